@@ -33,7 +33,19 @@ from ..base.errors import MechanismError
 from ..mechanism import parameters, parts
 from ..mechanism.description import RESERVED, Mechanism
 from ..mechanism.expressions import Quantity, affine
-from ..mechanism.flexure import CLAMP, ENDS, LINKS_MAX, MODELS, NODES_MAX, ORDER_DEFAULT, ORDER_MAX
+from ..mechanism.flexure import (
+    CLAMP,
+    ENDS,
+    HINGE_ORDER_DEFAULT,
+    LEAF,
+    LINKS_MAX,
+    MODELS,
+    NODES_MAX,
+    NOTCH_NODES,
+    ORDER_DEFAULT,
+    ORDER_MAX,
+    PROFILES,
+)
 from ..mechanism.parameters import NAME
 from ..mechanism.parts import FIELDS, GROUND, LENGTH_MAX, LENGTH_MIN
 from .units import check_coherent, number, quantity, si_unit
@@ -41,6 +53,10 @@ from .units import check_coherent, number, quantity, si_unit
 NAME_LENGTH_MAX = 100  # Characters; names become parts of file names.
 MATERIAL = ("youngs_modulus", "density")
 SECTION = ("thickness", "width")
+PROFILE = (
+    "profile", "end_thickness", "end_width", "notch_radius", "notch_depth", "waist_length",
+    "curvature", "rise",
+)  # fmt: skip
 TEXT, LIST = TAGS = ("<text>", "<list>")  # Tags of the two forms of a point, or of the ends.
 IDENTIFIER = "^[A-Za-z_][A-Za-z0-9_]*$"
 
@@ -132,6 +148,7 @@ Acceleration = Annotated[
     float, Measured("Acceleration of gravity", "m/s2", -1e6, 1e6, expression=False)
 ]
 End = Annotated[StrictStr, Field(json_schema_extra={"enum": list(ENDS)})]
+Profile = Annotated[StrictStr, Field(json_schema_extra={"enum": list(PROFILES)})]
 Model = Annotated[StrictStr, Field(json_schema_extra={"enum": list(MODELS)})]
 
 
@@ -207,11 +224,15 @@ class Section(Named):
     ) = Field(
         None,
         description="Order of the polynomial of the bending moment, for the model beam only "
-        f"(default: {ORDER_DEFAULT})",
+        f"(default: {ORDER_DEFAULT}; {HINGE_ORDER_DEFAULT} for a notch without a waist)",
     )
     nodes: (
         Annotated[StrictInt, Field(json_schema_extra={"minimum": 3, "maximum": NODES_MAX})] | None
-    ) = Field(None, description="Number of nodes, for the model beam only (default: order + 3)")
+    ) = Field(
+        None,
+        description="Number of nodes, or of those in a notch or waist, for the model beam only "
+        f"(default: order + 3; at least {NOTCH_NODES} in a notch without a waist)",
+    )
     thickness: Annotated[Quantity, measured(parts.FlexureType, "thickness")] | None = None
     width: Annotated[Quantity, measured(parts.FlexureType, "width")] | None = None
     material: StrictStr | None = Field(
@@ -220,12 +241,21 @@ class Section(Named):
     youngs_modulus: Annotated[Quantity, measured(parts.FlexureType, "youngs_modulus")] | None = None
     density: Annotated[Quantity, measured(parts.FlexureType, "density")] | None = None
     axial: StrictBool = Field(False, description="Whether the flexures can stretch")
+    profile: Profile = Field(LEAF, description="Section along a beam")
+    end_thickness: Annotated[Quantity, measured(parts.FlexureType, "end_thickness")] | None = None
+    end_width: Annotated[Quantity, measured(parts.FlexureType, "end_width")] | None = None
+    notch_radius: Annotated[Quantity, measured(parts.FlexureType, "notch_radius")] | None = None
+    notch_depth: Annotated[Quantity, measured(parts.FlexureType, "notch_depth")] | None = None
+    waist_length: Annotated[Quantity, measured(parts.FlexureType, "waist_length")] | None = None
+    curvature: Annotated[Quantity, measured(parts.FlexureType, "curvature")] | None = None
+    rise: Annotated[Quantity, measured(parts.FlexureType, "rise")] | None = None
     coefficients: dict[StrictStr, Annotated[Quantity, Measured("Coefficient", "")]] = Field(
         {}, description="Values that replace the published coefficients of the model"
     )
 
 
-_OWN = ("model", "n", "order", "nodes", *SECTION, "material", *MATERIAL, "axial", "coefficients")
+_OWN = ("model", "n", "order", "nodes", *SECTION, "material", *MATERIAL, "axial", "coefficients",
+        *PROFILE)  # fmt: skip
 _NO_MATERIAL_TWICE: list[Any] = [{"not": {"required": ["material", key]}} for key in MATERIAL]
 _MADE_OF: Any = {"anyOf": [{"required": ["material"]}, {"required": [*MATERIAL]}]}
 _OF_A_TYPE: Any = {"required": ["type"]}
@@ -244,7 +274,7 @@ class FlexureTypeTable(Section):
 
 
 class FlexureTable(Section):
-    """A straight flexure between two points, with a type or with its own section."""
+    """A flexure between two points, with a type or with its own section."""
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -473,7 +503,7 @@ def _type(table: Section, materials: Mapping[str, dict[str, Quantity]]) -> parts
             raise MechanismError(
                 f"{table.name}.{key} is missing: add the key, or the type of the flexure"
             )
-    keys = ("name", "model", "order", "nodes", *SECTION, "axial", "coefficients")
+    keys = ("name", "model", "order", "nodes", *SECTION, "axial", "coefficients", *PROFILE)
     given: dict[str, Any] = {key: getattr(table, key) for key in keys}
     return parts.FlexureType(**given | _material(table, materials), n=table.n or 0)
 
