@@ -211,6 +211,9 @@ def test_units_of_parameters_are_coherent_and_known_to_the_fmu():
     assert known <= {"", *units.COHERENT}
     for unit in units.COHERENT:
         units.check_coherent(unit.replace(".", "·"))
+        if unit.startswith("1/"):
+            assert units.converted("1", unit.replace("/", "/m"), unit) == 1e3
+            continue
         small = f"m{unit.removeprefix('k')}"
         assert units.converted("1", small, unit) == (1e-6 if unit.startswith("k") else 1e-3)
     for unit in ("mm", "deg", "g", "kN", "g/cm3", "1/ms"):

@@ -5,7 +5,7 @@ import pytest
 
 from kernel_library import constants
 from kernel_simulation import KernelMistake, KernelSimulation
-from many_parts import anvil, beams, elastic, two_stops
+from many_parts import anvil, beams, elastic, profiles, two_stops
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.independent import conditioning, independent
 from prbm.mechanics.inputs import input_names
@@ -158,7 +158,9 @@ def test_directional_derivatives_with_stretches_and_walls_on_bodies_equal_differ
     assert_directional(anvil(), HAMMER, BLOW, discrete)
 
 
-@pytest.mark.parametrize("guide", [elastic(), beams()], ids=["links", "beams"])
+@pytest.mark.parametrize(
+    "guide", [elastic(), beams(), profiles()], ids=["links", "beams", "profiles"]
+)
 def test_directional_derivatives_of_a_mechanism_with_all_kinds_of_parts_equal_differences(guide):
     inputs = dict.fromkeys(input_names(guide), 0.1) | {"pull.moment": 1e-3, "push.moment": -1e-3}
     inputs["tap.velocity"] = 0.04  # Away from the kink of the event indicator.

@@ -30,7 +30,7 @@ from kernel_library import (
     prototypes,
     structures,
 )
-from many_parts import beams, elastic, links_and_beams, rich
+from many_parts import beams, elastic, links_and_beams, profiles, rich
 from prbm.base import tolerances
 from prbm.base.errors import EquilibriumError, MechanismError, ParameterError, SimulationError
 from prbm.hybrid import runge_kutta
@@ -45,6 +45,7 @@ from prbm.mechanics import (
     forces,
     kinetics,
     modal,
+    profile,
     statics,
 )
 from prbm.mechanics import inputs as input_data
@@ -109,7 +110,10 @@ def spread(condition):
 
 
 NAMES = ("PRBDM", "PRBDM2R", "Rich", "Elastic", "Beams", "Mixed")
-OWN_MECHANISMS = {"Rich": rich, "Elastic": elastic, "Beams": beams, "Mixed": links_and_beams}
+OWN_MECHANISMS = {
+    "Rich": rich, "Elastic": elastic, "Beams": beams, "Mixed": links_and_beams,
+    "Profiles": profiles,
+}  # fmt: skip
 
 
 def described(name):
@@ -278,18 +282,54 @@ def test_unit_vectors_are_exact_along_the_axes():
         assert_same(found, expected)
 
 
-@twin(integrals=beam.integrals)
+@twin(
+    integrals=beam.integrals,
+    interpolation=beam.interpolation,
+    orthogonal=beam.orthogonal,
+)
 def test_beams_are_the_same():
     for order, nodes in ((1, 3), (3, 6), (7, 10), (12, 24)):
         for x in (-1.0, -0.3, 0.5, 1.0):
             S = np.zeros(order + 1)
             kernel().integrals(order, x, S)
             assert_same(S, beam.integrals(order, np.array([x]))[0])
+            lengths = np.zeros(nodes)
+            kernel().interpolation(nodes, x, lengths)
+            assert_same(lengths, beam.interpolation(nodes, np.array([x]))[0], scale=1.0)
         x, weights = np.zeros((2, nodes))
         kernel().gauss(nodes, x, weights)
         exact = np.polynomial.legendre.leggauss(nodes)
         assert_same(x, exact[0])
         assert_same(weights, exact[1])
+        peak = weights / (0.02 + x * x) ** 3
+        P = np.zeros((nodes, order + 1))
+        kernel().orthogonal(nodes, order, x, peak / peak.sum(), P)
+        assert_same(P, beam.orthogonal(order, x, peak / peak.sum()), 1e-9)
+
+
+@twin(notch_panels=profile.notch_panels, tangent=profile.Line.tangent)
+def test_panels_and_lines_are_the_same():
+    shapes = [(1e-3, 8e-3, (4e-3, 2e-3), H, w) for H in (5e-3, 3e-3, 9e-3) for w in (None, 6e-3)]
+    for shape in shapes:
+        notch = profile.Notch(*shape)
+        ours = structures()["Notch"](
+            *shape[:2], *shape[2], shape[3], shape[4] or 0.0, bool(shape[4])
+        )
+        expected = profile.notch_panels("neck", notch, 0.02, 7)
+        panels = (structures()["Panel"] * len(expected))()
+        kernel().notch_panels(b"neck", ours, 0.02, 7, ctypes.addressof(panels))
+        for panel, other in zip(panels, expected, strict=True):
+            assert panel.nodes == other.nodes
+            for x in (-1.0, -0.4, 0.0, 1.0):
+                section = kernel().section_at(panel, x)
+                found = [section.v, section.dv, section.thickness, section.width]
+                assert_same(found, np.ravel(other.at(np.array([x]))))
+    for line in (profile.Line(0.1), profile.Line(0.1, 12.0), profile.Line(0.1, 0.0, -0.02)):
+        ours = structures()["Line"](line.chord, line.curvature, line.rise)
+        assert kernel().line_length(ours) == pytest.approx(line.length, rel=1e-14)
+        for v in (0.0, 0.3, 1.0):
+            x = v * line.length
+            assert_same(kernel().tangent(ours, x), line.tangent(np.array([x]))[0])
 
 
 @twin(pull=direction_map.DirectionMap.pull, mass_matrix=system_arrays.System.mass_matrix)
@@ -993,7 +1033,8 @@ def test_fundamental_modes_away_from_equilibrium_are_the_same(name):
         kernel().fundamental_at(ours.structure, q, phi, M)
         expected, M_expected = modal.fundamental_at(system, q)
         assert_same(M, M_expected)
-        assert_same(np.sign(phi @ M @ expected) * phi, expected, 1e-9)
+        # Rounding errors are those of the fastest modes, which are those of notches.
+        assert_same(np.sign(phi @ M @ expected) * phi, expected, 1e-8)
 
 
 @twin(simulated_restitution=modal.simulated_restitution)

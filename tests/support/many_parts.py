@@ -207,3 +207,27 @@ def links_and_beams() -> Mechanism:
         for kind in links.flexure_types
     )
     return dataclasses.replace(links, flexure_types=kinds)
+
+
+def profiles(*, axial: bool = True) -> Mechanism:
+    """Return a mechanism of a notch, a taper, an arc, and a notch with fillets, from either end."""
+    links = elastic()
+    extra = {
+        "leaf": {
+            "order": 2, "profile": "taper", "end_thickness": "L/140", "end_width": 6e-3,
+            "rise": 1e-3,
+        },
+        "chain": {
+            "profile": "notch", "notch_radius": "L/80", "notch_depth": 1.5e-3, "waist_length": 0.02,
+        },
+        "bar": {"order": 1, "curvature": 12.0},
+    }  # fmt: skip
+    kinds = [
+        dataclasses.replace(kind, model="beam", n=0, axial=axial, **extra[kind.name])
+        for kind in links.flexure_types
+    ]
+    hinge = FlexureType("neck", "beam", 6e-4, 8e-3, 3e9, 1200.0, profile="notch", notch_radius=3e-3)
+    flexures = [
+        dataclasses.replace(f, type="neck") if f.name == "three" else f for f in links.flexures
+    ]
+    return dataclasses.replace(links, flexure_types=(*kinds, hinge), flexures=tuple(flexures))

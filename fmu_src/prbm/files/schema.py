@@ -15,7 +15,16 @@ from ..base.errors import MechanismError, PrbmError
 from ..mechanism import parameters, parts
 from ..mechanism.description import RESERVED, Mechanism
 from ..mechanism.expressions import Quantity, affine
-from ..mechanism.flexure import CLAMP, LINKS_MAX, NODES_MAX, ORDER_DEFAULT, ORDER_MAX
+from ..mechanism.flexure import (
+    CLAMP,
+    HINGE_ORDER_DEFAULT,
+    LEAF,
+    LINKS_MAX,
+    NODES_MAX,
+    NOTCH_NODES,
+    ORDER_DEFAULT,
+    ORDER_MAX,
+)
 from ..mechanism.parts import FIELDS, GROUND, LENGTH_MAX, LENGTH_MIN
 from .copies import Copied, Drawing, check_names, copied_bodies, explained, origins
 from .outlines import plate
@@ -34,6 +43,7 @@ from .values import (
     Point,
     PointName,
     PointOrName,
+    Profile,
     Reference,
     measured,
 )
@@ -43,6 +53,10 @@ GIVEN = ("mass", "inertia", "centre")
 PLATE = ("thickness", "material", "density")
 MATERIAL = ("youngs_modulus", "density")
 SECTION = ("thickness", "width")
+PROFILE = (
+    "profile", "end_thickness", "end_width", "notch_radius", "notch_depth", "waist_length",
+    "curvature", "rise",
+)  # fmt: skip
 IDENTIFIER = "^[A-Za-z_][A-Za-z0-9_]*$"
 
 
@@ -121,11 +135,15 @@ class Section(Named):
     ) = Field(
         None,
         description="Order of the polynomial of the bending moment, for the model beam only "
-        f"(default: {ORDER_DEFAULT})",
+        f"(default: {ORDER_DEFAULT}; {HINGE_ORDER_DEFAULT} for a notch without a waist)",
     )
     nodes: (
         Annotated[StrictInt, Field(json_schema_extra={"minimum": 3, "maximum": NODES_MAX})] | None
-    ) = Field(None, description="Number of nodes, for the model beam only (default: order + 3)")
+    ) = Field(
+        None,
+        description="Number of nodes, or of those in a notch or waist, for the model beam only "
+        f"(default: order + 3; at least {NOTCH_NODES} in a notch without a waist)",
+    )
     thickness: Annotated[Quantity, measured(parts.FlexureType, "thickness")] | None = None
     width: Annotated[Quantity, measured(parts.FlexureType, "width")] | None = None
     material: StrictStr | None = Field(
@@ -134,12 +152,21 @@ class Section(Named):
     youngs_modulus: Annotated[Quantity, measured(parts.FlexureType, "youngs_modulus")] | None = None
     density: Annotated[Quantity, measured(parts.FlexureType, "density")] | None = None
     axial: StrictBool = Field(False, description="Whether the flexures can stretch")
+    profile: Profile = Field(LEAF, description="Section along a beam")
+    end_thickness: Annotated[Quantity, measured(parts.FlexureType, "end_thickness")] | None = None
+    end_width: Annotated[Quantity, measured(parts.FlexureType, "end_width")] | None = None
+    notch_radius: Annotated[Quantity, measured(parts.FlexureType, "notch_radius")] | None = None
+    notch_depth: Annotated[Quantity, measured(parts.FlexureType, "notch_depth")] | None = None
+    waist_length: Annotated[Quantity, measured(parts.FlexureType, "waist_length")] | None = None
+    curvature: Annotated[Quantity, measured(parts.FlexureType, "curvature")] | None = None
+    rise: Annotated[Quantity, measured(parts.FlexureType, "rise")] | None = None
     coefficients: dict[StrictStr, Annotated[Quantity, Measured("Coefficient", "")]] = Field(
         {}, description="Values that replace the published coefficients of the model"
     )
 
 
-_OWN = ("model", "n", "order", "nodes", *SECTION, "material", *MATERIAL, "axial", "coefficients")
+_OWN = ("model", "n", "order", "nodes", *SECTION, "material", *MATERIAL, "axial", "coefficients",
+        *PROFILE)  # fmt: skip
 _NO_MATERIAL_TWICE: list[Any] = [{"not": {"required": ["material", key]}} for key in MATERIAL]
 _MADE_OF: Any = {"anyOf": [{"required": ["material"]}, {"required": [*MATERIAL]}]}
 _OF_A_TYPE: Any = {"required": ["type"]}
@@ -158,7 +185,7 @@ class FlexureTypeTable(Section):
 
 
 class FlexureTable(Section):
-    """A straight flexure between two points, with a type or with its own section."""
+    """A flexure between two points, with a type or with its own section."""
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -452,7 +479,7 @@ def _type(table: Section, materials: Mapping[str, dict[str, Quantity]]) -> parts
             raise MechanismError(
                 f"{table.name}.{key} is missing: add the key, or the type of the flexure"
             )
-    keys = ("name", "model", "order", "nodes", *SECTION, "axial", "coefficients")
+    keys = ("name", "model", "order", "nodes", *SECTION, "axial", "coefficients", *PROFILE)
     given: dict[str, Any] = {key: getattr(table, key) for key in keys}
     return parts.FlexureType(**given | _material(table, materials), n=table.n or 0)
 

@@ -20,7 +20,7 @@ from pydantic_core import CoreSchema, core_schema
 
 from ..base.errors import MechanismError
 from ..mechanism.expressions import Quantity
-from ..mechanism.flexure import ENDS, MODELS
+from ..mechanism.flexure import ENDS, MODELS, PROFILES
 from ..mechanism.parameters import NAME
 from ..mechanism.parts import FIELDS
 from .images import Line
@@ -126,6 +126,7 @@ Acceleration = Annotated[
     float, Measured("Acceleration of gravity", "m/s2", -1e6, 1e6, expression=False)
 ]
 End = Annotated[StrictStr, Field(json_schema_extra={"enum": list(ENDS)})]
+Profile = Annotated[StrictStr, Field(json_schema_extra={"enum": list(PROFILES)})]
 Model = Annotated[StrictStr, Field(json_schema_extra={"enum": list(MODELS)})]
 
 

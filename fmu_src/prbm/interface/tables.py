@@ -17,7 +17,7 @@ from ..mechanics.assembly import assemble
 from ..mechanics.inputs import input_names
 from ..mechanism.description import Mechanism
 from ..mechanism.expressions import Affine, Quantity, affine
-from ..mechanism.flexure import ENDS  # of a chain; also pivots of a flexure
+from ..mechanism.flexure import ENDS, PROFILES
 from ..mechanism.parts import (
     GROUND,
     Flexure,
@@ -29,6 +29,7 @@ from ..mechanism.parts import (
     Point,
     Release,
     body_of,
+    field_of,
     fields_of,
 )
 from .native import counter_of, state_derivatives
@@ -45,8 +46,13 @@ from .variables import (
 )
 
 FILE = "mechanism.bin"
-MAGIC, VERSION = b"PRBM", 4
+MAGIC, VERSION = b"PRBM", 5
 HEAD = 16  # Bytes before those that the checksum covers.
+DIMENSIONS = (
+    "end_thickness", "end_width", "notch_radius", "notch_depth", "waist_length", "curvature",
+    "rise",
+)  # fmt: skip
+"""Fields of a flexure type that are not always given, in the order of its fields."""
 STARTS = ("displacement", "angle", "amplitude")  # The starts of a release.
 TYPES = {"Real": 0, "Integer": 1, "Boolean": 2, CLOCK: 3}
 COORDINATES_MAX = 512  # The mass matrix then has 2 MB.
@@ -170,6 +176,13 @@ def _groups(mechanism: Mechanism, independent: Sequence[int]) -> dict[str, Itera
     }
 
 
+def _given(part: Part, name: str) -> Quantity:
+    """Return a field that is given, or the expression of its default."""
+    quantity = field_of(part, name)
+    assert quantity is not None
+    return quantity
+
+
 def _u32(*numbers: int) -> bytes:
     return struct.pack(f"<{len(numbers)}I", *numbers)
 
@@ -288,7 +301,7 @@ class _Writer:
 
     def _fields(self, part: Part) -> bytes:
         names = fields_of(part)
-        return b"".join(self._field(f"{part.name}.{n}", getattr(part, n)) for n in names)
+        return b"".join(self._field(f"{part.name}.{n}", _given(part, n)) for n in names)
 
     def _point(self, point: Point) -> bytes:
         return b"".join(self._expression(affine(coordinate)) for coordinate in point)
@@ -303,6 +316,8 @@ class _Writer:
         )
         flags = _u32(model.lumped, model.rate_with_gamma, kind.axial)
         numbers = flags + _u32(len(model.gamma), model.links, model.order, model.nodes)
+        given = sum(1 << i for i, n in enumerate(DIMENSIONS) if field_of(kind, n) is not None)
+        numbers += _u32(PROFILES.index(kind.profile), given)
         return _text(kind.name) + numbers + self._fields(kind) + b"".join(coefficients)
 
     def _between(self, part: Flexure | Joint) -> bytes:
@@ -323,7 +338,7 @@ class _Writer:
         parts: tuple[Part, ...] = (*m.flexure_types, *m.bodies, *m.frictions, *m.stops, m.release)
         for part in parts:
             for name, (unit, _, minimum, maximum, *_) in fields_of(part).items():
-                quantity = getattr(part, name)
+                quantity = _given(part, name)
                 if isinstance(quantity, str):
                     head = _text(f"{part.name}.{name}") + _text(unit)
                     yield head + self._field(name, quantity) + _f64(minimum, maximum)

@@ -112,6 +112,8 @@ enum { EFFORT_MAX = 1000000 };
 #define LOWEST_BOUNCE_RTOL 1e-10
 #define INDICATOR_LEAD_RTOL 0.01
 #define DEPENDENT_PIVOT_RTOL 1e-07
+#define NOTCH_PEAK_FACTOR 0.7
+enum { FINE_POINTS = 8 };
 enum { GAUSS_ITERATIONS_MAX = 8 };
 
 /* --- prbm.mechanics.contact_state --------------------------------------------------------------- */
@@ -150,10 +152,17 @@ enum { LINKS_MAX = 200 };
 enum { ORDER_MAX = 12 };
 enum { NODES_EXTRA_MIN = 2 };
 enum { NODES_MAX = 24 };
+enum { THICK_NODES = 2 };
+enum { FILLET_NODES = 4 };
+typedef enum {
+    PROFILE_LEAF = 0,
+    PROFILE_TAPER = 1,
+    PROFILE_NOTCH = 2,
+} Profile;
 
 /* --- prbm.interface.tables ---------------------------------------------------------------------- */
 
-enum { TABLES_VERSION = 4 };
+enum { TABLES_VERSION = 5 };
 enum { TABLES_HEAD = 16 };
 enum { COORDINATES_MAX = 512 };
 enum { DIRECTIONS_MAX = 1024 };
@@ -186,6 +195,16 @@ typedef enum {
     BOOLEAN = 2,
     CLOCK = 3,
 } VariableType;
+typedef enum {
+    DIMENSION_END_THICKNESS = 0,
+    DIMENSION_END_WIDTH = 1,
+    DIMENSION_NOTCH_RADIUS = 2,
+    DIMENSION_NOTCH_DEPTH = 3,
+    DIMENSION_WAIST_LENGTH = 4,
+    DIMENSION_CURVATURE = 5,
+    DIMENSION_RISE = 6,
+    DIMENSION_COUNT = 7,
+} Dimension;
 typedef enum {
     START_DISPLACEMENT = 0,
     START_ANGLE = 1,

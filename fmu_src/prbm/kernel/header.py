@@ -34,7 +34,16 @@ from ..interface.variables import (
 )
 from ..mechanics.contact_state import ContactMode
 from ..mechanics.inputs import BASE_AXES, INPUT_GROUPS, LOADS, WALL_INPUTS
-from ..mechanism.flexure import ENDS, LINKS_MAX, NODES_EXTRA_MIN, NODES_MAX, ORDER_MAX
+from ..mechanism.flexure import (
+    ENDS,
+    FILLET_NODES,
+    LINKS_MAX,
+    NODES_EXTRA_MIN,
+    NODES_MAX,
+    ORDER_MAX,
+    PROFILES,
+    THICK_NODES,
+)
 from ..mechanism.parts import LENGTH_MIN
 
 PATH = Path(__file__).with_name("generated.h")
@@ -72,6 +81,9 @@ def header() -> str:
                 _constant("ORDER_MAX", ORDER_MAX),
                 _constant("NODES_EXTRA_MIN", NODES_EXTRA_MIN),
                 _constant("NODES_MAX", NODES_MAX),
+                _constant("THICK_NODES", THICK_NODES),
+                _constant("FILLET_NODES", FILLET_NODES),
+                _enumeration("Profile", "PROFILE", _numbers(PROFILES)),
             ],
         ),
         _section(tables, _tables()),
@@ -143,6 +155,7 @@ def _tables() -> Iterator[str]:
     yield _constant("GROUND", tables.GROUND_NUMBER)
     yield _enumeration("SlotGroup", "SLOTS", _counted(tables.SLOT_GROUPS))
     yield _enumeration("VariableType", "", tables.TYPES)
+    yield _enumeration("Dimension", "DIMENSION", _numbers((*tables.DIMENSIONS, "count")))
     yield _enumeration("ReleaseStart", "START", _numbers((*tables.STARTS, "count")))
 
 

@@ -21,6 +21,7 @@
 #include "core/mechanism.h"
 #include "core/tables.h"
 #include "core/flexure.h"
+#include "core/profile.h"
 #include "core/beam.h"
 #include "core/system.h"
 #include "core/assembly.h"

@@ -19,6 +19,7 @@
 #include "core/kinetics.c"
 #include "core/constraints.c"
 #include "core/collection.c"
+#include "core/profile.c"
 #include "core/beam.c"
 #include "core/flexures.c"
 #include "core/block_map.c"

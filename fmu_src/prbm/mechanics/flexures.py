@@ -1,21 +1,22 @@
 """Flexures as links or beams: their coordinates, directions, masses, springs and loops."""
 
 import cmath
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from ..base.errors import ParameterError
 from ..mechanism.description import Mechanism
 from ..mechanism.expressions import affine
-from ..mechanism.flexure import PIN, Segments, segments
+from ..mechanism.flexure import NOTCH, PIN, TAPER, Segments, segments
 from ..mechanism.parts import LENGTH_MIN, Flexure, FlexureType, body_of, value
-from .arrays import Real
-from .beam import Beam
+from .arrays import Complex, Real
+from .beam import Beam, Material
 from .collection import Collection
+from .profile import Line, Notch, Panel, Straight, notch_panels
 from .system import Place
 
-CURVE_POINTS = 33  # Points of a drawn beam.
+CURVE_POINTS = 33  # Points of each panel of a drawn beam.
 
 
 def add_flexure(parts: Collection, flexure: Flexure) -> None:
@@ -26,7 +27,8 @@ def add_flexure(parts: Collection, flexure: Flexure) -> None:
     Raises
     ------
     ParameterError
-        If the flexure has no length, or its links are longer than the flexure.
+        If the flexure has no length, its links or its notch are longer than the flexure, its notch
+        vanishes, or its ends are impossible for its curvature or rise.
     """
     kind = next(k for k in parts.mechanism.flexure_types if k.name == flexure.type)
     if parts.length(flexure) < LENGTH_MIN:
@@ -35,7 +37,7 @@ def add_flexure(parts: Collection, flexure: Flexure) -> None:
             f"{parts.length(flexure):g} m: move its ends apart"
         )
     if parts.mechanism.model(kind).order:
-        _add_beam(parts, flexure, _beam(parts, flexure, kind), kind.axial)
+        _add_beam(parts, flexure, _beam(parts, flexure, kind), kind)
     else:
         _add_links(parts, flexure, _segments(parts, flexure, kind))
 
@@ -107,12 +109,55 @@ def _add_link(parts: Collection, direction: complex, length: float, axial: float
 
 def _beam(parts: Collection, flexure: Flexure, kind: FlexureType) -> Beam:
     """Return the beam of a flexure."""
-    L, model = parts.length(flexure), parts.mechanism.model(kind)
-    EI, EA, mass = _section(parts, kind)
-    return Beam(model.order, model.nodes, L, EI, mass * L, EA if kind.axial else 0.0)
+    model, line = parts.mechanism.model(kind), _line(parts, flexure, kind)
+    panels = _panels(parts, flexure, kind, line.length, model.nodes)
+    material = Material(*(value(kind, n, parts.values) for n in ("youngs_modulus", "density")))
+    return Beam(model.order, panels, line, material)
 
 
-def _add_beam(parts: Collection, flexure: Flexure, beam: Beam, axial: bool) -> None:
+def _line(parts: Collection, flexure: Flexure, kind: FlexureType) -> Line:
+    """Return the line of a beam as drawn."""
+    chord = parts.length(flexure)
+    if kind.curvature is not None:
+        curvature = value(kind, "curvature", parts.values)
+        if not abs(curvature) * chord < 2.0:
+            raise ParameterError(
+                f"flexure {flexure.name}: {kind.name}.curvature = {curvature:g} 1/m is impossible "
+                f"for ends at the distance {chord:g} m: choose one below {2.0 / chord:g} 1/m"
+            )
+        return Line(chord, curvature=curvature)
+    if kind.rise is not None:
+        rise = value(kind, "rise", parts.values)
+        if not abs(rise) < chord:
+            raise ParameterError(
+                f"flexure {flexure.name}: {kind.name}.rise = {rise:g} m is impossible for ends at "
+                f"the distance {chord:g} m: choose a rise below this distance"
+            )
+        return Line(chord, rise=rise)
+    return Line(chord)
+
+
+def _panels(
+    parts: Collection, flexure: Flexure, kind: FlexureType, L: float, nodes: int
+) -> Sequence[Panel]:
+    """Return the panels of a beam with the length L [m]."""
+
+    def given(name: str) -> float:
+        return value(kind, name, parts.values)
+
+    h, b = given("thickness"), given("width")
+    if kind.profile == NOTCH:
+        axes = given("notch_radius"), given("notch_depth")
+        waist = None if kind.hinge else given("waist_length")
+        notch = Notch(h, b, axes, given("end_thickness"), waist)
+        return notch_panels(flexure.name, notch, L, nodes)
+    if kind.profile == TAPER:
+        ends = (h, given("end_thickness")), (b, given("end_width"))
+        return (Straight(nodes, 0.0, L, *ends),)
+    return (Straight(nodes, 0.0, L, (h, h), (b, b)),)
+
+
+def _add_beam(parts: Collection, flexure: Flexure, beam: Beam, kind: FlexureType) -> None:
     """Add a beam: its coordinates, one arm for each node, masses and springs.
 
     The rotation of a clamped or free end is that of the body there, that of a pinned end is a
@@ -125,16 +170,17 @@ def _add_beam(parts: Collection, flexure: Flexure, beam: Beam, axial: bool) -> N
         for name, end in zip(("start", "end"), flexure.ends, strict=True)
     ]
     bends = [parts.angle_of_flexure(f"{flexure.name}.bend[{k}]") for k in range(1, beam.order + 1)]
-    strain = parts.coordinate(flexure.name) if axial else None
+    strain = parts.coordinate(flexure.name) if kind.axial else None
     new = next((body for body in bodies if body not in parts.origin), None)
     turned = None if new is None else parts.coordinate(new)
     ends = [
         pin if end == PIN else turned if body == new else parts.angle(parts.index[body])
         for pin, body, end in zip(pins, bodies, flexure.ends, strict=True)
     ]
-    arms = [_add_node(parts, [*ends, *bends], turns, strain) for turns in beam.turns]
+    known = zip(beam.turns, beam.strains, strict=True)
+    arms = [_add_node(parts, [*ends, *bends], turns, strain, own) for turns, own in known]
     reached = None if turned is None else parts.direction({turned: 1.0})
-    _place_beam(parts, flexure, beam, arms, reached)
+    _place_beam(parts, flexure, beam, arms, reached, thick=kind.profile == NOTCH)
     rates = beam.rates.tolist()
     parts.spring(rates[0], *ends)
     for j, rate in zip(bends, rates[1:], strict=True):
@@ -144,18 +190,24 @@ def _add_beam(parts: Collection, flexure: Flexure, beam: Beam, axial: bool) -> N
 
 
 def _add_node(
-    parts: Collection, coordinates: list[int | None], turns: Real, strain: int | None
+    parts: Collection, coordinates: list[int | None], turns: Real, strain: int | None, own: float
 ) -> int:
-    """Add the arm of a node, and its stretch; return its direction."""
+    """Add the arm of a node, and its stretch, own times the strain; return its direction."""
     known = zip(coordinates, turns, strict=True)
     arm = parts.direction({j: float(turn) for j, turn in known if j is not None})
     if strain is not None:
-        parts.direction({strain: 1.0}, arm=arm)
+        parts.direction({strain: float(own)}, arm=arm)
     return arm
 
 
 def _place_beam(
-    parts: Collection, flexure: Flexure, beam: Beam, arms: list[int], turned: int | None
+    parts: Collection,
+    flexure: Flexure,
+    beam: Beam,
+    arms: list[int],
+    turned: int | None,
+    *,
+    thick: bool,
 ) -> None:
     """Place the masses and the far end of a beam.
 
@@ -171,29 +223,38 @@ def _place_beam(
         Directions of the nodes.
     turned : int or None
         Direction of the body that the beam reaches; None: both bodies have been reached before.
+    thick : bool
+        Whether the sections have rotary inertia.
     """
     z_start, z_end = parts.end(flexure, flexure.start), parts.end(flexure, flexure.end)
     direction = (z_end - z_start) / abs(z_end - z_start)
-    whole = beam.positions(np.array([1.0]))[0]
+    whole = beam.whole
     forwards = body_of(flexure.start) in parts.origin
     near, z_near = (flexure.start, z_start) if forwards else (flexure.end, z_end)
     far, z_far = (flexure.end, z_end) if forwards else (flexure.start, z_start)
     root = parts.on(body_of(near), z_near)
 
-    def at(lengths: Real) -> Place:
+    def at(lengths: Complex) -> Place:
         place = root
         for arm, length in zip(arms, lengths if forwards else lengths - whole, strict=True):
-            place = place.plus(arm, float(length) * direction)
+            place = place.plus(arm, complex(length) * direction)
         return place
 
-    for mass, lengths in zip(beam.masses, beam.node_positions, strict=True):
-        parts.mass(at(lengths), float(mass))
+    sections = zip(arms, beam.masses, beam.radii, beam.node_positions, strict=True)
+    for arm, mass, radius, lengths in sections:
+        place = at(lengths)
+        if thick:  # Two masses across the flexure have the moment of inertia of the section.
+            for across in (-radius, radius):
+                parts.mass(place.plus(arm, 1j * across * direction), float(mass) / 2)
+        else:
+            parts.mass(place, float(mass))
     tip = at(whole if forwards else 0.0 * whole)
     if turned is None:
         parts.close(flexure.name, tip, parts.on(body_of(far), z_far))
     else:
         parts.reach(body_of(far), tip, z_far, turned)
-    curve = beam.positions(np.linspace(-1.0, 1.0, CURVE_POINTS))
+    points = np.linspace(-1.0, 1.0, CURVE_POINTS)
+    curve = beam.positions([points, *[points[1:]] * (len(beam.panels) - 1)])
     parts.lines.append((flexure.name, "flexure", [at(lengths) for lengths in curve]))
 
 

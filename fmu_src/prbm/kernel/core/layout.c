@@ -1,6 +1,7 @@
 /* The order of the assembly, the coordinates, and the positions of inputs and values. */
 #include <string.h>
 
+#include "core/beam.h"
 #include "core/flexure.h"
 #include "core/layout.h"
 #include "core/system.h"
@@ -25,10 +26,22 @@ static int pin_count(const Flexure *flexure) {
     return (flexure->type_at_start == PIN) + (flexure->type_at_end == PIN);
 }
 
+/* Return the number of nodes in all panels of a beam. */
+static int all_nodes(const FlexureType *kind) {
+    return node_count(kind->profile == PROFILE_NOTCH, !is_hinge(kind), kind->nodes);
+}
+
+static size_t size_of_beam(const FlexureType *kind) {
+    bool notched = kind->profile == PROFILE_NOTCH;
+    return beam_size(kind->order, all_nodes(kind), panel_count(notched, !is_hinge(kind)));
+}
+
 static Addition beam_addition(const FlexureType *kind, const Flexure *flexure) {
-    int nodes = kind->nodes, stretches = kind->axial ? nodes : 0;
+    int nodes = all_nodes(kind), stretches = kind->axial ? nodes : 0;
+    int masses = kind->profile == PROFILE_NOTCH ? 2 * nodes : nodes;
     Addition result = {kind->order + pin_count(flexure), kind->axial, nodes, stretches,
-                       1 + kind->order + kind->axial, nodes, nodes * (kind->order + 2) + stretches};
+                       1 + kind->order + kind->axial, masses,
+                       nodes * (kind->order + 2) + stretches};
     return result;
 }
 
@@ -60,6 +73,10 @@ PRBM void count_coordinates(Reader *reader, Mechanism *m) {
         masses += more.masses;
         map += more.map;
         m->longest = more.arms > m->longest ? more.arms : m->longest;
+        size_t size = kind_of(m, &m->flexures[i])->order > 0
+                          ? size_of_beam(kind_of(m, &m->flexures[i]))
+                          : 0;
+        m->beam_size = size > m->beam_size ? size : m->beam_size;
     }
     long long parts = (long long)m->flexure_count + m->joint_count;
     long long n = links + strains + b, r = 2 * (parts - b);
@@ -174,7 +191,7 @@ static void add_beam(const FlexureType *kind, const Flexure *flexure, Walk *walk
     int body = reached != GROUND ? add_body_angle(walk, reached) : FIXED;
     int start = end_angle(walk, flexure->type_at_start, start_pin, flexure->between.start);
     int end = end_angle(walk, flexure->type_at_end, end_pin, flexure->between.end);
-    for (int i = 0; i < kind->nodes; i++) {
+    for (int i = 0; i < all_nodes(kind); i++) {
         int arm = add_direction(walk, FIXED);
         depend(walk, start);
         depend(walk, end);

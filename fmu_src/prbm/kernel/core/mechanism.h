@@ -34,8 +34,11 @@ typedef struct {
     int pivots; /* Pivots of a cantilever; 0 for a chain. */
     int links;  /* Links of a chain; 0 for a model with coefficients. */
     int order;  /* Order of the bending moment of a beam; 0 for links. */
-    int nodes;  /* Nodes of a beam. */
+    int nodes;  /* Nodes of a beam, or of its notch or waist. */
+    int profile; /* PROFILE_... */
+    uint32_t given; /* The bits of the dimensions that are given. */
     Expression thickness, width, youngs_modulus, density;
+    Expression dimensions[DIMENSION_COUNT]; /* of the profile and of the line as drawn */
     const Expression *gamma, *K_theta; /* (pivots,) */
 } FlexureType;
 
@@ -179,9 +182,13 @@ typedef struct {
     int coordinate_count, direction_count, loop_count, link_count, strain_count, stretch_count,
         mass_count, spring_count;
     int longest; /* Largest number of links or nodes of a flexure. */
+    size_t beam_size; /* Largest number of doubles that a beam needs. */
     Slots slots;
 } Mechanism;
 
+PRBM bool has_dimension(const FlexureType *kind, int dimension);
+/* Whether a flexure has a notch without a waist, which bends like a hinge. */
+PRBM bool is_hinge(const FlexureType *kind);
 PRBM double evaluate(Expression quantity, const double *values); /* Twin: Affine in mechanism/. */
 PRBM bool check_parameter(const Parameter *parameter, double x, Problem *problem);
 /* Check all values and the fields that are expressions (Mechanism.values of the twin). */

@@ -1,0 +1,313 @@
+"""Beams with a profile: the boundary value problem, masses, frequencies, and rejected profiles."""
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import quad, solve_ivp
+from scipy.linalg import eigh
+from scipy.optimize import newton
+
+from prbm.base.errors import MechanismError, ParameterError
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.modal import modes
+from prbm.mechanics.statics import equilibrium
+from prbm.mechanism.description import Mechanism
+from prbm.mechanism.parts import Body, Flexure, FlexureType, Force, Release
+
+L, WIDTH, E, RHO = 0.03, 0.01, 70e9, 2700.0
+
+
+def kind(**given):
+    return FlexureType("neck", "beam", 5e-4, WIDTH, E, RHO, **given)
+
+
+KINDS = {
+    "taper": kind(profile="taper", end_thickness=2e-4, order=3),
+    "wide taper": kind(profile="taper", end_thickness=1e-3, end_width=4e-3, order=3),
+    "circular": kind(profile="notch", notch_radius=4e-3, order=3),
+    "shallow": kind(profile="notch", notch_radius=8e-3, end_thickness=4e-3, order=3),
+    "elliptic": kind(profile="notch", notch_radius=8e-3, notch_depth=3e-3, order=3),
+    "filleted": kind(profile="notch", notch_radius=2e-3, waist_length=0.012, order=3),
+    "in a block": kind(profile="notch", notch_radius=1.5e-3, end_thickness=0.015, order=3),
+}
+KINKS = {
+    "taper": (), "wide taper": (), "circular": (4e-3,), "elliptic": (8e-3,),
+    "shallow": (math.sqrt(8e-3**2 - 6.25e-3**2),), "filleted": (6e-3, 8e-3),
+    "in a block": (1.5e-3,),
+}  # fmt: skip
+"""Distances from the middle at which the thickness has kinks [m]."""
+
+
+def thickness(name, s):
+    """Return the thickness at s, from its definition [m]."""
+    k, d = KINDS[name], abs(s - L / 2)
+    if k.profile == "taper":
+        return k.thickness + (k.end_thickness - k.thickness) * s / L
+    a, d = k.notch_radius, d - (k.waist_length or 0.0) / 2
+    b = k.notch_depth or a
+    outside = k.end_thickness or k.thickness + 2 * b
+    if d <= 0.0:
+        return k.thickness
+    arc = k.thickness + 2 * b * (1 - math.sqrt(1 - (d / a) ** 2)) if d < a else math.inf
+    return min(arc, outside)
+
+
+def width(name, s):
+    k = KINDS[name]
+    return k.width + ((k.end_width or k.width) - k.width) * s / L
+
+
+def panels(name):
+    """Return the ends of the smooth parts, from 0 to L [m]."""
+    return [0.0, *(L / 2 - x for x in KINKS[name][::-1]), *(L / 2 + x for x in KINKS[name]), L]
+
+
+def integral(name, f):
+    """Return the integral of f over the length."""
+    parts = pairwise(panels(name))
+    return sum(quad(f, *part, epsabs=0.0, epsrel=1e-11, limit=400)[0] for part in parts)
+
+
+def rigidity(name, s):
+    return E * width(name, s) * thickness(name, s) ** 3 / 12
+
+
+def cantilever(k, ends=("clamp", "free"), *, backwards=False, mass=1e-3, inertia=1e-7):
+    points = ("ground.clamp", "tip.end")
+    description = Mechanism(
+        name="Cantilever",
+        title="A beam, clamped at one end",
+        ground={"clamp": (0.0, 0.0)},
+        bodies=(Body("tip", mass, inertia, (L, 0.0), {"end": (L, 0.0)}),),
+        flexure_types=(k,),
+        flexures=(
+            Flexure("beam", k.name, *(points[::-1] if backwards else points),
+                    ends[::-1] if backwards else ends),
+        ),
+        forces=(Force("force", "tip"),),
+        release=Release("tip", direction=90.0),
+    )  # fmt: skip
+    return assemble(description, description.values())
+
+
+def tip(system, force=0j, moment=0.0):
+    """Return the position [m] and the slope of the tip under loads [N], [N m]."""
+    loads = {"force.x": force.real, "force.y": force.imag, "force.moment": moment}
+    shape = equilibrium(system, loads=loads)
+    frame = system.bodies["tip"]
+    return complex(frame.A @ system.directions(shape.q)) + frame.c, float(shape.q[frame.j])
+
+
+def elastica(name, force, moment):
+    """Return the tip under dead loads by shooting from the tip, whose slope is sought."""
+
+    def clamp(slope):
+        y = np.array([slope, 0.0, 0.0])  # Slope, and position relative to the tip.
+
+        def change(s, y):
+            M = moment - (complex(y[1], -y[2]) * force).imag
+            return [M / rigidity(name, s), math.cos(y[0]), math.sin(y[0])]
+
+        for part in pairwise(panels(name)[::-1]):
+            y = solve_ivp(change, part, y, method="DOP853", rtol=1e-11, atol=1e-14).y[:, -1]
+        return y
+
+    slope = newton(lambda angle: clamp(angle)[0], 0.5, tol=1e-10)
+    return -complex(*clamp(slope)[1:]), slope
+
+
+def weakness(name, lever):
+    """Return the slope of the tip under a load whose moment at s is the lever [rad]."""
+    return integral(name, lambda s: lever(s) / rigidity(name, s))
+
+
+@pytest.mark.parametrize("load", ["moment", "force", "both"])
+@pytest.mark.parametrize("name", KINDS)
+def test_a_beam_of_order_3_bends_by_40_degrees_like_the_boundary_value_problem(name, load):
+    slope = math.radians(40.0)
+    moment = slope / weakness(name, lambda s: 1.0) if load != "force" else 0.0
+    force = 1.2j * slope / weakness(name, lambda s: L - s) if load != "moment" else 0j
+    if load == "both":  # Half of the slope by each load, and compression.
+        moment, force = 0.5 * moment, 0.5 * force - 0.3 * abs(force)
+    z, found = tip(cantilever(KINDS[name]), force, moment)
+    exact, angle = elastica(name, force, moment)
+    assert math.radians(38.0) < angle < math.radians(60.0)
+    assert abs(z - exact) < 1e-4 * abs(exact - L)
+    assert found == pytest.approx(angle, rel=1e-4)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_errors_fall_with_the_order_and_the_nodes(name):
+    force = 1.2j * math.radians(40.0) / weakness(name, lambda s: L - s)
+    exact, _ = elastica(name, force, 0.0)
+    errors = [
+        abs(tip(cantilever(replace(KINDS[name], order=n, nodes=nodes)), force)[0] - exact)
+        for n, nodes in ((1, 5), (3, 8), (5, 12))
+    ]
+    assert errors[1] < 0.2 * errors[0]
+    assert errors[2] < 0.5 * errors[1] or errors[2] < 1e-5 * abs(exact - L)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_a_profile_is_the_same_from_either_end(name):
+    systems = [
+        cantilever(replace(KINDS[name], axial=True), backwards=backwards)
+        for backwards in (False, True)
+    ]
+    if KINDS[name].profile == "taper":  # The start is the other end.
+        k = KINDS[name]
+        turned = {"thickness": k.end_thickness, "end_thickness": k.thickness,
+                  "width": k.end_width or k.width, "end_width": k.width}  # fmt: skip
+        systems[1] = cantilever(replace(k, axial=True, **turned), backwards=True)
+    load = 0.3j / L / weakness(name, lambda s: 1.0)
+    assert tip(systems[0], load)[0] == pytest.approx(tip(systems[1], load)[0], abs=1e-9 * L)
+    found = [modes(system, equilibrium(system)).frequency[:3] for system in systems]
+    np.testing.assert_allclose(*found, rtol=1e-7)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_mass_centre_and_inertia_of_a_beam_that_rotates_about_a_pin_are_those_of_its_solid(name):
+    """A notch has the rotary inertia of its sections; that of a taper is neglected."""
+    system = cantilever(KINDS[name], ("pin", "clamp"))
+    e = system.directions(system.q0)
+    rigid = np.zeros(system.n)  # The pin, and the body, rotate with the rate 1.
+    rigid[[j for j, owner in enumerate(system.owners) if owner in ("beam.start", "tip")]] = 1.0
+    tip_inertia = 1e-7 + 1e-3 * L**2
+
+    def moment(power):
+        return integral(name, lambda s: RHO * width(name, s) * thickness(name, s) * s**power)
+
+    inertia = moment(2)
+    if KINDS[name].profile == "notch":
+        inertia += integral(name, lambda s: RHO * WIDTH * thickness(name, s) ** 3 / 12)
+    assert system.m.sum() - 1e-3 == pytest.approx(moment(0), rel=2e-4)
+    first = (system.m @ (system.c + system.A @ e)).real - 1e-3 * L
+    assert first == pytest.approx(moment(1), rel=2e-4)
+    found = rigid @ system.mass_matrix(e) @ rigid
+    assert found == pytest.approx(inertia + tip_inertia, rel=1e-4)
+
+
+def test_a_taper_between_equal_ends_is_a_leaf():
+    leaf, taper = kind(order=3), kind(profile="taper", end_thickness=5e-4, order=3)
+    found = [
+        modes(system, equilibrium(system, loads={"force.y": 0.5})).frequency
+        for system in map(cantilever, (leaf, taper))
+    ]
+    np.testing.assert_allclose(*found, rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_a_beam_stretches_by_the_integral_of_its_axial_flexibility(name):
+    system = cantilever(replace(KINDS[name], axial=True))
+    flexibility = integral(name, lambda s: 1 / (E * width(name, s) * thickness(name, s)))
+    z, _ = tip(system, 1e-7 * L / flexibility + 0j)
+    assert z - L == pytest.approx(1e-7 * L, rel=2e-4)
+
+
+def elements(name, mass, inertia):
+    """Return the frequencies of a cantilever with a tip body, by Hermite elements [Hz]."""
+    fine = L / 2 + np.linspace(-3e-3, 3e-3, 241) if KINDS[name].hinge else np.linspace(0.0, L, 301)
+    edges = np.unique(np.concatenate([np.linspace(0.0, L, 61), fine, panels(name)]))
+    edges = edges[np.diff(edges, append=1.0) > 1e-6]
+    n = 2 * len(edges)
+    K, M = np.zeros((n, n)), np.zeros((n, n))
+    for i, (a, b) in enumerate(pairwise(edges)):
+        h, s = b - a, 0.5 * (a + b)
+        at = slice(2 * i, 2 * i + 4)
+        K[at, at] += rigidity(name, s) / h**3 * np.array(
+            [[12, 6 * h, -12, 6 * h], [6 * h, 4 * h**2, -6 * h, 2 * h**2],
+             [-12, -6 * h, 12, -6 * h], [6 * h, 2 * h**2, -6 * h, 4 * h**2]]
+        )  # fmt: skip
+        area = width(name, s) * thickness(name, s)
+        M[at, at] += RHO * area * h / 420 * np.array(
+            [[156, 22 * h, 54, -13 * h], [22 * h, 4 * h**2, 13 * h, -3 * h**2],
+             [54, 13 * h, 156, -22 * h], [-13 * h, -3 * h**2, -22 * h, 4 * h**2]]
+        )  # fmt: skip
+        if KINDS[name].profile == "notch":
+            M[at, at] += RHO * area * thickness(name, s) ** 2 / 12 / (30 * h) * np.array(
+                [[36, 3 * h, -36, 3 * h], [3 * h, 4 * h**2, -3 * h, -(h**2)],
+                 [-36, -3 * h, 36, -3 * h], [3 * h, -(h**2), -3 * h, 4 * h**2]]
+            )  # fmt: skip
+    M[-2, -2] += mass
+    M[-1, -1] += inertia
+    flexibilities = eigh(M[2:, 2:], K[2:, 2:], eigvals_only=True)  # 1/omega^2, without round-off.
+    return 1.0 / np.sqrt(flexibilities[:-3:-1]) / (2 * math.pi)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_frequencies_with_a_body_at_the_tip_are_those_of_elements(name):
+    system = cantilever(KINDS[name])
+    found = modes(system, equilibrium(system)).frequency[:2]
+    np.testing.assert_allclose(found, elements(name, 1e-3, 1e-7), rtol=2e-3)
+
+
+REJECTED = {
+    "order 0": ({"order": 0}, "neck.order = 0 must lie between 1 and 12"),
+    "order 50": ({"order": 50}, "neck.order = 50 must lie between 1 and 12"),
+    "few nodes": ({"order": 3, "nodes": 4}, "neck.nodes = 4 must lie between 5"),
+    "unknown": ({"profile": "hole"}, "neck.profile = 'hole' is unknown: choose one of leaf, taper"),
+    "no radius": ({"profile": "notch"}, "neck.notch_radius is missing"),
+    "other profile": (
+        {"profile": "taper", "notch_radius": 1e-3},
+        "neck.notch_radius is not a dimension of the profile taper; remove it, or choose the "
+        "profile notch",
+    ),
+    "other model": (
+        {"model": "2R", "curvature": 1.0},
+        "neck.curvature: only the model beam has it; remove curvature",
+    ),
+    "model without profile": ({"model": "2R", "profile": "taper"}, "neck.profile: only the model"),
+    "curved notch": (
+        {"profile": "notch", "notch_radius": 1e-3, "rise": 1e-3},
+        "neck.rise is not a dimension of the profile notch",
+    ),
+    "arc and cosine": ({"curvature": 1.0, "rise": 1e-3}, "neck.curvature excludes neck.rise"),
+    "vanishing taper": (
+        {"profile": "taper", "end_thickness": 0.0},
+        "neck.end_thickness = 0 m must be at least 1e-09 m",
+    ),
+    "inverted taper": (
+        {"profile": "taper", "end_thickness": -1e-3},
+        "neck.end_thickness = -0.001 m must be at least 1e-09 m",
+    ),
+    "inverted notch": (
+        {"profile": "notch", "notch_radius": 1e-3, "end_thickness": 4e-4},
+        "must be above the thickness of its waist, 0.0005 m: increase end_thickness",
+    ),
+    "long notch": (
+        {"profile": "notch", "notch_radius": 0.016},
+        "its notch of the length 0.032 m is longer than the flexure, 0.03 m: reduce notch_radius",
+    ),
+    "long waist": (
+        {"profile": "notch", "notch_radius": 1e-3, "waist_length": 0.029},
+        "its notch of the length 0.031 m is longer than the flexure",
+    ),
+    "steep arc": (
+        {"curvature": -70.0},
+        "neck.curvature = -70 1/m is impossible for ends at the distance 0.03 m: choose one below "
+        "66.6667 1/m",
+    ),
+    "high rise": (
+        {"rise": 0.04},
+        "neck.rise = 0.04 m is impossible for ends at the distance 0.03 m: choose a rise below",
+    ),
+    "zero density": ({"density": 0.0}, "neck.density = 0 kg/m3 must be at least 1 kg/m3"),
+}
+
+
+@pytest.mark.parametrize("mistake", REJECTED)
+def test_mistakes_in_profiles_are_rejected_with_a_remedy(mistake):
+    changes, words = REJECTED[mistake]
+    with pytest.raises((MechanismError, ParameterError)) as error:
+        cantilever(replace(kind(), **changes))
+    assert words in str(error.value)
+
+
+def test_a_low_order_between_two_clamps_is_rejected_except_for_hinges():
+    for k in (kind(order=2), kind(order=2, profile="taper", end_thickness=1e-3)):
+        with pytest.raises(MechanismError, match="too stiff with an order below 3"):
+            cantilever(k, ("clamp", "clamp"))
+    cantilever(kind(order=1, profile="notch", notch_radius=4e-3), ("clamp", "clamp"))
