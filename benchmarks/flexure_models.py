@@ -278,12 +278,12 @@ def beam_table() -> str:
     lines = table(head, [], "").splitlines()
     for name, (n, free), figures in rows:
         lines.append(f"| {name} | {n} ({free}) | {_beam_cells(figures)} |")
-    return "\n".join([*lines, f"| finite elements | | {_beam_cells(FE_GUIDE)} |"])
+    return "\n".join([*lines, f"| finite elements | | {_beam_cells(limit_of_elements())} |"])
 
 
 def _beam_cells(figures: Sequence[float] | Real) -> str:
-    """Return rest position and frequencies with four and two decimals."""
-    forms = (".4f", ".4f", *[".2f"] * 4)
+    """Return rest position, the first frequency and the others with 5, 4 and 3 decimals."""
+    forms = (".5f", ".4f", *[".3f"] * 4)
     return " | ".join(format(x, form) for x, form in zip(figures[:6], forms, strict=True))
 
 

@@ -176,7 +176,7 @@ def test_a_mechanism_of_many_flexures_is_skipped_with_a_reason():
     many = replace(stretching(FINGER), flexures=(*FINGER.flexures, *more))
     result = check(many, {}, [Vibration()])
     (skipped,) = (one for one in result if isinstance(one, Skipped))
-    assert f"it has {FLEXURES_MAX + 1} flexures" in str(skipped)
+    assert f"the mechanism has {FLEXURES_MAX + 1} flexures" in str(skipped)
     assert "prbm validate" in str(skipped)
 
 

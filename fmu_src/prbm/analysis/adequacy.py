@@ -356,8 +356,8 @@ def _finer(mechanism: Mechanism, values: Mapping[str, float]) -> _Model | None:
         return None
     if len(mechanism.flexures) > FLEXURES_MAX:
         raise ParameterError(
-            f"it has {len(mechanism.flexures)} flexures, and the comparison is made for at most "
-            f"{FLEXURES_MAX}; compare with finite elements, prbm validate"
+            f"the mechanism has {len(mechanism.flexures)} flexures, and the comparison is made for "
+            f"at most {FLEXURES_MAX}; compare with finite elements, prbm validate"
         )
     return _with_beams(mechanism, FINE_ORDER, values)
 
