@@ -13,20 +13,33 @@ from ..mechanism.description import Mechanism
 from ..mechanism.flexure import BEAM, MODELS
 from ..mechanism.parts import FlexureType
 from ..runs.experiment import Experiment
+from .live.page import LivePart
 
 STYLE = """
-body { font: 16px/1.5 system-ui, sans-serif; color: #222; max-width: 62rem; margin: 2rem auto;
-  padding: 0 1rem; }
-h1 { line-height: 1.2; } h2 { margin-top: 2.2rem; border-bottom: 1px solid #ccc; }
-pre { background: #f5f7fa; padding: .8rem 1rem; overflow-x: auto; line-height: 1.3; }
-code { background: #f5f7fa; padding: 0 .2em; } pre code { padding: 0; }
+:root { color-scheme: light dark; --text: #1d2530; --muted: #566170; --page: #f6f8fa;
+  --card: #ffffff; --line: #d9dfe6; --edge: #b3bcc7; --grid: #e6eaef; --field: #f6f8fa;
+  --code: #eef2f6; --anchor: #1c5f9f; --warn: #fff1e5; --warn-text: #5c2600;
+  --handle-text: #a34100; }
+@media (prefers-color-scheme: dark) { :root { --text: #e4eaf1; --muted: #a3afbd; --page: #10161d;
+  --card: #18202a; --line: #2d3845; --edge: #4b5867; --grid: #263140; --field: #10161d;
+  --code: #1f2935; --anchor: #7fbcf5; --warn: #3a2110; --warn-text: #ffd9bd;
+  --handle-text: #ffab73; } }
+body { font: 16px/1.5 system-ui, sans-serif; color: var(--text); background: var(--page);
+  max-width: 86rem; margin: 2rem auto; padding: 0 1.25rem; }
+body > p, body > ul, body > ol, body > .table { max-width: 64rem; }
+a { color: var(--anchor); }
+h1 { line-height: 1.2; margin-bottom: .5rem; }
+h2 { margin-top: 2.2rem; border-bottom: 1px solid var(--line); }
+pre { background: var(--code); padding: .8rem 1rem; overflow-x: auto; line-height: 1.3;
+  max-width: 62rem; border-radius: 6px; }
+code { background: var(--code); padding: 0 .2em; } pre code { padding: 0; }
 .table { overflow-x: auto; }
 table { border-collapse: collapse; width: 100%; font-size: .88rem; }
-th, td { text-align: left; padding: .25rem .6rem; border-bottom: 1px solid #ddd;
+th, td { text-align: left; padding: .25rem .6rem; border-bottom: 1px solid var(--line);
   vertical-align: top; }
-th { background: #eef3f8; } td.number { text-align: right; white-space: nowrap; }
+th { background: var(--code); } td.number { text-align: right; white-space: nowrap; }
 td:first-child { white-space: nowrap; } caption { text-align: left; font-weight: 600;
-  padding: .8rem 0 .3rem; } figure { margin: 1rem 0; }
+  padding: .8rem 0 .3rem; } figure { margin: 1rem 0; } svg { color: var(--anchor); }
 """
 
 KINDS = {
@@ -78,6 +91,7 @@ def native_page(
     platforms: Sequence[str],
     experiment: Experiment,
     with_reference: bool,
+    live: LivePart | None = None,
 ) -> str:
     """Return the HTML page of a native FMU.
 
@@ -95,11 +109,13 @@ def native_page(
         The default experiment.
     with_reference : bool
         Whether the FMU contains reference results of the default experiment.
+    live : LivePart or None
+        The part of the page that simulates the mechanism; None: the page is static.
     """
     variables = interface.variables
     return _page(
         mechanism,
-        _summary(mechanism, f"FMI {version}.0 model exchange and co-simulation"),
+        _summary(mechanism, f"FMI {version}.0 model exchange and co-simulation", live),
         _native_use(mechanism, interface, version, platforms, experiment, with_reference),
         _equations(mechanism),
         _exchange(interface, version),
@@ -108,17 +124,42 @@ def native_page(
         _variables(variables),
         _limits(mechanism, variables, INPUTS_OF_BOTH),
         _list("Sources", (escape(source) for source in SOURCES), ordered=True),
-        _native_licenses(platforms),
+        _native_licenses(platforms, live is not None),
+        live=live,
     )
 
 
-def _page(mechanism: Mechanism, *sections: str) -> str:
-    name = escape(mechanism.name)
+def explorer_page(mechanism: Mechanism, variables: tuple[Variable, ...], live: LivePart) -> str:
+    """Return the HTML page that simulates a mechanism without an FMU.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The mechanism.
+    variables : tuple of Variable
+        The variables of its FMUs.
+    live : LivePart
+        The part of the page that simulates the mechanism.
+    """
+    return _page(
+        mechanism,
+        _summary(mechanism, "Simulation in the browser", live),
+        _equations(mechanism),
+        _walls(mechanism),
+        _variables(variables),
+        _limits(mechanism, variables, INPUTS_OF_STEPS),
+        _list("Sources", (escape(source) for source in SOURCES), ordered=True),
+        live=live,
+    )
+
+
+def _page(mechanism: Mechanism, *sections: str, live: LivePart | None = None) -> str:
+    name, own, data = escape(mechanism.name), live.style if live else "", live.data if live else ""
     return (
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{name}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n"
-        + "\n".join(sections)
+        f"<title>{name}</title>\n<style>{STYLE}{own}</style>\n</head>\n<body>\n"
+        + "\n".join([*sections, data])
         + "\n</body>\n</html>\n"
     )
 
@@ -140,13 +181,13 @@ def _flexures(mechanism: Mechanism) -> str:
     return " ".join(sentences[beam] for beam in sorted(beams))
 
 
-def _summary(mechanism: Mechanism, flavour: str) -> str:
+def _summary(mechanism: Mechanism, flavour: str, live: LivePart | None = None) -> str:
     drawing = escape(mechanism.drawing.strip("\n"))
-    figure = f"<figure><pre>{drawing}</pre></figure>" if drawing else ""
+    figure = f'<figure class="static-figure"><pre>{drawing}</pre></figure>' if drawing else ""
     return (
         f"<h1>{escape(mechanism.name)}</h1>\n"
         f"<p><strong>{escape(mechanism.title)}.</strong> "
-        f"{escape(mechanism.description.strip())}</p>\n{figure}\n"
+        f"{escape(mechanism.description.strip())}</p>\n{live.markup if live else ''}\n{figure}\n"
         f"<p>{_flexures(mechanism)} Impacts follow the laws of rigid bodies. They are located to "
         "10<sup>-12</sup> s inside a communication step. Decaying bounces end in "
         "resting contact, which releases when the contact force reaches zero.</p>\n"
@@ -350,7 +391,7 @@ def _drawn_wall() -> str:
 
     def path(kind: str, points: Iterable[tuple[float, float]]) -> str:
         places = " ".join(f"{80 + width * t:.1f},{140 - rise * x:.1f}" for t, x in points)
-        return f'<polyline points="{places}" fill="none" stroke="#1f4e79" {kind}/>'
+        return f'<polyline points="{places}" fill="none" stroke="currentColor" {kind}/>'
 
     joining = [(k / 20, float(wall.motion(k / 20)[0])) for k in range(21)]
     drawn = [
@@ -360,7 +401,10 @@ def _drawn_wall() -> str:
         path('stroke-width="0.7"', [(1.0, -0.1), (1.0, 1.2)]),
     ]
     labels = ((96, 88, "line r"), (150, 135, "wall x"), (76, 165, "t0"), (262, 165, "t0 + T"))
-    drawn += [f'<text x="{x}" y="{y}" font-size="13">{text}</text>' for x, y, text in labels]
+    drawn += [
+        f'<text x="{x}" y="{y}" font-size="13" fill="currentColor">{text}</text>'
+        for x, y, text in labels
+    ]
     return (
         '<figure><svg viewBox="0 0 380 170" width="380" role="img" '
         f'aria-label="A wall joins the line of its inputs">{"".join(drawn)}</svg></figure>'
@@ -524,16 +568,22 @@ def _events(mechanism: Mechanism, interface: NativeInterface, version: int) -> s
     return "\n".join(parts)
 
 
-def _native_licenses(platforms: Sequence[str]) -> str:
+def _native_licenses(platforms: Sequence[str], live: bool) -> str:
     windows = (
         ' The libraries for Windows contain start-up code of MinGW-w64, see <a href="licenses/'
         'mingw-w64.txt">licenses/mingw-w64.txt</a>.'
         if any(name.endswith("-windows") for name in platforms)
         else ""
     )
+    module = (
+        " The simulation on this page contains parts of wasi-libc and musl: MIT, see "
+        '<a href="licenses/wasi-libc.txt">licenses/wasi-libc.txt</a>.'
+        if live
+        else ""
+    )
     return (
         "<h2>Licences</h2>\n<p>The model and its engine: MIT, see "
         '<a href="licenses/prbm-impact.txt">licenses/prbm-impact.txt</a>. Libraries that '
         "were compiled with ziglang contain parts of its runtime library: MIT, see "
-        f'<a href="licenses/zig.txt">licenses/zig.txt</a>.{windows}</p>'
+        f'<a href="licenses/zig.txt">licenses/zig.txt</a>.{windows}{module}</p>'
     )

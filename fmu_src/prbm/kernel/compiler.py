@@ -195,6 +195,11 @@ def browser_module(progress: Callable[[str], None] = lambda step: None) -> bytes
     """
     files = kernel()
     found = prebuilt(f"{BROWSER.name}/{LIVE.name}{BROWSER.suffix}", files)
+    if found is None and importlib.util.find_spec("ziglang") is None:
+        raise NoCompilerError(
+            "a page that simulates its mechanism needs the compiler of the Python package "
+            "ziglang: install it with 'python -m pip install ziglang'"
+        )
     return found or _library(BROWSER, _zig(BROWSER), LIVE, files, progress)
 
 

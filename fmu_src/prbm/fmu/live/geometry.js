@@ -193,6 +193,15 @@ class Shapes {
     return bodyOutline(points.map((point) => minus(point, centre)), this.size);
   }
 
+  // The straight shape, in which each flexure is a line between its drawn ends.
+  get straight() {
+    const lines = this.description.flexures.map(({ ends }) => ({
+      curve: ends.map((end) => pointOf(end.point, this.values)),
+      corners: [],
+    }));
+    return { poses: this.drawn, lines };
+  }
+
   // Return the shape at coordinates: the poses of the bodies and the lines of the flexures.
   at(q) {
     const numbers = this.simulation.points(q);
