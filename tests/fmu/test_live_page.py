@@ -2,6 +2,7 @@
 
 import json
 import re
+import webbrowser
 import zipfile
 from base64 import b64decode
 from dataclasses import replace
@@ -11,6 +12,7 @@ from io import BytesIO
 import pytest
 
 from live import node
+from prbm.commands import command_line
 from prbm.files.mechanism_file import shipped
 from prbm.fmu import native_fmu
 from prbm.fmu.explorer import explorer
@@ -108,3 +110,18 @@ def test_the_joined_script_has_no_syntax_errors(tmp_path):
     path = tmp_path / "page.js"
     path.write_text(script())
     node("--check", path)
+
+
+def test_explore_writes_the_page_and_opens_it(tmp_path, monkeypatch, capsys):
+    opened: list[str] = []
+    monkeypatch.setattr(webbrowser, "open", opened.append)
+    path = tmp_path / "new" / "guide.html"
+    line = ["explore", "PRBDM", "--set", "stop.restitution=0.5", "--out", str(path)]
+    assert command_line.main(line) == command_line.OK
+    listed = json.loads(data(path.read_text(encoding="utf-8"), "content"))
+    starts = {quantity["name"]: quantity["start"] for quantity in listed["quantities"]}
+    assert starts["stop.restitution"] == 0.5
+    assert opened == [path.as_uri()]
+    assert command_line.main([*line, "--no-open"]) == command_line.OK
+    assert len(opened) == 1
+    assert command_line.main(["explore", "PRBDM", "--set", "stop.restitution=2"]) == 2
