@@ -39,7 +39,8 @@ th, td { text-align: left; padding: .25rem .6rem; border-bottom: 1px solid var(-
   vertical-align: top; }
 th { background: var(--code); } td.number { text-align: right; white-space: nowrap; }
 td:first-child { white-space: nowrap; } caption { text-align: left; font-weight: 600;
-  padding: .8rem 0 .3rem; } figure { margin: 1rem 0; } svg { color: var(--anchor); }
+  padding: .8rem 0 .3rem; } figure { margin: 1rem 0; }
+figure svg { color: var(--anchor); max-width: 100%; height: auto; }
 """
 
 KINDS = {
@@ -159,9 +160,17 @@ def _page(mechanism: Mechanism, *sections: str, live: LivePart | None = None) ->
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{name}</title>\n<style>{STYLE}{own}</style>\n</head>\n<body>\n"
-        + "\n".join([*sections, data])
+        + _focusable("\n".join(sections))
+        + f"\n{data}"
         + "\n</body>\n</html>\n"
     )
+
+
+def _focusable(sections: str) -> str:
+    """Let the keyboard scroll code and tables that are wider than the page."""
+    for scrolled in ("<pre", '<div class="table"'):
+        sections = sections.replace(f"{scrolled}>", f'{scrolled} tabindex="0">')
+    return sections
 
 
 def _list(title: str, items: Iterable[str], *, ordered: bool = False) -> str:

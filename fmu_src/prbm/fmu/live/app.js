@@ -123,7 +123,7 @@ class Page {
     const { changes, problems } = changesOf(location.hash, this.known);
     this.apply(changes, true);
     if (problems.length) {
-      this.say(problems.join(" "));
+      this.say([byId("message").textContent, ...problems].filter(Boolean).join(" "));
     }
   }
 
@@ -165,7 +165,7 @@ class Page {
       throw error;
     }
     const wrong = [...changes.keys()].find((name) => error.message.startsWith(name));
-    this.say(`${error.message}${this.run ? " The last valid simulation is still shown." : ""}`, wrong);
+    this.say(`${error.message}.${this.run ? " The last valid simulation is still shown." : ""}`, wrong);
     if (!this.run) {
       this.state("error");
       if (changes.size) {
@@ -201,7 +201,7 @@ class Page {
     dataset.runs = this.runs;
     dataset.milliseconds = Math.round(performance.now() - this.started);
     if (run.error) {
-      this.say(run.error.message);
+      this.say(`${run.error.message}.`);
     }
     this.stage.fit(this.shapes, run);
     this.film.stopTime = run.error ? Math.max(run.time, run.step) : description.stopTime;

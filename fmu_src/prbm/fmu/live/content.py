@@ -165,7 +165,7 @@ def _stop(stop: Stop) -> dict[str, Json]:
         "offset": _field(stop, "offset"),
         "position": _field(stop, "position"),
         "displacement": f"{stop.name}.displacement",
-        "quantity": _given(stop, "position"),
+        "quantity": _given(stop, "position") or f"{stop.name}.displacement",
     }
 
 

@@ -8,7 +8,7 @@ function changesOf(fragment, known) {
   for (const item of fragment.replace(/^#/, "").split("&").filter(Boolean)) {
     const [name, text] = decoded(item);
     if (!known.has(name)) {
-      problems.push(`The link has an unknown parameter, which was ignored: ${name.slice(0, 60)}`);
+      problems.push(`The link has an unknown parameter, which was ignored: ${name.slice(0, 60)}.`);
     } else {
       changes.set(name, parsed(text));
     }

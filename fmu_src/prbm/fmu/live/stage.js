@@ -2,7 +2,8 @@
 
 const MARGIN = 34; // Pixels around the motion.
 const FLASH_TIME = 0.35; // Seconds of the film in which the mark of an impact fades.
-const HATCHES = 7; // Strokes of the hatching of a wall.
+const HATCH_PITCH = 11; // Pixels between two strokes of a hatching.
+const HATCHES_MIN = 4; // Strokes of a hatching.
 const BOUND_SHAPES = 60; // Shapes of a run that determine the size of the drawing.
 const KEY_STEPS = 100; // Key strokes from one end of a slider to the other.
 
@@ -47,7 +48,7 @@ class Stage {
     this.ground = add("ground", "path", { class: "ground" });
     this.scale = add("scale", "path", { class: "scale" });
     this.scaleText = add("scale", "text", { class: "scale-text", "text-anchor": "middle" });
-    this.wallHandles = stops.map((stop) => stop.quantity && this.handle(stop.quantity, `Wall of ${words(stop.name)}`, "wall-handle"));
+    this.wallHandles = stops.map((stop) => this.handle(stop.quantity, `Wall of ${words(stop.name)}`, "wall-handle"));
     const { release } = this.description;
     this.bodyHandle =
       release.quantity && release.start !== "angle"
@@ -92,6 +93,7 @@ class Stage {
     const along = node.along;
     const fine = 0.25 / this.pixels;
     this.actions.grab(name);
+    this.holding = true;
     const amount = (moved) => {
       const [x, y] = minus(this.world(moved), start);
       return rounded(value + x * along[0] + y * along[1], fine);
@@ -99,6 +101,7 @@ class Stage {
     const move = (moved) => this.actions.drag(name, amount(moved), false);
     const end = (moved) => {
       node.classList.remove("dragging");
+      this.holding = false;
       node.removeEventListener("pointermove", move);
       node.removeEventListener("pointerup", end);
       node.removeEventListener("pointercancel", end);
@@ -122,6 +125,9 @@ class Stage {
 
   // Choose the part of the plane that is shown, from the shapes of a run and the walls.
   fit(shapes, run) {
+    if (this.bounds && this.holding) {
+      return; // The drawing keeps its scale below a pointer.
+    }
     const points = [];
     const every = Math.max(1, Math.floor(run.count / BOUND_SHAPES));
     for (let row = 0; row < run.count; row += every) {
@@ -216,9 +222,10 @@ class Stage {
   hatched(point, into, length) {
     const along = times(length, turned([0, 1], into));
     const start = minus(point, times(0.5, along));
-    const strokes = Array.from({ length: HATCHES }, (_, k) => {
-      const z = plus(start, times((k + 0.6) / HATCHES, along));
-      return this.path([z, plus(z, times(0.75 / HATCHES, minus(times(length, into), along)))]);
+    const count = Math.max(HATCHES_MIN, Math.round((length * this.pixels) / HATCH_PITCH));
+    const strokes = Array.from({ length: count }, (_, k) => {
+      const z = plus(start, times((k + 0.7) / count, along));
+      return this.path([z, plus(z, times(0.65 / count, minus(times(length, into), along)))]);
     });
     return this.path([start, plus(start, along)]) + strokes.join("");
   }
@@ -264,10 +271,8 @@ class Stage {
       const [wx, wy] = this.screen(point);
       const r = flash ? 6 + 22 * flash.strength * (0.4 + 0.6 * flash.age) : 0;
       filled(this.flashes[k], { cx: wx, cy: wy, r, opacity: flash ? 1 - flash.age : 0 }, []);
-      if (this.wallHandles[k]) {
-        const beside = turned(into, [0, shapes.wallLength(k) / 2 + 15 / this.pixels]);
-        this.place(this.wallHandles[k], plus(point, beside), into, stop.quantity);
-      }
+      const beside = turned(into, [0, shapes.wallLength(k) / 2 + 15 / this.pixels]);
+      this.place(this.wallHandles[k], plus(point, beside), into, stop.quantity);
     });
     if (this.bodyHandle) {
       const { body, direction, quantity } = this.description.release;
