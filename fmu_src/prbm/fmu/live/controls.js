@@ -28,7 +28,7 @@ class Controls {
 
   row(quantity, full) {
     const id = `q-${quantity.slot}`;
-    const label = element("label", { for: id, title: quantity.name }, words(full ? quantity.name : quantity.label));
+    const label = element("label", { for: id, title: quantity.name }, labelled(full ? quantity.name : quantity.label));
     const number = element("input", {
       id, type: "text", inputmode: "decimal", autocomplete: "off", spellcheck: "false",
       "aria-describedby": `${id}-note`, "data-name": quantity.name,
@@ -94,6 +94,11 @@ function rank(name, description) {
   }
   const last = LAST.indexOf(name);
   return last < 0 ? 2 : 4 + last;
+}
+
+// Return a name as a label: words, unless it is a symbol such as K_theta.
+function labelled(name) {
+  return /^[A-Z]_/.test(name) ? name : words(name);
 }
 
 function heading(name) {

@@ -3,6 +3,7 @@
 const GROUND = "ground";
 const CURVE_POINTS = 40; // Points of the drawn curve of a flexure.
 const SPLINE_POINTS = 8; // Points of the drawn curve between two nodes of a beam.
+const CURVED_CORNERS_MAX = 11; // More corners are joined by straight lines, not by a curve.
 const BODY_THICKNESS_MIN = 0.04; // Of the size of the mechanism.
 
 const plus = ([a, b], [c, d]) => [a + c, b + d];
@@ -204,7 +205,12 @@ class Shapes {
 
   // Return the shape at coordinates: the poses of the bodies and the lines of the flexures.
   at(q) {
-    const numbers = this.simulation.points(q);
+    return this.shape(this.simulation.points(q));
+  }
+
+  // Return the shape for the points of a drawing, which the kernel computes.  through: whether the
+  // curve of a flexure goes through its pivots, to show modes that bend it between its ends.
+  shape(numbers, through = false) {
     let next = 0;
     const take = () => [numbers[next++], numbers[next++]];
     const lines = this.description.flexures.map((flexure) =>
@@ -215,14 +221,16 @@ class Shapes {
     for (const body of this.description.bodies) {
       poses.set(body.name, { centre: take(), arm: take() });
     }
-    return { poses, lines: lines.map((line, k) => this.line(k, line, poses)) };
+    return { poses, lines: lines.map((line, k) => this.line(k, line, poses, through)) };
   }
 
-  line(k, corners, poses) {
+  line(k, corners, poses, through) {
     const flexure = this.description.flexures[k];
+    if (!flexure.beam && flexure.corners > CURVED_CORNERS_MAX) {
+      return { curve: corners, corners };
+    }
     if (!flexure.beam) {
-      const curve = flexure.corners > 12 ? corners : chainCurve(corners, flexure.guided);
-      return { curve, corners };
+      return { curve: through ? splineCurve(corners) : chainCurve(corners, flexure.guided), corners };
     }
     const [start, end] = flexure.ends.map((place) => this.carried(place.body, place.point, poses));
     return { curve: splineCurve([start, ...corners, end]), corners: [] };

@@ -2,6 +2,7 @@
 
 const MODES_MAX = 8; // Modes in the list.
 const MODE_AMPLITUDE = 0.1; // Largest displacement, as a share of the size of the mechanism.
+const SMALL_ANGLE = 1e-4; // rad; amplitude at which a mode is linear.
 const MODE_PERIOD = 1.6; // Seconds of the film of one period.
 const MOVING_MIN = 0.05; // Parts with a smaller share of the largest displacement are not named.
 
@@ -57,43 +58,59 @@ class ModeView {
   choose(k) {
     this.chosen = k;
     this.buttons.forEach((button, i) => button.setAttribute("aria-pressed", String(i === k)));
-    const { shape } = this.found.modes[k];
-    const largest = Math.max(...this.parts(shape, 1e-6).map(([, size]) => size));
-    this.scale = (1e-6 * MODE_AMPLITUDE * this.shapes.size) / largest;
-    const moves = this.parts(shape, this.scale).sort((a, b) => b[1] - a[1]);
+    this.setSlopes(this.found.modes[k].shape);
+    const moves = this.parts().sort((a, b) => b[1] - a[1]);
+    this.scale = (MODE_AMPLITUDE * this.shapes.size) / moves[0][1];
     const shares = moves
       .filter(([, size]) => size > MOVING_MIN * moves[0][1])
       .map(([name, size]) => `${words(name)} ${digits((100 * size) / moves[0][1], 2)}\u202f%`);
-    const still = moves.filter(([, size]) => size <= MOVING_MIN * moves[0][1]).map(([name]) => words(name));
+    const resting = moves.filter(([, size]) => size <= MOVING_MIN * moves[0][1]).map(([name]) => words(name));
     this.text.textContent =
       `Mode ${k + 1} moves: ${shares.join(", ")}` +
-      (still.length ? `. Hardly moves: ${still.join(", ")}.` : ".") +
+      (resting.length ? `. Hardly moves: ${resting.join(", ")}.` : ".") +
       " Percentages are of the largest displacement.";
     this.paint(1);
   }
 
-  // Return the largest displacement of each body and flexure for an amplitude of a mode.
-  parts(shape, amplitude) {
-    const at = (sign) => this.shapes.at(this.moved(shape, sign * amplitude));
-    const [rest, moved] = [at(0), at(1)];
+  // Compute the points of the drawing at rest, and their rates of change with the amplitude of a
+  // mode.  Positions are linear in the arms, so that any amplitude keeps the parts connected.
+  setSlopes(shape) {
+    const h = SMALL_ANGLE / Math.max(...shape.map(Math.abs));
+    const at = (amplitude) => {
+      const q = this.found.q.map((x, j) => x + amplitude * shape[j]);
+      return this.shapes.simulation.points(q).slice();
+    };
+    const [before, after] = [at(-h), at(h)];
+    this.rest = at(0);
+    this.slopes = this.rest.map((_, i) => (after[i] - before[i]) / (2 * h));
+  }
+
+  moved(amplitude) {
+    return this.shapes.shape(this.rest.map((x, i) => x + amplitude * this.slopes[i]), true);
+  }
+
+  // Return the largest displacement of each body and flexure for a mode of amplitude 1.
+  parts() {
+    const small = (SMALL_ANGLE * this.shapes.size) / Math.max(...this.slopes.map(Math.abs));
+    const [rest, moved] = [this.moved(0), this.moved(small)];
+    const largest = (a, b) => Math.max(...a.map((z, i) => norm(minus(b[i], z)))) / small;
+    const corners = (shape, k) => {
+      const line = shape.lines[k];
+      return line.corners.length ? line.corners : line.curve;
+    };
     const bodies = this.description.bodies.map(({ name }, k) => {
-      const [a, b] = [rest, moved].map((s) => this.shapes.body(k, s.poses));
-      return [name, Math.max(...a.map((z, i) => norm(minus(b[i], z))))];
+      const [a, b] = [rest, moved].map((shape) => this.shapes.body(k, shape.poses));
+      return [name, largest(a, b)];
     });
-    const lines = this.description.flexures.map(({ name }, k) => {
-      const [a, b] = [rest, moved].map((s) => s.lines[k].curve);
-      return [name, Math.max(...a.map((z, i) => norm(minus(b[i], z))))];
-    });
+    const lines = this.description.flexures.map(({ name }, k) => [
+      name,
+      largest(corners(rest, k), corners(moved, k)),
+    ]);
     return [...bodies, ...lines];
   }
 
-  moved(shape, amplitude) {
-    return this.found.q.map((x, j) => x + amplitude * shape[j]);
-  }
-
   paint(share) {
-    const { shape } = this.found.modes[this.chosen];
-    this.draw(this.shapes.at(this.moved(shape, share * this.scale)));
+    this.draw(this.moved(share * this.scale));
   }
 
   frame(time) {
