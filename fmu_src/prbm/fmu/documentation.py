@@ -14,6 +14,7 @@ from ..mechanism.flexure import BEAM, MODELS
 from ..mechanism.parts import FlexureType
 from ..runs.experiment import Experiment
 from .live.page import LivePart
+from .mathml import block, formula, inline, matrix, row
 
 STYLE = """
 :root { color-scheme: light dark; --text: #1d2530; --muted: #566170; --page: #f6f8fa;
@@ -40,6 +41,13 @@ th, td { text-align: left; padding: .25rem .6rem; border-bottom: 1px solid var(-
 th { background: var(--code); } td.number { text-align: right; white-space: nowrap; }
 td:first-child { white-space: nowrap; } caption { text-align: left; font-weight: 600;
   padding: .8rem 0 .3rem; } figure { margin: 1rem 0; }
+math[display=block] { margin: .9rem 0; text-align: left; display: block math; font-size: 1.08em;
+  overflow-x: auto; overflow-y: hidden; max-width: 62rem; }
+mtd { padding: .15em .6em; }
+.matrix { margin: 0 .3em; --c: linear-gradient(currentColor, currentColor); background:
+  var(--c) 0 0/6px 1.5px, var(--c) 0 100%/6px 1.5px, var(--c) 100% 0/6px 1.5px,
+  var(--c) 100% 100%/6px 1.5px; background-repeat: no-repeat;
+  border-left: 1.5px solid currentColor; border-right: 1.5px solid currentColor; }
 figure svg { color: var(--anchor); max-width: 100%; height: auto; }
 """
 
@@ -269,21 +277,33 @@ def _stretches(mechanism: Mechanism) -> bool:
 
 def _equations(mechanism: Mechanism) -> str:
     flexures = "".join(_flexure_row(mechanism, kind) for kind in mechanism.flexure_types)
+    beams = _beams(mechanism)
+    motion = block(
+        matrix([["M", "Phi_q^T", "-G^T"], ["Phi_q", "0", "0"], ["G", "0", "0"]]),
+        matrix([["a"], ["lambda"], ["force"]]),
+        row("="),
+        matrix([["Q - C v^2"], ["-dot(Phi_q) v"], ["-dot(G) v"]]),
+    )
+    mass = formula("M = Re(bar(e)_i H_{ij} e_j) + diag(J)", "C = -Im(bar(e)_i H_{ij} e_j)")
+    loads = "Q = springs + gravity + damping (2 zeta omega_1 M v + beta K v) + friction + inputs"
+    impact = formula(
+        "M (v^+ - v^-) + Phi_q^T Lambda = G^T P",
+        "Phi_q v^+ = 0",
+        "dot(g)^+ = -restitution dot(g)^-",
+        "P >= 0",
+    )
     return (
         "<h2>Equations</h2>\n"
-        f"<p>{BEAMS if _beams(mechanism) else ''}With the absolute angles q of the links "
-        f"{'and nodes ' if _beams(mechanism) else ''}and e = exp(i q), every point is "
-        f"z = c + A e, {STRETCHING if _stretches(mechanism) else ''}and</p>\n<pre>"
-        "[ M      Phi_q^T  -G^T ] [ a      ]   [ Q - C v^2        ]\n"
-        "[ Phi_q  0         0   ] [ lambda ] = [ -(d/dt Phi_q) v  ]\n"
-        "[ G      0         0   ] [ force  ]   [ -(d/dt G) v      ]   while a stop holds\n\n"
-        "M = Re(conj(e)_i H_ij e_j) + diag(J),   C = -Im(conj(e)_i H_ij e_j)\n"
-        "Q = springs + gravity + damping (2 zeta omega_1 M v + beta K v) + friction + inputs"
-        "</pre>\n<p>Phi(q) = 0 are the loop constraints; positions and velocities are projected "
-        "onto them. The gap g has the rate g' = G v + w, with w the velocity of the wall. At an "
-        "impact,</p>\n<pre>"
-        "M (v+ - v-) + Phi_q^T Lambda = G^T P,   Phi_q v+ = 0,   g'+ = -restitution g'-,   P >= 0"
-        "</pre>\n<p>With friction at the stop, the coefficient of restitution is energetic "
+        f"<p>{BEAMS if beams else ''}With the absolute angles {inline('q')} of the links "
+        f"{'and nodes ' if beams else ''}and {inline('e = exp(i q)')}, every point is "
+        f"{inline('z = c + A e')}, {STRETCHING if _stretches(mechanism) else ''}and</p>\n"
+        f"{motion}\n{mass}\n{formula(loads)}\n"
+        "<p>The last row acts while a stop holds. "
+        f"{inline('Phi(q) = 0')} are the loop constraints; positions and velocities are "
+        "projected onto them. The gap "
+        f"{inline('g')} has the rate {inline('dot(g) = G v + w')}, with {inline('w')} the velocity "
+        f"of the wall. At an impact,</p>\n{impact}\n"
+        "<p>With friction at the stop, the coefficient of restitution is energetic "
         "(Stronge), so that no impact gains energy. Without friction it equals Newton's "
         "coefficient.</p>\n"
         '<div class="table"><table><caption>Flexure models</caption><thead><tr><th>type</th>'
@@ -361,12 +381,12 @@ STOP_LIMITS = (
 
 WALLS = (
     "In co-simulation the inputs of a wall at a communication point t0 define a line",
-    "r(t) = position + displacement + v (t - t0),",
+    formula("r(t) = position + displacement + v (t - t_0)"),
     "with v the input <code>velocity</code> or, until that has been non-zero, the mean rate of the "
     "<code>displacement</code>. The wall joins the line within T, twice the recent longest "
     "communication step (at most a fifth of the period). With e and u its distance and speed ahead "
     "of the line at t0, and s = (t - t0)/T &le; 1, its position is",
-    "x(t) = r(t) + (1 - s)<sup>2</sup> (e + (2 e + u T) s).",
+    formula("x(t) = r(t) + {(1 - s)}^2 (e + (2 e + u T) s)"),
 )
 WALL_RULES = (
     "A uniform motion that is given with its velocity is exact. Otherwise the error is below "
@@ -389,8 +409,8 @@ def _walls(mechanism: Mechanism) -> str:
     line, position = WALLS[1], WALLS[3]
     rules = "".join(f"<li>{rule}</li>" for rule in WALL_RULES)
     return (
-        f"<h2>Moving walls</h2>\n<p>{WALLS[0]}</p>\n<pre>{line}</pre>\n<p>{WALLS[2]}</p>\n"
-        f"<pre>{position}</pre>\n{_drawn_wall()}\n<ul>{rules}</ul>"
+        f"<h2>Moving walls</h2>\n<p>{WALLS[0]}</p>\n{line}\n<p>{WALLS[2]}</p>\n"
+        f"{position}\n{_drawn_wall()}\n<ul>{rules}</ul>"
     )
 
 
@@ -526,18 +546,23 @@ def _exchange(interface: NativeInterface, version: int) -> str:
     discard = f"fmi{version}Discard"
     return (
         "<h2>Model exchange</h2>\n"
-        "<p>The coordinates q of the mechanism satisfy the loop constraints Phi(q) = 0. The states "
-        "are the independent coordinates q_i, one per degree of freedom, and their rates v_i. "
-        "The dependent coordinates q_d are computed from the constraints at every call, so that "
-        "the solver of the importer needs no treatment of constraints:</p>\n<pre>"
-        "Phi(q_i, q_d) = 0,      v_d = -(dPhi/dq_d)^-1 (dPhi/dq_i) v_i"
-        "</pre>\n"
+        "<p>The coordinates q of the mechanism satisfy the loop constraints "
+        f"{inline('Phi(q) = 0')}. The states "
+        "are the independent coordinates "
+        f"{inline('q_i')}, one per degree of freedom, and their rates {inline('v_i')}. "
+        "The dependent coordinates "
+        f"{inline('q_d')} "
+        "are computed from the constraints at every call, so that "
+        "the solver of the importer needs no treatment of constraints:</p>\n"
+        f"{formula('Phi(q_i, q_d) = 0', 'v_d = -{Phi_{q_d}}^{-1} Phi_{q_i} v_i')}\n"
         '<div class="table"><table><caption>Continuous states, in order</caption><thead><tr>'
         "<th>state</th><th>derivative</th></tr></thead><tbody>"
         f"{rows}</tbody></table></div>\n"
-        "<p>The independent coordinates were chosen at the export. The choice keeps dPhi/dq_d as "
+        "<p>The independent coordinates were chosen at the export. The choice keeps "
+        f"{inline('Phi_{q_d}')} as "
         "far from singular as possible between the straight shape and the release shape of the "
-        "mechanism file; start values do not change it. Far outside these shapes dPhi/dq_d can "
+        "mechanism file; start values do not change it. Far outside these shapes "
+        f"{inline('Phi_{q_d}')} can "
         "become singular. Then the derivatives cannot be computed, the reason is logged, and the "
         f"call returns <code>{discard}</code>. Co-simulation has no such singularity, because it "
         "integrates all coordinates and projects them onto the constraints.</p>\n"
