@@ -326,7 +326,7 @@ def test_licences_of_all_contents_are_included(fmu):
     with zipfile.ZipFile(fmu.path) as archive:
         names = {n.removeprefix(folder) for n in archive.namelist() if n.startswith(folder)}
         entry = archive.read(f"{folder}license.txt").decode()
-    assert {"license.txt", "prbm-impact.txt", "zig.txt"} == names
+    assert {"license.txt", "prbm-impact.txt", "wasi-libc.txt", "zig.txt"} == names
     assert all(name in entry for name in names - {"license.txt"})
 
 

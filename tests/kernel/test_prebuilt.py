@@ -74,3 +74,13 @@ def test_exports_use_the_libraries_of_the_package_unless_cc_is_set(tmp_path, mon
     assert libraries(["host"]) == {here: here.name.encode()}
     monkeypatch.setenv("CC", "cc")
     assert libraries(["host"]) == {here: b"compiled"}
+
+
+def test_live_pages_use_the_module_of_the_package_even_if_cc_is_set(tmp_path, monkeypatch):
+    made = {"wasm32-wasi/prbm_live.wasm": b"module"}
+    for name, content in prebuilt.package_files(made, "a compiler", compiler.kernel()).items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes(content)
+    monkeypatch.setattr(prebuilt, "files", lambda _: tmp_path)
+    monkeypatch.setenv("CC", "cc")
+    assert compiler.browser_module(lambda step: pytest.fail(step)) == b"module"

@@ -132,6 +132,7 @@ def parser() -> argparse.ArgumentParser:
     _measure(commands)
     _picture(commands)
     _animate(commands)
+    _explore(commands)
     _validate(commands)
     _completion(commands)
     return p
@@ -434,6 +435,23 @@ def _animate(commands: Commands) -> None:
         usage=f"%(prog)s {ANIMATION_USAGE}",
     )  # fmt: skip
     animation_arguments(parser)
+
+
+def _explore(commands: Commands) -> None:
+    parser = _command(
+        commands, "explore", "explore:write_page",
+        "write a page that simulates a mechanism in the browser, and open it",
+        _examples("prbm explore PRBDM2R", "prbm explore my_mechanism.toml --out page.html"),
+        details="The page is one file and needs no network.",
+    )  # fmt: skip
+    _mechanism(parser)
+    parser.add_argument(
+        "--out", type=Path, metavar="FILE.html", help="file to write (default: MECHANISM.html)"
+    )
+    parser.add_argument(
+        "--no-open", action="store_false", dest="open", help="do not open the page in the browser"
+    )
+    set_argument(parser, "value of a parameter or input")
 
 
 def _validate(commands: Commands) -> None:

@@ -39,6 +39,10 @@ LINK = {
     ),
     "windows": ("-shared", "-s"),
     "darwin": ("-fPIC", "-dynamiclib", "-Wl,-install_name,@rpath/prbm_fmu.dylib"),
+    "wasi": (
+        "-mexec-model=reactor", "-s", "-Wl,--export-dynamic", "-Wl,--export=malloc",
+        "-Wl,--export=free",
+    ),
 }  # fmt: skip
 _loaded: dict[str, bytes] = {}  # Libraries of this process by the names of their cache entries.
 ERROR_LINES_MAX = 6  # Lines of a compiler's output in an error message.
@@ -79,6 +83,7 @@ class Product:
 FMU = Product("prbm_fmu")  # The library of native FMUs.
 ENGINE = Product("prbm_engine", ("-DPRBM_ENGINE",))  # The library of the Python package.
 PRODUCTS = (FMU, ENGINE)
+LIVE = Product("prbm_live", ENGINE.flags)  # The module of live pages, for web browsers.
 
 
 @dataclass(frozen=True)
@@ -119,6 +124,8 @@ PLATFORMS = {
         Platform("aarch64-darwin", "aarch64-darwin", ".dylib", "aarch64-macos.11.0"),
     )
 }
+BROWSER = Platform("wasm32-wasi", "wasm32-wasi", ".wasm", "wasm32-wasi")
+"""WebAssembly, the platform of live pages.  FMUs have no libraries for it."""
 SYSTEMS = {"linux": "linux", "win32": "windows", "darwin": "darwin"}
 MACHINES = {"x86_64": "x86_64", "amd64": "x86_64", "aarch64": "aarch64", "arm64": "aarch64"}
 
@@ -182,6 +189,30 @@ def _sources() -> dict[str, bytes]:
             f"{error.filename} cannot be read ({error.strerror}): correct the permissions of the "
             "installed package, or install it again"
         ) from None
+
+
+def browser_module(progress: Callable[[str], None] = lambda step: None) -> bytes:
+    """Return the kernel as a WebAssembly module without imports, with the functions of engine.h.
+
+    It is the same for every mechanism: the tables are passed in its memory.
+
+    Raises
+    ------
+    NoCompilerError
+        If the installed package has no module, and ziglang is not installed.
+    CompilerError
+        If ziglang fails.
+    DamagedLibraryError
+        If the module of the installed package is damaged.
+    """
+    files = _sources()
+    found = prebuilt(f"{BROWSER.name}/{LIVE.name}{BROWSER.suffix}", files)
+    if found is None and importlib.util.find_spec("ziglang") is None:
+        raise NoCompilerError(
+            "a page that simulates its mechanism needs the compiler of the Python package "
+            "ziglang: install it with 'python -m pip install ziglang'"
+        )
+    return found or _library(BROWSER, _zig(BROWSER), LIVE, files, progress)
 
 
 def _prebuilt(wanted: Platform, product: Product, files: Mapping[str, bytes]) -> bytes | None:

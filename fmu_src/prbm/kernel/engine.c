@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/modal.h"
 #include "core/tables.h"
 #include "engine.h"
 #include "hybrid/simulation.h"
@@ -234,6 +235,65 @@ EXPORTED double prbm_steps(const Engine *engine) {
 
 EXPORTED int prbm_coordinates(const Engine *engine) {
     return engine->n;
+}
+
+/* --- drawings --------------------------------------------------------------------------------- */
+
+EXPORTED int prbm_point_count(const Engine *engine) {
+    const System *system = system_of(engine->simulation);
+    return system->corner_count + 2 * system->b;
+}
+
+/* Write the point c + A e, and return the next address. */
+static double *write_point(Complex c, int d, const Complex *A, const Complex *e, double *to) {
+    for (int j = 0; j < d; j++) {
+        c = plus(c, product(A[j], e[j]));
+    }
+    to[0] = c.re;
+    to[1] = c.im;
+    return to + 2;
+}
+
+EXPORTED void prbm_points(Engine *engine, const double *q, double *points) {
+    Simulation *sim = engine->simulation;
+    const System *system = system_of(sim);
+    size_t mark = sim->scratch.used;
+    int d = system->d;
+    Complex *e = take_complex(&sim->scratch, d, 1);
+    directions(system, q, e);
+    for (int i = 0; i < system->corner_count; i++) {
+        points = write_point(system->corners_c[i], d, system->corners + i * d, e, points);
+    }
+    for (int i = 0; i < system->b; i++) {
+        const BodyFrame *frame = &system->bodies[i];
+        points = write_point(frame->c, d, frame->A, e, points);
+        *points++ = e[frame->arm].re;
+        *points++ = e[frame->arm].im;
+    }
+    sim->scratch.used = mark;
+}
+
+EXPORTED int prbm_mode_count(const Engine *engine) {
+    const System *system = system_of(engine->simulation);
+    return system->n - system->r;
+}
+
+EXPORTED int prbm_modes(Engine *engine, double *q, double *frequencies, double *shapes,
+                        char *message) {
+    Problem problem = {""};
+    Simulation *sim = engine->simulation;
+    const System *system = system_of(sim);
+    size_t mark = sim->scratch.used;
+    int n = system->n, count = prbm_mode_count(engine);
+    Equilibrium shape = {q, take(&sim->scratch, (size_t)system->r), 0.0};
+    double *phi = take_matrix(&sim->scratch, n, count);
+    bool ok = equilibrium(system, false, 0.0, &shape, &sim->scratch, &problem) &&
+              modes(system, &shape, frequencies, phi, &sim->scratch, &problem);
+    for (int i = 0; ok && i < n * count; i++) {
+        shapes[i % count * n + i / count] = phi[i];
+    }
+    sim->scratch.used = mark;
+    return succeed(ok, &problem, message) ? count : -1;
 }
 
 /* --- saving and restoring --------------------------------------------------------------------- */

@@ -53,6 +53,18 @@ EXPORTED double prbm_time(const Engine *engine);  /* present time [s] */
 EXPORTED double prbm_steps(const Engine *engine); /* integration steps so far */
 EXPORTED int prbm_coordinates(const Engine *engine); /* n */
 
+/* The points of a drawing: the corners of the flexures in the order of the assembly, then the centre
+ * and the arm of each body.  A beam has its nodes only as corners. */
+EXPORTED int prbm_point_count(const Engine *engine);
+/* Compute the points (point_count, 2) at coordinates q (n,) for the parameters of the start. */
+EXPORTED void prbm_points(Engine *engine, const double *q, double *points);
+/* Compute the modes about the equilibrium under gravity: its coordinates q (n,), frequencies [Hz] in
+ * ascending order, negative if unstable, and the coordinates of each mode (modes, n).  Return the
+ * number of modes, -1 on failure. */
+EXPORTED int prbm_mode_count(const Engine *engine);
+EXPORTED int prbm_modes(Engine *engine, double *q, double *frequencies, double *shapes,
+                        char *message);
+
 /* Record the impacts from now on, or no longer. */
 EXPORTED void prbm_record(Engine *engine, bool record);
 /* Move the recorded impacts out, ENGINE_IMPACT + 3 n numbers each: index of the stop, count, time,

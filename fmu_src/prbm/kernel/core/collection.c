@@ -43,6 +43,13 @@ PRBM void add_mass(System *system, const Place *spot, double mass) {
     }
 }
 
+/* Add a corner of the drawn line of a flexure. */
+PRBM void add_corner(System *system, const Place *spot) {
+    int d = system->d, i = system->corner_count++;
+    memcpy(system->corners + i * d, spot->A, (size_t)d * sizeof *spot->A);
+    system->corners_c[i] = spot->c;
+}
+
 /* Add a uniform rod that turns with direction j, as two points with the same moments of mass. */
 PRBM void add_rod(System *system, double mass, const Place *start, int j, Complex vector,
                     Place *spare) {

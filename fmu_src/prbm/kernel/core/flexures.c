@@ -86,6 +86,7 @@ static bool walk_links(System *system, const Step *step, Scratch *scratch, Probl
     Complex direction = scaled(1.0 / modulus(along_it), along_it);
     Place spot = new_place(system, scratch), spare = new_place(system, scratch);
     on_body(system, span.root, span.z_start, &spot);
+    add_corner(system, &spot);
     int *owners = take_integers(scratch, pieces.n + 2), next = step->first_direction;
     owners[0] = system->origins[span.root].j;
     for (int i = 1; i <= pieces.n; i++) {
@@ -100,6 +101,7 @@ static bool walk_links(System *system, const Step *step, Scratch *scratch, Probl
                                 : complex_of(pieces.lengths[i], 0.0);
         add_rod(system, pieces.rods[i], &spot, owners[i], vector, &spare);
         extend(&spot, owners[i], vector);
+        add_corner(system, &spot);
         add_mass(system, &spot, pieces.lumps[i]);
         add_spring(system, pieces.rates[i], coordinate_of(system, owners[i]),
                    coordinate_of(system, owners[i + 1]));
@@ -113,6 +115,8 @@ static bool walk_links(System *system, const Step *step, Scratch *scratch, Probl
         reach(system, span.far, &spot, minus(span.z_end, last), last_one);
     }
     add_rod(system, pieces.rods[pieces.n + 1], &spot, last_one, last, &spare);
+    extend(&spot, last_one, last);
+    add_corner(system, &spot);
     return true;
 }
 
@@ -204,6 +208,7 @@ static void place_beam(System *system, const Step *step, const Beam *beam,
         } else {
             add_mass(system, &spot, beam->masses[i]);
         }
+        add_corner(system, &spot);
     }
     Complex *none = take_complex(scratch, nodes, 1);
     zeros(2 * nodes, (double *)none);

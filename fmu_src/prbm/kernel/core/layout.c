@@ -26,6 +26,9 @@ static int pin_count(const Flexure *flexure) {
     return (flexure->type_at_start == PIN) + (flexure->type_at_end == PIN);
 }
 
+/* The largest number of corners of a flexure in addition to its links or nodes. */
+enum { CORNERS_BESIDE_ARMS = 3 };
+
 /* Return the number of nodes in all panels of a beam. */
 static int all_nodes(const FlexureType *kind) {
     return node_count(kind->profile == PROFILE_NOTCH, !is_hinge(kind), kind->nodes);
@@ -62,7 +65,7 @@ static Addition addition_of(const Mechanism *m, const Flexure *flexure) {
 
 PRBM void count_coordinates(Reader *reader, Mechanism *m) {
     long long b = m->body_count, links = 0, strains = 0, springs = 0;
-    long long arms = b, stretching = 0, masses = b, map = b;
+    long long arms = b, stretching = 0, masses = b, map = b, corners = 0;
     for (int i = 0; i < m->flexure_count && !reader->wrong; i++) {
         Addition more = addition_of(m, &m->flexures[i]);
         links += more.links;
@@ -72,6 +75,7 @@ PRBM void count_coordinates(Reader *reader, Mechanism *m) {
         springs += more.springs;
         masses += more.masses;
         map += more.map;
+        corners += more.arms + CORNERS_BESIDE_ARMS;
         m->longest = more.arms > m->longest ? more.arms : m->longest;
         size_t size = kind_of(m, &m->flexures[i])->order > 0
                           ? size_of_beam(kind_of(m, &m->flexures[i]))
@@ -100,6 +104,7 @@ PRBM void count_coordinates(Reader *reader, Mechanism *m) {
         m->loop_count = (int)r;
         m->spring_count = (int)springs;
         m->mass_count = (int)masses;
+        m->corner_count = (int)corners;
     }
 }
 

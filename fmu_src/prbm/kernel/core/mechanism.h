@@ -180,7 +180,7 @@ typedef struct {
     double default_step; /* Step of the default experiment [s]; 0: unknown. */
     /* Sizes of the assembled system. */
     int coordinate_count, direction_count, loop_count, link_count, strain_count, stretch_count,
-        mass_count, spring_count;
+        mass_count, spring_count, corner_count;
     int longest; /* Largest number of links or nodes of a flexure. */
     size_t beam_size; /* Largest number of doubles that a beam needs. */
     Slots slots;

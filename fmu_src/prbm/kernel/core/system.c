@@ -82,6 +82,8 @@ PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memor
     result.pushed = place_frames(memory, (size_t)m->force_count, d);
     result.probes = place_frames(memory, (size_t)m->probe_count, d);
     result.origins = place_origins(memory, b + 1, d);
+    result.corners = place(memory, (size_t)m->corner_count * d, sizeof(Complex));
+    result.corners_c = place(memory, (size_t)m->corner_count, sizeof(Complex));
     result.stretch_count = m->stretch_count;
     result.stretches = m->stretches;
     result.spring = place(memory, (size_t)m->spring_count, sizeof(Spring));

@@ -76,6 +76,8 @@ typedef struct {
     Place *origins;           /* (b + 1,), the ground's first */
     int stretch_count;
     const int *stretches;     /* directions that are stretches */
+    int corner_count;
+    Complex *corners, *corners_c; /* (corners, d), (corners,): flexures, for drawings */
     int spring_count;
     Spring *spring;           /* the springs whose rates make up K */
     int block_count;
