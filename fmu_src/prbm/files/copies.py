@@ -210,7 +210,7 @@ class Drawing:
         return f"{owner}.{name}"
 
     def _body_image(self, owner: str, image: Image) -> str | None:
-        """Return the name of the body at the image of a body, None if there is none."""
+        """Return the name of the body at the image of a body, None without such a body."""
         other = image.name(owner)
         if owner == GROUND or other not in self._bodies:
             return None
