@@ -4,6 +4,7 @@ import cmath
 import math
 from dataclasses import asdict
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
@@ -14,9 +15,10 @@ from prbm.files import copies
 from prbm.files.images import Line, displaced, rotated, same, written
 from prbm.files.mechanism_file import read_mechanism
 from prbm.mechanics.assembly import assemble
+from prbm.mechanics.statics import equilibrium
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.expressions import Affine, affine
-from prbm.mechanism.parts import Point
+from prbm.mechanism.parts import Flexure, Point
 from support import mechanism
 
 HEAD = """\
@@ -339,6 +341,64 @@ def test_copies_share_the_section_of_their_original_and_the_material_of_its_plat
     _, left, right = plates.bodies
     assert left.mass == right.mass
     assert [x for x, _ in right.outline] == [0.07, 0.06, 0.06]
+
+
+def test_types_of_mirror_images_change_a_sign_and_share_all_parameters(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An image in two lines has the type of the original."""
+    monkeypatch.setattr(copies, "SIGNED", ("width",))
+    (kind,) = read(tmp_path, BY_HAND).flexure_types
+    lines = (Line.read("x = 0"), Line.read("y = 0"))
+    table = SimpleNamespace(name="upper_left", mirror=lines, repeat=None)
+    names = ("upper_left", "upper_right", "lower_left", "lower_right")
+    flexures = [Flexure(name, "leaf", "a.b", "c.d") for name in names]
+    found, types = copies.mirrored_types([table], flexures, [kind])
+    assert [f.type for f in found] == ["leaf", "leaf_mirrored", "leaf_mirrored", "leaf"]
+    assert types[0] == kind
+    assert len(types) == 2
+    assert affine(types[1].width) == Affine(0.0, {"leaf.width": -1.0})
+    for name in ("thickness", "youngs_modulus", "density"):
+        assert affine(getattr(types[1], name)) == Affine(0.0, {f"leaf.{name}": 1.0})
+
+
+CURVED = """
+[ground]
+left = ["-span/2 - 10 mm", 0]
+
+[[bodies]]
+name = "stage"
+mass = "10 g"
+inertia = "5 kg.mm2"
+centre = [0, 0]
+points.left = ["-10 mm", "2 mm"]
+
+[[flexures]]
+name = "left"
+type = "leaf"
+start = "ground.left"
+end = "stage.left"
+mirror = "x = 0"
+
+[release]
+body = "stage"
+direction = 90
+displacement = "-1 mm"
+"""
+
+
+@pytest.mark.skipif("rise" not in copies.SIGNED, reason="no curved flexures")
+@pytest.mark.parametrize("shape", ['rise = "2 mm"', 'curvature = "8 1/m"'])
+def test_a_symmetric_body_between_curved_flexures_does_not_turn(tmp_path: Path, shape: str) -> None:
+    path = tmp_path / "curved.toml"
+    path.write_text(HEAD + shape + CURVED)
+    curved = read_mechanism(path)
+    system = assemble(curved, curved.values())
+    q = equilibrium(system, -1e-3).q
+    frame = system.bodies["stage"]
+    assert abs(q[frame.j]) < 1e-9
+    place = frame.c + frame.A @ system.directions(q)
+    assert place == pytest.approx(-1e-3j, abs=1e-9)
 
 
 @pytest.mark.parametrize(("shift", "owner"), [("20 mm", "right_arm"), ("30 mm", "left_arm")])

@@ -14,6 +14,7 @@ from matplotlib.patches import PathPatch
 from scipy.integrate import quad
 
 from prbm.base.errors import MechanismError
+from prbm.commands.command_line import main
 from prbm.drawing.shapes import Shapes
 from prbm.drawing.style import area
 from prbm.files.mechanism_file import read_mechanism
@@ -277,6 +278,22 @@ def test_the_density_of_a_plate_without_a_material_is_a_parameter(tmp_path: Path
     assert (known["stage.density"].unit, known["stage.density"].minimum) == ("kg/m3", 1.0)
     assert not {"stage.mass", "stage.inertia", "stage.thickness"} & set(known)
     assert own.bodies[0].mass.endswith("*stage.density")
+
+
+def test_the_picture_command_prints_the_properties_of_plates(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A plate of 60 mm x 10 mm x 8 mm with 1190 kg/m3 has 5.712 g and m (b^2 + h^2) / 12."""
+    begin, end = FILE.index('"left", ["30 mm"'), FILE.index('thickness = "8 mm"')
+    bar = '"left", ["30 mm", "leaf.length"], ["30 mm", "leaf.length + 10 mm"], '
+    bar += '["-30 mm", "leaf.length + 10 mm"]]\n'
+    (tmp_path / "plate.toml").write_text(FILE[:begin] + bar + FILE[end:])
+    monkeypatch.chdir(tmp_path)
+    assert main(["picture", "plate.toml", "--set", "leaf.length=50mm"]) == 0
+    assert capsys.readouterr().out.splitlines() == [
+        "Plate.png",
+        f"stage: 5.712 g, {5.712 * 3700 / 12 * 1e-3:.4g} kg.mm2, centre of mass at (0, 55) mm",
+    ]
 
 
 # --- drawing ----------------------------------------------------------------------------------

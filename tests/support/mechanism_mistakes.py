@@ -532,7 +532,21 @@ CHANGES = {
     ),
     "mirror without a line": (LEFT, f'{LEFT}mirror = "x"\n', "write the line of symmetry"),
     "mirror at a mass": (LEFT, f'{LEFT}mirror = "x = 3 kg"\n', "'kg' has another dimension"),
-    "mirror without a unit": (LEFT, f'{LEFT}mirror = "x = 3"\n', "3 has no unit"),
+    "mirror without a unit": (
+        LEFT,
+        f'{LEFT}mirror = "x = 3"\n',
+        '3 has no unit: write a unit after each number, as in "3 m"\n',
+    ),
+    "outline that is a number": (
+        ANVIL,
+        "outline = 3\n",
+        "bodies.1.outline (of anvil) = 3: write a list of corners",
+    ),
+    "holes that are a number": (
+        ANVIL,
+        f"{TRIANGLE}holes = 3\n",
+        "bodies.1.holes (of anvil) = 3: write a list of corners, [[..., ...], [..., ...], [..., .",
+    ),
     "mirror with a number": (LEFT, f"{LEFT}mirror = 3\n", "flexures.0.mirror (of left) = 3: write"),
     "mirror with three lines": (
         LEFT,

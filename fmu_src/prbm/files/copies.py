@@ -8,13 +8,15 @@ import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import reduce
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from ..base.errors import MechanismError
-from ..mechanism.parts import GROUND, Body, Flexure, Joint, Point
-from .images import Image, Line, displaced, rotated, same
+from ..mechanism.expressions import affine
+from ..mechanism.parts import FIELDS, GROUND, Body, Flexure, FlexureType, Joint, Point
+from .images import Image, Line, displaced, rotated, same, written
 
 COPIES_MAX = 10_000  # Copies in one file.
+SIGNED = tuple(name for name in ("curvature", "rise") if name in FIELDS[FlexureType])
 SUBJECT_WORDS = 2  # The subject of a message is among its first words: flexure NAME.
 
 _NAME = re.compile(r"[\w\[\]]+(?:\.[\w\[\]]+)*")
@@ -208,12 +210,51 @@ class Drawing:
         return f"{owner}.{name}"
 
     def _body_image(self, owner: str, image: Image) -> str | None:
-        """Return the name of the body at the image of a body, None if there is none."""
+        """Return the name of the body at the image of a body, None without such a body."""
         other = image.name(owner)
         if owner == GROUND or other not in self._bodies:
             return None
         centre = image.point(self._bodies[owner].centre)
         return other if same(self._bodies[other].centre, centre) else None
+
+
+def mirrored_types(
+    tables: Iterable[Copied], flexures: Iterable[Flexure], types: Sequence[FlexureType]
+) -> tuple[tuple[Flexure, ...], tuple[FlexureType, ...]]:
+    """Return flexures and types, with own types for the mirror images of curved flexures.
+
+    The curvature of a mirror image has the opposite sign.  Its type shares all parameters of the
+    type of the original, because its fields are expressions.
+    """
+    known = {kind.name: kind for kind in types}
+    curved = {k.name for k in types if any(getattr(k, f) is not None for f in SIGNED)}
+    added: dict[str, FlexureType] = {}
+    mirrored = {
+        _name(table.name, chain)
+        for table in tables
+        for chain in _chains(table)
+        if sum(bool(image.exchanged) for image in chain) % 2
+    }
+    result = []
+    for flexure in flexures:
+        if flexure.name in mirrored and flexure.type in curved:
+            kind = _mirrored_type(known[flexure.type])
+            added[kind.name] = kind
+            flexure = replace(flexure, type=kind.name)
+        result.append(flexure)
+    return tuple(result), (*types, *added.values())
+
+
+def _mirrored_type(kind: FlexureType) -> FlexureType:
+    """Return a type with the parameters of another one, and the opposite curvature."""
+    given = {name: getattr(kind, name) for name in FIELDS[FlexureType]}
+    shared: dict[str, Any] = {
+        name: value if isinstance(value, str) else f"{kind.name}.{name}"
+        for name, value in given.items()
+        if value is not None
+    }
+    shared |= {n: written(affine(shared[n]).scaled(-1.0)) for n in SIGNED if n in shared}
+    return replace(kind, name=f"{kind.name}_mirrored", **shared)
 
 
 def _chains(table: Copied) -> Iterator[Chain]:

@@ -94,7 +94,10 @@ class Line:
         found = _LINE.fullmatch(text) if isinstance(text, str) else None
         if found is None:
             raise MechanismError('write the line of symmetry, "x = 0" or "y = 40 mm"')
-        return cls(found[1], quantity(found[2], "m"))
+        try:
+            return cls(found[1], quantity(found[2], "m"))
+        except MechanismError as error:  # There are no numbers outside the quotes.
+            raise MechanismError(str(error).partition(", or a number in m without")[0]) from None
 
     @property
     def image(self) -> Image:

@@ -160,6 +160,9 @@ def _problem(error: dict[str, Any], data: Any) -> str:
         remedy = str(error["ctx"]["error"])
     elif kind == "string_pattern_mismatch":
         remedy = NAME_REMEDIES[str(loc[-1])]
+    elif kind == "tuple_type" and loc[-1] in ("outline", "holes"):
+        remedy = "write a list of corners, [[..., ...], [..., ...], [..., ...]]"
+        remedy += ", for each hole" if loc[-1] == "holes" else ""
     elif kind == "tuple_type" and len(loc) > 1:
         remedy = "write a pair, [..., ...]"
     elif kind == "less_than_equal":

@@ -26,7 +26,15 @@ from ..mechanism.flexure import (
     ORDER_MAX,
 )
 from ..mechanism.parts import FIELDS, GROUND, LENGTH_MAX, LENGTH_MIN
-from .copies import Copied, Drawing, check_names, copied_bodies, explained, origins
+from .copies import (
+    Copied,
+    Drawing,
+    check_names,
+    copied_bodies,
+    explained,
+    mirrored_types,
+    origins,
+)
 from .outlines import plate
 from .units import check_coherent, si_unit
 from .values import (
@@ -381,9 +389,12 @@ def mechanism(file: MechanismTable, drawing: str = "") -> Mechanism:
     bodies = copied_bodies(file.bodies, [_body(table, materials) for table in file.bodies])
     drawn = Drawing(file.ground, bodies)
     flexures = tuple(drawn.connections(file.flexures, [*map(_flexure, file.flexures)]))
+    own = (flexure for flexure in file.flexures if flexure.type is None)
+    types = [_type(table, materials) for table in (*file.flexure_types, *own)]
     joints = tuple(drawn.connections(file.joints, [*map(_joint, file.joints)]))
+    connected = mirrored_types(file.flexures, flexures, types)
     try:
-        result = _assembled(file, drawn, flexures, joints, materials, drawing)
+        result = _assembled(file, drawn, connected, joints, drawing)
         _check_drawn(result)
     except PrbmError as error:
         made_by = origins(_with_copies(file)) | drawn.made_by
@@ -394,21 +405,19 @@ def mechanism(file: MechanismTable, drawing: str = "") -> Mechanism:
 def _assembled(
     file: MechanismTable,
     drawn: Drawing,
-    flexures: tuple[parts.Flexure, ...],
+    connected: tuple[tuple[parts.Flexure, ...], tuple[parts.FlexureType, ...]],
     joints: tuple[parts.Joint, ...],
-    materials: Mapping[str, dict[str, Quantity]],
     drawing: str,
 ) -> Mechanism:
     """Return the mechanism of a file, whose bodies, flexures and joints include the copies."""
-    own = (flexure for flexure in file.flexures if flexure.type is None)
     points = {body.name: body.points for body in drawn.bodies}
     same = ("name", "title", "description", "gravity", "damping_zeta", "damping_beta")
     return Mechanism(
         **{key: getattr(file, key) for key in same},
         ground=drawn.ground,
         bodies=drawn.bodies,
-        flexure_types=tuple(_type(t, materials) for t in (*file.flexure_types, *own)),
-        flexures=flexures,
+        flexures=connected[0],
+        flexure_types=connected[1],
         joints=joints,
         stops=tuple(parts.Stop(**_attached(stop, points)) for stop in file.stops),
         frictions=tuple(parts.Friction(**_attached(part, points)) for part in file.frictions),
