@@ -1,13 +1,16 @@
 """FMUs of a guide on beams: all versions and interfaces equal the engine."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from fmpy import simulate_fmu
+from fmpy import read_model_description, simulate_fmu
+from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 
 from native_host import Instance, Integrator
+from prbm.fmu import native_fmu, python_fmu
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.statics import free_displacement
@@ -83,3 +86,50 @@ def test_an_fmu_linearised_at_rest_has_the_frequencies_of_the_page(version, nati
         found += sorted(omega[omega > 1.0] / (2 * math.pi))
     digits = (4, 4, 2, 2, 2, 2)
     assert [round(x, d) for x, d in zip(found, digits, strict=True)] == list(AT_REST)
+
+
+def notched():
+    """Return the guide with fillets at the ends of thin flexures."""
+    thesis = mechanism("PRBDM2R")
+    kinds = (
+        replace(
+            kind, model="beam", coefficients={}, profile="notch", notch_radius=1e-3,
+            waist_length=0.03,
+        )
+        for kind in thesis.flexure_types
+    )  # fmt: skip
+    return replace(thesis, name="NotchedGuide", flexure_types=tuple(kinds))
+
+
+@pytest.mark.parametrize("kind", ["python", "fmi2", "fmi3"])
+def test_dimensions_of_a_notch_are_parameters_of_fmus(kind, tmp_path):
+    """They have units and bounds; the motion with other dimensions is that of the engine."""
+    path, values = tmp_path / "NotchedGuide.fmu", {"flexure.notch_radius": 2e-3}
+    values["flexure.waist_length"] = 0.025
+    if kind == "python":
+        path.write_bytes(python_fmu.build(notched(), {}))
+    else:
+        path.write_bytes(native_fmu.build(notched(), {}, int(kind[-1])))
+    assert not validate_fmu(str(path))
+    variables = {v.name: v for v in read_model_description(str(path)).modelVariables}
+    for name in values:
+        assert (variables[name].unit, float(variables[name].min)) == ("m", 1e-9)
+        assert variables[name].variability == "fixed"
+    found = simulate_fmu(
+        str(path), fmi_type="CoSimulation", stop_time=0.02, output_interval=STEP,
+        start_values=values, output=["shuttle.x"],
+    )  # fmt: skip
+    simulation = Simulation(notched(), values)
+    simulation.advance(0.02)
+    exact = simulation.outputs()["shuttle.x"]
+    assert float(found["shuttle.x"][-1]) == pytest.approx(exact, abs=1e-8)
+    plain = Simulation(notched())
+    plain.advance(0.02)
+    assert abs(plain.outputs()["shuttle.x"] - exact) > 1e-5
+
+
+def test_an_fmu_rejects_a_notch_that_is_longer_than_its_flexure(tmp_path, capfd):
+    path = tmp_path / "NotchedGuide.fmu"
+    path.write_bytes(native_fmu.build(notched(), {}, 3))
+    with pytest.raises(FMICallException):
+        simulate_fmu(str(path), stop_time=0.01, start_values={"flexure.waist_length": 0.05})

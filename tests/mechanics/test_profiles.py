@@ -311,3 +311,93 @@ def test_a_low_order_between_two_clamps_is_rejected_except_for_hinges():
         with pytest.raises(MechanismError, match="too stiff with an order below 3"):
             cantilever(k, ("clamp", "clamp"))
     cantilever(kind(order=1, profile="notch", notch_radius=4e-3), ("clamp", "clamp"))
+
+
+# --- curved beams -------------------------------------------------------------------------------
+
+
+def drawn(curvature, rise, u):
+    """Return the angle of the line from the chord, and ds/du, at 0 <= u <= 1 along it."""
+    if curvature:
+        half = math.asin(0.5 * curvature * L)
+        return half * (2 * u - 1), 2 * half / curvature
+    span = math.sqrt(L**2 - rise**2)
+    slope = 0.5 * math.pi * rise / span * np.sin(math.pi * u)
+    return np.arctan(slope) - math.asin(rise / L), span * np.sqrt(1 + slope**2)
+
+
+def curved_elastica(curvature, rise, force, moment):
+    """Return the tip of a curved beam under dead loads, by shooting from the tip."""
+    EI = E * WIDTH * 5e-4**3 / 12
+
+    def clamp(turn):
+        def change(u, y):
+            M = moment - (complex(y[1], -y[2]) * force).imag
+            angle, ds = drawn(curvature, rise, u)
+            return [ds * M / EI, ds * math.cos(y[0] + angle), ds * math.sin(y[0] + angle)]
+
+        start = np.array([turn, 0.0, 0.0])
+        return solve_ivp(change, (1.0, 0.0), start, method="DOP853", rtol=1e-11, atol=1e-14).y[
+            :, -1
+        ]
+
+    turn = newton(lambda angle: clamp(angle)[0], 0.5, tol=1e-10)
+    return -complex(*clamp(turn)[1:]), turn
+
+
+CURVED = {"arc": (20.0, 0.0), "half circle": (-60.0, 0.0), "flat": (0.0, 2e-3), "s": (0.0, -0.01)}
+
+
+def curved(name, **given):
+    curvature, rise = CURVED[name]
+    shape = {"curvature": curvature} if curvature else {"rise": rise}
+    return kind(**shape, **given)
+
+
+@pytest.mark.parametrize("name", CURVED)
+def test_a_curved_beam_bends_by_40_degrees_like_the_boundary_value_problem(name):
+    stiffness = math.radians(40.0) * E * WIDTH * 5e-4**3 / 12 / L
+    force, moment = (0.8j - 0.6) * stiffness / L, 0.5 * stiffness
+    exact, turn = curved_elastica(*CURVED[name], force, moment)
+    assert turn > math.radians(20.0)
+    for order, limit in ((3, 1e-3), (5, 1e-5)):
+        z, found = tip(cantilever(curved(name, order=order, nodes=order + 5)), force, moment)
+        assert abs(z - exact) < limit * abs(exact - L)
+        assert found == pytest.approx(turn, rel=limit)
+
+
+@pytest.mark.parametrize("name", CURVED)
+def test_a_curved_beam_is_drawn_with_its_curvature_or_rise_and_is_free_of_stress(name):
+    system = cantilever(curved(name, order=3))
+    shape = equilibrium(system)
+    np.testing.assert_allclose(shape.q, system.q0, atol=1e-12)
+    line = next(one for one in system.outlines if one.kind == "flexure")
+    z = line.c + line.A @ system.directions(system.q0)
+    assert abs(z[0]) < 1e-15
+    assert z[-1] == pytest.approx(L, abs=1e-12)
+    curvature, rise = CURVED[name]
+    if curvature:
+        centre = 0.5 * L + 1j * math.sqrt(1 / curvature**2 - L**2 / 4) * np.sign(curvature)
+        np.testing.assert_allclose(abs(z - centre), 1 / abs(curvature), rtol=1e-4)
+        assert np.sign(z[len(z) // 2].imag) == -np.sign(curvature)
+        length = 2 * math.asin(0.5 * abs(curvature) * L) / abs(curvature)
+    else:
+        along = z * np.exp(1j * math.asin(rise / L))
+        span = math.sqrt(L**2 - rise**2)
+        wave = 0.5 * rise * (1 - np.cos(math.pi * along.real / span))
+        np.testing.assert_allclose(along.imag, wave, atol=3e-5 * L)
+        length = quad(lambda u: drawn(0.0, rise, u)[1], 0.0, 1.0)[0]
+    assert system.m.sum() - 1e-3 == pytest.approx(RHO * WIDTH * 5e-4 * length, rel=1e-5)
+
+
+@pytest.mark.parametrize("name", CURVED)
+def test_a_curved_beam_is_the_same_from_either_end(name):
+    """The signs of the curvature and the rise: seen from the end, an arc turns the other way."""
+    systems = []
+    for backwards in (False, True):
+        k = curved(name, order=3, axial=True)
+        if backwards and k.curvature is not None:
+            k = replace(k, curvature=-k.curvature)
+        systems.append(cantilever(k, backwards=backwards))
+    load = 0.3j / L * E * WIDTH * 5e-4**3 / 12 / L
+    assert tip(systems[0], load)[0] == pytest.approx(tip(systems[1], load)[0], abs=1e-9 * L)
