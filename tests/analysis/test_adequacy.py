@@ -27,6 +27,7 @@ FINGER = read_mechanism(SUPPORT / "finger.toml")
 EVERY = [Vibration(), Impact(0)]
 WEIGHTLESS = {"gravity.x": 0.0}
 STOP = (Quantity.RESTITUTION, 0)
+SLOW = ("Bistable",)  # Its chains of many links take nine seconds.
 
 
 def found(model, values=None, shapes=EVERY):
@@ -87,7 +88,10 @@ def test_a_finding_names_shape_displacement_both_values_and_remedy():
     assert "mode 2 is unstable with inextensible flexures" in str(unstable)
 
 
-@pytest.mark.parametrize("name", ["finger", *shipped()])
+@pytest.mark.parametrize(
+    "name",
+    ["finger", *(pytest.param(n, marks=pytest.mark.slow) if n in SLOW else n for n in shipped())],
+)
 def test_the_choice_removes_the_findings(name):
     model = FINGER if name == "finger" else mechanism(name)
     shapes = [Vibration(), *map(Impact, range(len(model.stops)))]

@@ -56,6 +56,7 @@ def test_the_page_gives_the_modal_restitution_with_and_without_stretch(tmp_path:
 
 @pytest.mark.fmu
 @pytest.mark.native
+@pytest.mark.slow
 def test_commands_and_code_of_the_page_print_its_results(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

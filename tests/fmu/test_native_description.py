@@ -278,7 +278,7 @@ def test_the_compiled_source_needs_no_resources(native, tmp_path, fmi):
     command = ["cc", *STRICT, *names]
     (library,) = (tmp_path / "binaries").rglob("*.so")
     subprocess.run(
-        [*command, *definitions, "-O1", "-fPIC", "-shared", "-o", library, "-lm"],
+        [*command, *definitions, "-O0", "-fPIC", "-shared", "-o", library, "-lm"],
         cwd=sources, check=True,
     )  # fmt: skip
     shutil.rmtree(tmp_path / "resources")
