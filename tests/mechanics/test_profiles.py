@@ -207,6 +207,23 @@ def test_a_beam_stretches_by_the_integral_of_its_axial_flexibility(name):
     assert z - L == pytest.approx(1e-7 * L, rel=2e-4)
 
 
+@pytest.mark.parametrize("name", ["taper", "wide taper"])
+def test_the_thin_half_of_a_taper_stretches_more(name):
+    """The displacement of the middle is the integral of the flexibility of the first half."""
+
+    def flexibility(s):
+        return 1 / (E * width(name, s) * thickness(name, s))
+
+    system = cantilever(replace(KINDS[name], axial=True, nodes=8))
+    force = 1e-6 * L / integral(name, flexibility)
+    q = equilibrium(system, loads={"force.x": force}).q
+    line = next(one for one in system.outlines if one.kind == "flexure")
+    middle = len(line.c) // 2
+    moved = (line.A @ (system.directions(q) - system.directions(system.q0)))[middle].real
+    assert moved == pytest.approx(force * quad(flexibility, 0.0, L / 2)[0], rel=1e-4)
+    assert abs(moved / (1e-6 * L) - 0.5) > 0.02
+
+
 def elements(name, mass, inertia):
     """Return the frequencies of a cantilever with a tip body, by Hermite elements [Hz]."""
     fine = L / 2 + np.linspace(-3e-3, 3e-3, 241) if KINDS[name].hinge else np.linspace(0.0, L, 301)

@@ -318,7 +318,7 @@ def _flexure_row(mechanism: Mechanism, kind: FlexureType) -> str:
     model = mechanism.model(kind)
     coefficients = ", ".join(f"{c.name} = {c.value:g}" for c in model.coefficients)
     if model.order:
-        coefficients = f"order = {model.order}, nodes = {model.nodes}"
+        coefficients = f"order = {model.order}, nodes = {model.nodes}, profile = {kind.profile}"
     coefficients = coefficients or f"n = {kind.n}"
     cells = (kind.name, kind.model, coefficients, model.source)
     return "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>"
