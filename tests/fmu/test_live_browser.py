@@ -2,12 +2,12 @@
 
 import json
 import os
-import tomllib
 import zipfile
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 
+import numpy as np
 import pytest
 from fmpy import simulate_fmu
 
@@ -15,6 +15,7 @@ from browser import NARROW, WIDE, chromium
 from prbm.files.mechanism_file import load, shipped
 from prbm.fmu.explorer import explorer
 from prbm.fmu.native_fmu import build
+from prbm.kernel.simulation import KernelSimulation
 from support import ROOT, SUPPORT, mechanism
 
 pytestmark = [pytest.mark.native, pytest.mark.slow]
@@ -74,11 +75,17 @@ def lever() -> str:
     return "".join(block.removeprefix("toml\n") for block in blocks if block.startswith("toml\n"))
 
 
-@pytest.mark.parametrize("name", ["lever", "finger", "pivot"])
+OTHERS = {
+    "finger": SUPPORT / "finger.toml",
+    "pivot": SUPPORT / "pivot.toml",
+    "accelerometer": ROOT / "benchmarks" / "accelerometer.toml",
+}
+
+
+@pytest.mark.parametrize("name", ["lever", *OTHERS])
 def test_mechanisms_that_are_not_shipped_can_be_explored(browser, name, tmp_path):
     path = tmp_path / f"{name}.toml"
-    path.write_text(lever() if name == "lever" else (SUPPORT / f"{name}.toml").read_text())
-    assert tomllib.loads(path.read_text())
+    path.write_text(OTHERS[name].read_text() if name in OTHERS else lever())
     data = browser.open(written(tmp_path, load(str(path))))
     assert data["state"] == "done"
     assert browser.errors() == []
@@ -146,6 +153,19 @@ def test_a_wrong_link_gives_a_message_and_the_default_run(browser, guide, fragme
     data = browser.open(guide, fragment)
     assert words in browser.message()
     assert data["last"] == default["last"]
+
+
+def test_the_saved_table_has_the_values_of_the_native_library(browser, guide, tmp_path):
+    folder = {"behavior": "allow", "downloadPath": str(tmp_path)}
+    browser.open(guide)
+    browser.driver.execute_cdp_cmd("Browser.setDownloadBehavior", folder)
+    browser.find("#download").click()
+    browser.wait(lambda data: (tmp_path / "PRBDM.csv").exists())
+    found = np.genfromtxt(tmp_path / "PRBDM.csv", delimiter=",", names=True, deletechars="")
+    simulation = KernelSimulation(mechanism("PRBDM"))
+    names = ["shuttle.x", "energy.elastic", "stop.impact_count"]
+    expected = np.array(simulation.sample(found["time"][1:], names))
+    assert np.array_equal(np.array([found[name][1:] for name in names]).T, expected)
 
 
 def test_texts_with_markup_are_shown_as_text(browser, tmp_path):

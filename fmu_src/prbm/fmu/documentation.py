@@ -175,8 +175,8 @@ def _page(mechanism: Mechanism, *sections: str, live: LivePart | None = None) ->
 
 
 def _focusable(sections: str) -> str:
-    """Let the keyboard scroll code and tables that are wider than the page."""
-    for scrolled in ("<pre", '<div class="table"'):
+    """Let the keyboard scroll code, formulas and tables that are wider than the page."""
+    for scrolled in ("<pre", '<div class="table"', '<math display="block"'):
         sections = sections.replace(f"{scrolled}>", f'{scrolled} tabindex="0">')
     return sections
 

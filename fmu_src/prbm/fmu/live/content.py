@@ -18,6 +18,7 @@ from ...runs.experiment import Experiment
 Json = Any
 
 SPAN_FACTOR = 4.0  # Range of a slider of a positive quantity, as a factor of its start value.
+SHOWN_MIN = 0.1  # A smaller largest value of a slider is shown in a smaller unit.
 SIGNED_FACTOR = 2.0  # Half range of other sliders, in units of the start or nominal value.
 
 
@@ -46,13 +47,16 @@ def content(
     system = assemble(mechanism, mechanism.values())
     slot = slots(mechanism, independent)
     release = mechanism.release
+    typical = {v.unit: v.nominal for v in variables if v.causality == "output" and v.nominal}
     return {
         "name": mechanism.name,
         "title": mechanism.title,
         "stopTime": experiment.stop_time,
         "step": experiment.step,
         "quantities": [
-            _quantity(v, slot[v.name]) for v in variables if v.causality in ("parameter", "input")
+            _quantity(v, slot[v.name], typical)
+            for v in variables
+            if v.causality in ("parameter", "input")
         ],
         "outputs": [
             {"name": v.name, "slot": slot[v.name], **_unit(v)}
@@ -100,9 +104,11 @@ def _unit(v: Variable) -> dict[str, Json]:
     return {"description": v.description, "unit": unit, "shown": shown or unit, "factor": factor}
 
 
-def _quantity(v: Variable, slot: int) -> dict[str, Json]:
+def _quantity(v: Variable, slot: int, typical: Mapping[str, float]) -> dict[str, Json]:
+    """Return a parameter or input; ``typical`` are the magnitudes of outputs by unit."""
     group, _, label = v.name.partition(".")
     assert v.start is not None
+    slider = _slider(v, typical)
     return {
         "name": v.name,
         "slot": slot,
@@ -112,21 +118,40 @@ def _quantity(v: Variable, slot: int) -> dict[str, Json]:
         "start": float(v.start),
         "minimum": v.minimum if math.isfinite(v.minimum) else None,
         "maximum": v.maximum if math.isfinite(v.maximum) else None,
-        "slider": _slider(v),
-        **_unit(v),
+        "slider": slider,
+        **_fitting(_unit(v), max(abs(slider["low"]), abs(slider["high"]))),
     }
 
 
-def _slider(v: Variable) -> dict[str, Json]:
+def _fitting(unit: dict[str, Json], largest: float) -> dict[str, Json]:
+    """Return a unit, or a smaller one that suits a small largest value in SI.
+
+    Examples
+    --------
+    >>> mm = {"unit": "m", "shown": "mm", "factor": 1e3}
+    >>> _fitting(mm, 0.01)["shown"], _fitting(mm, 4e-6)["shown"]
+    ('mm', 'um')
+    """
+    smaller = {k: x for k, x in UNITS[unit["unit"]].display.items() if x > unit["factor"]}
+    if largest * unit["factor"] >= SHOWN_MIN or not smaller:
+        return unit
+    shown = min(smaller, key=lambda name: smaller[name])
+    return unit | {"shown": shown, "factor": smaller[shown]}
+
+
+def _slider(v: Variable, magnitudes: Mapping[str, float]) -> dict[str, Json]:
     """Return the range of a slider within the bounds, and whether it is logarithmic."""
     start = float(v.start or 0.0)
-    typical = max(SIGNED_FACTOR * abs(start), v.nominal or abs(start) or 1.0)
-    if v.minimum > 0.0 and start > 0.0 and not (v.unit in ("", "1") and v.maximum <= 1.0):
+    usual = magnitudes.get(v.unit) or v.nominal or 1.0
+    fraction = v.unit in ("", "1") and v.maximum == 1.0
+    if v.minimum > 0.0 and start > 0.0 and not fraction:
         low, high, logarithmic = start / SPAN_FACTOR, start * SPAN_FACTOR, True
     elif v.minimum >= 0.0:
-        low, high, logarithmic = max(0.0, v.minimum), SIGNED_FACTOR * typical, False
+        high = SPAN_FACTOR * start or SIGNED_FACTOR * (v.nominal or 1.0)
+        low, high, logarithmic = max(0.0, v.minimum), high, False
     else:
-        low, high, logarithmic = -SIGNED_FACTOR * typical, SIGNED_FACTOR * typical, False
+        high = SIGNED_FACTOR * max(abs(start), usual)
+        low, high, logarithmic = -high, high, False
     return {"low": max(low, v.minimum), "high": min(high, v.maximum), "logarithmic": logarithmic}
 
 

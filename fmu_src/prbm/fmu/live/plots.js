@@ -3,6 +3,7 @@
 const PLOT_HEIGHT = 170;
 const INSET = { left: 58, right: 12, top: 10, bottom: 24 };
 const FLAT = 1e-6; // Smaller values, as a share of the largest one, are shown as zero.
+const ROUND_OFF = { m: 1e-13, "m/s": 1e-12 }; // Motions below these limits are shown as zero.
 const POINTS_MAX = 2000; // Corners of a drawn curve.
 
 // Return the plots of a mechanism: title, unit, and series with the columns of a run.
@@ -118,11 +119,14 @@ class Plot {
     const ranges = this.plot.series.map(({ column }) => range(run, column));
     let low = Math.min(...ranges.map((sides) => sides[0]));
     let high = Math.max(...ranges.map((sides) => sides[1]));
-    const largest = Math.max(high, -low);
+    let largest = Math.max(high, -low);
+    if (largest < (ROUND_OFF[this.plot.unit] ?? 0)) {
+      [low, high, largest] = [0, 0, 0];
+    }
     ranges.forEach(([a, b], k) => {
       this.keys[k].classList.toggle("flat", ranges.length > 1 && Math.max(b, -a) <= FLAT * largest);
     });
-    this.tiny = FLAT * largest;
+    this.tiny = high === low ? Infinity : FLAT * largest;
     if (this.plot.walls) {
       low = Math.min(low, ...walls);
       high = Math.max(high, ...walls);
