@@ -177,5 +177,10 @@ PRBM bool project_near(const Equations *equations, const Evaluation *evaluation,
         return true;
     }
     copy(n, kept, y); /* Undo the correction. */
-    return project(q, t, y, scratch, problem);
+    if (!project(q, t, y, scratch, problem)) {
+        return false;
+    }
+    pad(n, y, correction->at.angle);
+    find_directions(q->system, near, &correction->at);
+    return true;
 }
