@@ -105,10 +105,7 @@ RARE void mapped_rows(const Equations *q, Correction *c) {
     const System *system = q->system;
     rows_and_convection(q, &c->at, c->by_direction, c->convective);
     zeros(q->r * system->even, c->rows);
-    for (int k = 0; k < q->r; k++) {
-        pull_directions(system, c->by_direction + k * system->wide, c->at.local,
-                        c->rows + k * system->even);
-    }
+    pull_directions(system, q->r, c->by_direction, c->rows);
 }
 
 SIZED void velocity_residuals(int even, const Equations *q, double t, Correction *c) {
