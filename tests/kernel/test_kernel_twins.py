@@ -383,7 +383,10 @@ def test_the_arrays_of_a_mechanism_are_the_same(name):
         assert_same(array(ours.calculated, len(known)), list(known.values()), scale=1.0)
         assert not outside(ours.blocks(), system.H).any()
         e = system.directions(random_state(system, rng)[0])
-        assert not outside(ours.mass_blocks(), system.mass_matrix(e)).any()
+        M = system.mass_matrix(e)
+        assert not outside(ours.mass_blocks()[:, :2], M).any()
+        for start, size, apart in ours.mass_blocks():
+            assert not M[start + apart + 1 : start + size, start : start + apart].any()
 
 
 def test_the_size_of_a_mechanism_with_all_centres_at_one_point_is_the_same():
@@ -587,8 +590,11 @@ def even(x):
     return np.ascontiguousarray(padded)
 
 
-def factors_of(M, rows, columns, sizes):
-    """Return the kernel's Factors of a matrix with blocks of some sizes, and their arrays."""
+def factors_of(M, rows, columns, sizes, apart=0):
+    """Return the kernel's Factors of a matrix with blocks of some sizes, and their arrays.
+
+    The rows of a block after the row ``apart`` are zero in the columns before it.
+    """
     r, n = rows.shape
     L = np.linalg.cholesky(M)
     root = np.diag(L).copy()
@@ -598,7 +604,7 @@ def factors_of(M, rows, columns, sizes):
         Z_columns = Z  # The kernel compares the pointers.
     starts = np.cumsum([0, *sizes])
     parts = np.concatenate([L[a:b, a:b].ravel() for a, b in itertools.pairwise(starts)])
-    blocks = np.array([starts[:-1], sizes], np.int32).T.copy()
+    blocks = np.array([starts[:-1], sizes, [apart] * len(sizes)], np.int32).T.copy()
     S, pivots = np.full(r * (2 * r + 1), np.nan), np.zeros(r, np.int32)
     arrays = [blocks, parts, even(1.0 / root**2), Z, Z_columns, S, pivots]
     addresses = (part.ctypes.data for part in arrays)
@@ -613,8 +619,11 @@ def solved_again(factors, right, n):
 
 
 @twin(factor_schur=constraints.factor_and_solve, solve_again=constraints.solve_again)
-@pytest.mark.parametrize("sizes", [(1,), (3,), (4, 3), (2, 1, 4), (5, 6)])
-def test_repeated_solutions_with_one_factorization_are_the_same(sizes):
+@pytest.mark.parametrize(
+    ("sizes", "apart"),
+    [((1,), 0), ((3,), 0), ((4, 3), 0), ((2, 1, 4), 0), ((5, 6), 0), ((7,), 3), ((8,), 5)],
+)
+def test_repeated_solutions_with_one_factorization_are_the_same(sizes, apart):
     """With columns that differ from the rows, as for sliding friction, and with equal ones."""
     rng, n = np.random.default_rng(0), sum(sizes)
     block = np.repeat(range(len(sizes)), sizes)
@@ -622,8 +631,12 @@ def test_repeated_solutions_with_one_factorization_are_the_same(sizes):
         for own in (False, True):
             M, rows = random_saddle(rng, n, r)
             M[block[:, None] != block] = 0.0
+            if apart:
+                M += np.diag(np.abs(M).sum(axis=1))  # Definite with zeros, too.
+                M[:apart, apart + 1 :] = 0.0
+                M[apart + 1 :, :apart] = 0.0
             columns = rows + 0.2 * own * rng.normal(size=rows.shape)
-            factors, _arrays = factors_of(M, rows, columns, sizes)
+            factors, _arrays = factors_of(M, rows, columns, sizes, apart)
             assert kernel().factor_schur(factors)
             kkt = constraints.saddle(M, columns, rows)
             rel = spread(np.linalg.cond(kkt) * np.linalg.cond(M))

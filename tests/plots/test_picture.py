@@ -317,7 +317,8 @@ def test_mechanisms_are_found_by_path_and_by_name() -> None:
     [
         (
             ["Bistabel"],
-            "unknown mechanism 'Bistabel' (mechanism files end in .toml); did you mean Bistable?",
+            "unknown mechanism 'Bistabel' (mechanism files end in .toml); did you mean Bistable "
+            "or CurvedBistable?",
         ),
         (["none.toml"], "none.toml: cannot be read"),
         (["PRBDM", "--set", "shuttle.mas=1"], "did you mean shuttle.mass"),

@@ -364,11 +364,11 @@ class KernelSystem:
 
     def blocks(self) -> np.ndarray:
         """Return the starts and sizes of the blocks of the mass matrix of the directions."""
-        return array(self.structure.blocks, self.structure.block_count, 2, kind="int")
+        return array(self.structure.blocks, self.structure.block_count, 3, kind="int")[:, :2]
 
     def mass_blocks(self) -> np.ndarray:
-        """Return the starts and sizes of the blocks of the mass matrix."""
-        return array(self.structure.mass_blocks, self.structure.mass_block_count, 2, kind="int")
+        """Return start, size and the row apart of each block of the mass matrix."""
+        return array(self.structure.mass_blocks, self.structure.mass_block_count, 3, kind="int")
 
     def frame(self, group: str, i: int) -> tuple[int, int, complex, complex, np.ndarray]:
         """Return ``(j, arm, c, drawn, A)`` of the i-th point of a group, fixed to a body.

@@ -317,7 +317,8 @@ class Simulation:
         step, controller = take_step(configuration, front, self.k1, self.controller, self.fastest)
         if step.h > STABLE_STEP_WATCH_FACTOR * self.fastest.longest_step(equations):
             self.fastest = self.fastest.refined(equations, step.factors)
-        arc = Arc(front.time, step.h, front.time + step.h, front.y, step.k).following(last)
+        before = last.start_before(step.h) if last else None
+        arc = Arc(front.time, step.h, front.time + step.h, front.y, step.k, before)
         view = StepView(configuration.scales, equations, arc, step.forces)
         event = events.first_event(view)
         if event is None:

@@ -10,6 +10,7 @@ Sources
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -100,8 +101,7 @@ def rounded_step(h: float) -> float:
     return shifted - (shifted - h)
 
 
-@dataclass(frozen=True)
-class Step:
+class Step(NamedTuple):
     """A computed step, not yet accepted.
 
     Parameters
@@ -174,8 +174,9 @@ def take_step(
         controller = controller.next(step.error)
         if step.error <= 1.0:
             # A step that was shortened by a wall does not shorten the next one.
-            whole = wanted if step.h == h < wanted else 0.0
-            return step, replace(controller, h=max(controller.h, whole))
+            if step.h == h < wanted and controller.h < wanted:
+                controller = replace(controller, h=wanted)
+            return step, controller
 
 
 def fixed_step(configuration: Configuration, front: Front, k1: Real) -> Step:
@@ -263,7 +264,7 @@ def projected(configuration: Configuration, equations: Equations, t: float, step
     """
     y = equations.project_near(t + step.h, step.y, step.factors)
     check_projection(configuration, t + step.h, step.y, y)
-    return replace(step, y=y)
+    return step._replace(y=y)
 
 
 def check_projection(configuration: Configuration, t: float, y: Real, projected: Real) -> None:
@@ -310,13 +311,18 @@ def step_error(scales: Scales, h: float, k: Real, y: Real, y1: Real) -> float:
     order 7 does [3].  On linear oscillations it is 0.35 to 1.8 times that error, up to the limit of
     stability.
     """
-    fine = error_norm(scales, h * (PAIR.error @ k), y, y1)
-    coarse = error_norm(scales, h * (PAIR.coarse_error @ k), y, y1)
+    scale = scales.of_state(np.maximum(np.abs(y), np.abs(y1)))
+    fine = root_mean_square(h * PAIR.error.dot(k) / scale)
+    coarse = root_mean_square(h * PAIR.coarse_error.dot(k) / scale)
     size = math.sqrt(fine * fine + coarse * coarse)
     return fine * fine / size if size > 0.0 else size
 
 
 def error_norm(scales: Scales, difference: Real, y: Real, y1: Real) -> float:
     """Return the root mean square of an error (2 n + 2,), relative to the larger state."""
-    ratio = difference / scales.of_state(np.maximum(np.abs(y), np.abs(y1)))
-    return math.sqrt(float(ratio @ ratio) / len(ratio))
+    return root_mean_square(difference / scales.of_state(np.maximum(np.abs(y), np.abs(y1))))
+
+
+def root_mean_square(x: Real) -> float:
+    """Return the root of the mean square of the elements of an array."""
+    return math.sqrt(float(x.dot(x)) / len(x))

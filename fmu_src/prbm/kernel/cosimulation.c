@@ -24,7 +24,8 @@ static bool leave_arc(Simulation *sim, bool shown, Problem *problem) {
     if (within && !shown) {
         ok = end_step(sim, state->time, problem);
     } else {
-        ok = arc_state(sim, state->front, &sim->present.reference, &sim->at_front, problem);
+        ok = arc_state(sim, state->front, sim->present.e, &sim->present.reference, &sim->at_front,
+                       problem);
         state->front_time = state->time;
     }
     state->arc.valid = state->has_k1 = false;
@@ -72,6 +73,15 @@ static bool check_time(const Simulation *sim, double time, Problem *problem) {
     return true;
 }
 
+/* Whether the motion goes on: nothing has been set, and all walls rest on their references. */
+static bool goes_on(const Simulation *sim) {
+    bool rest = true;
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        rest = rest && sim->state.walls[i].rate == 0.0 && sim->state.walls[i].span == 0.0;
+    }
+    return rest && sim->untouched;
+}
+
 /* Begin a communication step: join the walls to their references, and apply changed inputs and
  * parameters.  A step that was interrupted at an event keeps its references, unless an input of a
  * wall or a parameter has changed. */
@@ -79,7 +89,14 @@ static bool begin_step(Simulation *sim, double time, Problem *problem) {
     State *state = &sim->state;
     size_t bytes = (size_t)system_of(sim)->s * sizeof(Wall);
     Wall joined[STOPS_MAX];
+    if (goes_on(sim)) {
+        if (!state->interrupted) {
+            (void)pass_point(sim, time);
+        }
+        return true;
+    }
     bool set = values_changed(sim);
+    sim->untouched = true;
     if (set || !state->interrupted || walls_changed(sim)) {
         join_walls(sim, time, set, joined);
     } else {
@@ -168,6 +185,16 @@ static bool advance_some(Simulation *sim, double time, Stops stops, bool *event,
     return true;
 }
 
+/* Prepare a communication step to a time: keep a backup, unless nothing can fail because the time is
+ * within the latest integration step, no event is due and nothing has been set. */
+static void prepare_step(Simulation *sim, double time) {
+    bool known = time <= sim->state.front_time && goes_on(sim) && !event_due(&sim->state, time);
+    sim->present.fresh = NOTHING;
+    if (!known) {
+        keep_backup(sim);
+    }
+}
+
 PRBM bool simulation_advance_some(Simulation *simulation, double time, bool each, bool *event,
                                   Problem *problem) {
     Simulation *sim = simulation;
@@ -180,8 +207,7 @@ PRBM bool simulation_advance_some(Simulation *simulation, double time, bool each
         *event = event_due(&sim->state, time);
         return true;
     }
-    keep_backup(sim);
-    sim->present.fresh = NOTHING;
+    prepare_step(sim, time);
     return attempt(sim, advance_some(sim, time, stops, event, problem), problem);
 }
 
@@ -218,8 +244,7 @@ PRBM bool simulation_advance_part(Simulation *simulation, double time, int steps
             *reached = true;
             return true;
         }
-        keep_backup(sim);
-        sim->present.fresh = NOTHING;
+        prepare_step(sim, time);
     }
     return attempt(sim, advance_part(sim, time, steps, effort, reached, problem), problem);
 }

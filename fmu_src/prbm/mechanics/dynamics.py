@@ -14,6 +14,7 @@ therefore differs from its row in R.
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from ..mechanism.parts import value
 from . import constraints, forces
@@ -87,10 +88,7 @@ class Equations:
         self._number_contacts()
         self._collect_loads()
         self._stack_rows()
-        # One product with e gives loads, inertia and constraints: see _solve.
-        self._stack: Complex = np.vstack([self.w, system.H, 1j * self.rows.spread])
-        self._J_stack = np.zeros((self.d + len(self.rows), self.d))
-        self._J_stack[: self.d] = np.diag(system.J)
+        self._stack_terms()
         # Springs and their damping in one product with (q, v): see torques.
         damping = self.beta * system.K
         self._K_y = np.block([[system.K, damping], [0 * system.K, damping]])
@@ -141,6 +139,20 @@ class Equations:
         self.rows = Rows(system, B, c, z, on)
         self.positions = self.rows.first(self.first_stick)
 
+    def _stack_terms(self) -> None:
+        """Stack inertia, constraints and loads, and extend Phi to the multipliers: see _solve."""
+        d, B, size = self.d, 1j * self.rows.spread, self.d + len(self.rows)
+        self._terms = np.zeros((size, size + 1), complex)
+        self._terms[:d, :d] = self.system.H
+        self._terms[d:, :d] = B
+        self._terms[:d, d:size] = B.conj().T
+        self._terms[:d, size] = 1j * self.w.conj()
+        self._J = np.diag(np.concatenate([self.system.J, np.zeros(len(self.rows))]))
+        self._ones = np.ones(size + 1, complex)
+        self._last = np.zeros(size + 1, complex if len(self.system.stretches) else float)
+        self._last[size] = 1.0
+        self._Phi = block_diag(self.system.Phi.Phi, np.eye(len(self.rows)))
+
     def with_contacts(self, contacts: ContactState) -> "Equations":
         """Return the equations for another state of the contacts."""
         if contacts == self.contacts:
@@ -184,42 +196,39 @@ class Equations:
         (2 n,)
             K (q - q0) + beta K v, then beta K v [N m].
         """
-        result: Real = self._K_y @ y
-        result -= self._straight
+        result: Real = self._K_y.dot(y) - self._straight
         return result
 
     def _solve(self, t: float, q: Real, v: Real, torques: Real) -> Evaluation:
         """Solve the equations for given torques of the springs.
 
-        One product with e gives all terms that depend on it, row by row:
+        One product gives all terms, with u = (e, 1, ..., 1):
 
-            G = [w e;  diag(e)^H H diag(e);  i B e],
+            X = diag(u)^H [ H    (i B)^H   i w^H ] diag(u).
+                          [ i B     0        0   ]
 
-        whose real parts are the load, M - J and the constraint rows, and whose imaginary parts
-        are -C (:func:`prbm.mechanics.kinetics.inertia`) and the convective terms Re(B e), all of
-        the directions.
+        The real part of the first columns is the matrix of the equations without J, that of the
+        directions.  The imaginary part times (v^2, 0, 1) is the right side: -C v^2
+        (:func:`prbm.mechanics.kinetics.inertia`), the loads and the convective terms Re(B e) v^2.
         """
-        n, d, Phi = self.n, self.d, self.system.Phi
-        e, w = self.system.directions(q), self.system.turning(v)
-        G = self._stack * e
-        G[1 : d + 1] *= e.conj()[:, None]
+        n, d, e, w = self.n, self.d, self.system.directions(q), self.system.turning(v)
+        u, squares = self._ones.copy(), self._last.copy()
+        u[:d] = e
+        squares[:d] = w * w
+        X = self._terms * u
+        X *= u[:-1].conj()[:, None]
+        kkt = X.real[:, :-1] + self._J
+        right: Real = X.imag.dot(squares) if squares.dtype == float else X.dot(squares).imag
         carried = d + self.rows.carried
         if len(carried):
-            G.real[1 + carried] = self.rows.by_direction(e)[self.rows.carried]
-        size = n + len(self.rows)
-        kkt = np.zeros((size, size), order="F")
-        kkt[:, :n] = Phi.fold(Phi.pull(G.real[1:] + self._J_stack))
-        kkt[:n, n:] = kkt[n:, :n].T
-        M = kkt[:n, :n]
-        squares = w * w
-        right: Real = (G[1:] @ squares).imag if np.iscomplexobj(w) else G.imag[1:] @ squares.real
-        if len(carried):
+            kkt[carried, :d] = self.rows.by_direction(e)[self.rows.carried]
+            kkt[:d, carried] = kkt[carried, :d].T
             right[carried] = self.rows.carried_convective(e, w)
-        right[:d] += G.real[0]
-        right = Phi.fold(right)
+        if not self.system.Phi.identity:
+            kkt, right = self._Phi.T @ kkt @ self._Phi, self._Phi.T @ right
         if self.moving_walls:
             right[n + self.first_hold : n + self.first_stick] -= self.held_motions(t)[2]
-        Q = right[:n]
+        M, Q = kkt[:n, :n], right[:n]
         Q -= torques
         if self.driven:
             Q += self.moment
@@ -251,17 +260,18 @@ class Equations:
         torques = self.torques(y[: 2 * n])
         evaluation = self._solve(t, q, v, torques[:n])
         lam = evaluation.lam
+        loss, power = v.dot(torques[n:]), 0.0
+        if self.mass_damping:
+            loss += 2.0 * self.mass_damping * kinetic_energy(evaluation.M, v)
+        if self.slipping_points or self.slipping_stops:
+            loss += self._friction_power(q, v, lam)
+        if self.driven or self.moving_walls:
+            power = self._input_power(t, q, v, lam)
         result = np.empty(2 * n + 2)
         result[:n] = v
-        result[n : 2 * n] = evaluation.a
-        result[2 * n] = v @ torques[n:]
-        result[2 * n + 1] = 0.0
-        if self.mass_damping:
-            result[2 * n] += 2.0 * self.mass_damping * kinetic_energy(evaluation.M, v)
-        if self.slipping_points or self.slipping_stops:
-            result[2 * n] += self._friction_power(q, v, lam)
-        if self.driven or self.moving_walls:
-            result[2 * n + 1] = self._input_power(t, q, v, lam)
+        result[n:-2] = evaluation.a
+        result[-2] = loss
+        result[-1] = power
         return result, evaluation
 
     def _friction_power(self, q: Real, v: Real, lam: Real) -> float:

@@ -400,7 +400,8 @@ class System:
         """
         theta = self.Phi.of(q)
         if not len(self.stretches):
-            turned: Complex = np.exp(1j * theta)
+            turned = np.empty(theta.shape, complex)
+            turned.real, turned.imag = np.cos(theta), np.sin(theta)
             return turned
         w = 1j * theta
         w[..., self.stretched] += theta[..., self.stretches]

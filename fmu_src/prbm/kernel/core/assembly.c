@@ -162,11 +162,28 @@ static int end_of_block(int size, const bool *linked, int start) {
     return end;
 }
 
+/* Return the row of a block between start and end, counted in the block, that leaves most elements
+ * zero: those of later rows in earlier columns. */
+static int row_apart(int size, const bool *linked, int start, int end) {
+    int apart = 0, most = 0;
+    for (int row = start + 1; row < end - 1; row++) {
+        int zeros = (row - start) * (end - 1 - row);
+        for (int i = row + 1; i < end; i++) {
+            for (int j = start; j < row; j++) {
+                zeros = linked[i * size + j] ? 0 : zeros;
+            }
+        }
+        apart = zeros > most ? row - start : apart;
+        most = zeros > most ? zeros : most;
+    }
+    return apart;
+}
+
 static int find_blocks(int size, const bool *linked, Block *blocks) {
     int count = 0;
     for (int start = 0; start < size;) {
         int end = end_of_block(size, linked, start);
-        Block block = {start, end - start};
+        Block block = {start, end - start, row_apart(size, linked, start, end)};
         blocks[count++] = block;
         start = end;
     }
@@ -242,8 +259,8 @@ static void add_moments(System *system, Scratch *scratch) {
         add_moments_of(system, system->m[k], system->A + (size_t)k * d);
     }
     find_all_blocks(system, scratch);
-    set_block_maps(system, scratch);
     pack_blocks(system);
+    set_block_maps(system, scratch);
 }
 
 /* Return the size of the drawn mechanism [m]: the largest distance between points of the ground and

@@ -21,7 +21,6 @@ typedef struct {
     double *squares;         /* (wide,): turn^2 */
     Complex *e;              /* (wide,) */
     Parts e_parts;           /* (wide,) */
-    double *local;           /* (wide + 1, even) working memory, if mapped */
     double *own;             /* (d,) the diagonal of the mass of the directions, if arms stretch */
 } Kinematics;
 
@@ -32,7 +31,8 @@ typedef struct {
     double *row, *columns;           /* (even,), (r, even) */
     double *a, *lam;                 /* (even + 2,) accelerations; (r,) */
     double *load, *rows;             /* (wide,), (r, wide) of the directions: a and Z, unless mapped */
-    double *mass, *shift;            /* (n, n), (wide,) M and Im(w^2), if mapped */
+    double *mass, *shift;            /* (n, n), (wide,) blocks of M and Im(w^2), if mapped */
+    double *turned;                  /* (wide,) working memory, if mapped */
     double *block;                   /* of M, below its diagonal */
     double spring_loss;              /* the power that the springs dissipate */
     Factors factors;

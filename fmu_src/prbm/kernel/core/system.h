@@ -30,24 +30,43 @@ typedef struct {
     int a, b;
 } Spring;
 
-/* A dense block on the diagonal of the mass matrix, for example that of the links of a flexure that
- * closes a loop. */
+/* A block on the diagonal of the mass matrix, for example that of the links of a flexure that
+ * closes a loop.  The rows after the row apart, counted in the block, are zero in the columns
+ * before it. */
 typedef struct {
-    int start, size;
+    int start, size, apart;
 } Block;
 
-/* The map from coordinates to the directions of a block of the mass matrix of the directions. */
+/* Sizes of the blocks whose code is compiled separately: those of a beam of the order 3. */
+enum {
+    BEAM_COORDINATES = 4,
+    BEAM_ENTRIES = 10, /* of a symmetric matrix of the coordinates */
+    BEAM_DIRECTIONS_MIN = 5,
+    BEAM_DIRECTIONS_MAX = 7,
+    BEAM_CHANGES = 28 /* of the most directions with all coordinates */
+};
+
+/* A block of the mass matrix of the directions, and its map from the coordinates. */
 typedef struct {
-    int start, size; /* The directions. */
-    int count, even; /* The number of coordinates that they depend on, and its padded length. */
-    int *coordinate; /* (count,) in ascending order */
-    double *change;  /* (size, even) changes of the directions with these coordinates */
+    int start, size, even; /* The directions: the first, their number, its padded length. */
+    int count;             /* The number of coordinates that they depend on. */
+    int *coordinate;       /* (count,) in ascending order */
+    double *change;        /* (count, even) changes of the directions with these coordinates */
+    Parts H;               /* (size, even) below the diagonal, and zero elsewhere */
+    int mass_first, mass_size; /* The mass of the coordinates i and j <= i is at the index
+                                * mass_first + i mass_size + j of the mass blocks. */
+    bool beam;             /* Whether the members below are used. */
+    int place[BEAM_ENTRIES];       /* The indices of the masses of the coordinates. */
+    double constant[BEAM_ENTRIES]; /* The part of these masses that is constant. */
+    double rows[BEAM_CHANGES];     /* (size, BEAM_COORDINATES) change, row by row. */
+    double *products;      /* (pairs, BEAM_ENTRIES) their changes with the mass of each pair of
+                            * directions */
 } BlockMap;
 
-/* The constant arrays of a mechanism, as in the twin.  There are n coordinates, d directions, r loop
- * rows, p mass points, s stops, f friction points and b bodies.  Columns of A and of the rows are
- * zero at stretches, see spread.  Vectors with the shape (even,) or (wide,) have n or d elements, and
- * are padded to an even length. */
+/* The constant arrays of a mechanism, as in the twin.  There are n coordinates, d directions, r
+ * loop rows, p mass points, s stops, f friction points and b bodies.  Columns of A and of the
+ * rows are zero at stretches, see spread.  Vectors with the shape (even,) or (wide,) have n or d
+ * elements, and are padded to an even length. */
 typedef struct {
     const Mechanism *mechanism;
     const double *values;
@@ -113,8 +132,8 @@ PRBM void motion(const System *system, const BodyFrame *frame, const Complex *e,
                  Complex *displacement, Complex *velocity);
 /* Copy B (r, d) to rows, and repeat the column of each arm for its stretch.  rows may be B. */
 PRBM void spread(const System *system, int r, const Complex *B, Complex *rows);
-/* Replace the unit vectors e by the arms, and by -i times the arms for stretches.  theta (d,) are the
- * directions. */
+/* Replace the unit vectors e by the arms, and by -i times the arms for stretches.  theta (d,)
+ * are the directions. */
 PRBM void stretch(const System *system, const double *theta, Complex *e);
 /* Compute the mass matrix M (n, n). */
 PRBM void mass_matrix(const System *system, const Complex *e, double *M, Scratch *scratch);

@@ -45,11 +45,13 @@ static void output_stops(const Simulation *sim, double *out) {
     Rows gaps = gap_rows(system);
     for (int i = 0; i < system->s; i++) {
         double *values = out + PER_STOP * i;
-        values[STOP_GAP] = gap(&sim->equations, i, sim->state.time, e);
-        values[STOP_GAP_RATE] = gap_rate(&sim->equations, i, sim->state.time, e, v);
-        values[STOP_POINT_DISPLACEMENT] = -(row_value(&gaps, i, e) + gaps.c[i]) -
-                    field_value(sim, system->mechanism->stops[i].position);
-        values[STOP_POINT_VELOCITY] = -row_rate(&gaps, i, e, v);
+        WallMotion wall = wall_motion(&sim->state.walls[i], sim->state.time);
+        double value = row_value(&gaps, i, e) + gaps.c[i], rate = row_rate(&gaps, i, e, v);
+        values[STOP_GAP] = value + wall.x;
+        values[STOP_GAP_RATE] = rate + wall.v;
+        values[STOP_POINT_DISPLACEMENT] =
+            -value - field_value(sim, system->mechanism->stops[i].position);
+        values[STOP_POINT_VELOCITY] = -rate;
     }
 }
 

@@ -209,6 +209,15 @@ PRBM double simulation_steps(const Simulation *simulation) {
     return simulation->steps;
 }
 
+PRBM double pass_point(Simulation *sim, double time) {
+    State *state = &sim->state;
+    double last = state->time - state->point, following = time - state->time;
+    double H = greater(last > 0.0 ? last : following, state->longest - WALL_FADING_FACTOR * last);
+    state->longest = lesser(H, WALL_LONGEST_RTOL * sim->configuration.scales.time);
+    state->point = state->time;
+    return H;
+}
+
 /* --- contact state and inputs ----------------------------------------------------------------- */
 
 PRBM void set_inputs(Simulation *sim) {

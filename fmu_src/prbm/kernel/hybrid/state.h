@@ -130,6 +130,7 @@ typedef struct {
     Located located;
     Node middle;           /* of the latest step */
     bool has_middle;       /* whether the middle has been computed */
+    double embedded_error; /* of the latest step; negative before it is computed */
     double *reach;         /* (d,), (n,) bounds of the changes of arms and coordinates */
     double *torques;       /* (even + 2,) of the springs in the fastest mode */
     double *response;      /* (even + 2,) accelerations by these torques */
@@ -169,7 +170,8 @@ struct Simulation {
     Scratch scratch;
     ImpactListener *on_impact;
     void *listener;
-    double steps; /* integration steps since the simulation was opened */
+    bool untouched; /* whether nothing has been set since the last communication point */
+    double steps;   /* integration steps since the simulation was opened */
     size_t bytes;
 };
 

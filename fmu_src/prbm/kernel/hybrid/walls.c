@@ -47,10 +47,8 @@ PRBM double push_wall(Simulation *sim, int i, double P) {
 PRBM void join_walls(Simulation *sim, double time, bool set, Wall *joined) {
     State *state = &sim->state;
     double now = state->time, last = now - state->point, following = time - now;
-    double H = greater(last > 0.0 ? last : following, state->longest - WALL_FADING_FACTOR * last);
+    double H = pass_point(sim, time);
     double share = lesser(H / following, 1.0), least = WALL_PATH_RTOL * system_of(sim)->length;
-    state->longest = lesser(H, WALL_LONGEST_RTOL * sim->configuration.scales.time);
-    state->point = now;
     for (int i = 0; i < system_of(sim)->s; i++) {
         const Stop *stop = &sim->configuration.mechanism->stops[i];
         Wall wall = state->walls[i], line = given_reference(sim, i);
