@@ -196,12 +196,6 @@ SIZED void map_beam(int size, const BlockMap *map, const double *ALONE x, double
     }
 }
 
-/* Compute the directions of coordinates, and their rates of those of the coordinates. */
-SIZED void move_beam(int size, const BlockMap *map, Kinematics *at) {
-    map_beam(size, map, at->angle, at->theta);
-    map_beam(size, map, at->speed, at->turn);
-}
-
 RARE void map_block(const BlockMap *map, const double *x, double *out) {
     for (int i = 0; i < map->size; i += LANES) {
         Lanes sum = NO_LANES;
@@ -216,17 +210,25 @@ RARE void map_block(const BlockMap *map, const double *x, double *out) {
     }
 }
 
+SIZED void map_one(const BlockMap *map, const double *x, double *out) {
+    switch (map->beam ? map->size : 0) {
+    case 5: map_beam(5, map, x, out); break;
+    case 6: map_beam(6, map, x, out); break;
+    case 7: map_beam(7, map, x, out); break;
+    default: map_block(map, x, out);
+    }
+}
+
+PRBM void map_directions(const System *system, const double *x, double *out) {
+    for (int k = 0; k < system->block_count; k++) {
+        map_one(&system->maps[k], x, out);
+    }
+}
+
 PRBM void map_motion(const System *system, Kinematics *at) {
     for (int k = 0; k < system->block_count; k++) {
-        const BlockMap *map = &system->maps[k];
-        switch (map->beam ? map->size : 0) {
-        case 5: move_beam(5, map, at); break;
-        case 6: move_beam(6, map, at); break;
-        case 7: move_beam(7, map, at); break;
-        default:
-            map_block(map, at->angle, at->theta);
-            map_block(map, at->speed, at->turn);
-        }
+        map_one(&system->maps[k], at->angle, at->theta);
+        map_one(&system->maps[k], at->speed, at->turn);
     }
 }
 

@@ -9,6 +9,8 @@
 PRBM void place_maps(System *system, Memory *memory);
 /* Set the maps of all blocks of directions from the factors and masses of the system. */
 PRBM void set_block_maps(System *system, Scratch *scratch);
+/* Compute the directions, or their rates, out (d,) of coordinates or rates x (n,). */
+PRBM void map_directions(const System *system, const double *x, double *out);
 /* Compute the directions and their rates from the coordinates and their rates. */
 PRBM void map_motion(const System *system, Kinematics *at);
 /* Add the derivatives by directions x (r, wide), pulled back to the coordinates, to out

@@ -73,8 +73,10 @@ PRBM void evaluation_place(Evaluation *evaluation, const System *system, Memory 
 
 PRBM void set_reference(Reference *reference, const System *system, const double *angle) {
     int wide = system->wide;
-    for (int j = 0; j < system->d; j++) {
-        reference->theta[j] = direction_of(system, angle, j);
+    if (system->mapped) {
+        map_directions(system, angle, reference->theta);
+    } else {
+        copy(system->d, angle, reference->theta);
     }
     reference->theta[wide - 1] = system->d < wide ? 0.0 : reference->theta[wide - 1];
     unit_vectors(wide, reference->theta, reference->e);
