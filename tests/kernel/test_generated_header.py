@@ -169,7 +169,7 @@ def exported():
     for name, expected in arrays.items():
         shape = "".join(f"[{count}]" for count in expected.shape)
         lines.append(f"const double value_{name}{shape} = {name};")
-    return compiled(text="\n".join(lines)), macros, arrays
+    return compiled(flags=("-O0",), text="\n".join(lines)), macros, arrays
 
 
 def test_tolerances_of_c_equal_those_of_python_bit_by_bit(exported):
