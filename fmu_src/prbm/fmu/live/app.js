@@ -47,9 +47,13 @@ class Page {
     this.modes = new ModeView(byId("modes"), description, (shape) =>
       this.stage.draw(this.shapes, shape),
     );
+    const handles = [
+      ...(description.stops.length ? ["a wall"] : []),
+      ...(this.stage.bodyHandle ? ["the released body"] : []),
+    ];
     byId("hint").textContent =
-      (description.stops.length ? "Drag a wall or the released body" : "Drag the released body") +
-      "; arrow keys move a focused handle. Drag over a plot to move in time.";
+      (handles.length ? `Drag ${handles.join(" or ")}; arrow keys move a focused handle. ` : "") +
+      "Drag over a plot to move in time.";
     byId("impact-card").hidden = description.stops.length === 0;
     this.listen();
   }
