@@ -1,6 +1,6 @@
 // A run of a live page's kernel in Node, without a page.
 //
-// node live_host.js SCRIPTS MODULE.wasm: reads one job as JSON from standard input, writes the result
+// node live_host.js SCRIPTS MODULE.wasm: reads a job as JSON from standard input, and writes the result
 // as JSON to standard output.  Numbers of the result keep all digits.
 "use strict";
 const { readFileSync } = require("node:fs");

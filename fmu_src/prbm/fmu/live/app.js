@@ -1,6 +1,6 @@
 // The live page: a simulation for the present parameters, its film, plots, tables and link.
 
-const PATIENCE = 120; // Milliseconds after which a drag replaces a run that is not finished.
+const RUN_AGE_MIN = 120; // Milliseconds that a run gets before a drag replaces it.
 const PLOT_PERIOD = 50; // Milliseconds between two drawings of the plots while the film runs.
 
 class Page {
@@ -12,7 +12,11 @@ class Page {
     this.changes = new Map();
     this.outputs = plottedOutputs(description);
     description.stops.forEach((stop) =>
-      this.outputs.push(`${stop.name}.contact`, `${stop.name}.impact_count`, `${stop.name}.impact_time`),
+      this.outputs.push(
+        `${stop.name}.contact`,
+        `${stop.name}.impact_count`,
+        `${stop.name}.impact_time`,
+      ),
     );
     const slot = new Map(description.outputs.map((output) => [output.name, output.slot]));
     this.slots = this.outputs.map((name) => slot.get(name));
@@ -33,13 +37,23 @@ class Page {
     };
     this.film = new Film(description.stopTime, () => this.show());
     this.stage = new Stage(byId("stage"), description, actions);
-    this.controls = new Controls(byId("fields"), description, (...change) => this.change(...change));
+    this.controls = new Controls(byId("fields"), description, (...change) =>
+      this.change(...change),
+    );
     const seek = (time) => this.film.seek(time);
-    this.plots = plotList(description, this.column).map((plot) => new Plot(plot, byId("plots"), seek));
-    this.modes = new ModeView(byId("modes"), description, (shape) => this.stage.draw(this.shapes, shape));
+    this.plots = plotList(description, this.column).map(
+      (plot) => new Plot(plot, byId("plots"), seek),
+    );
+    this.modes = new ModeView(byId("modes"), description, (shape) =>
+      this.stage.draw(this.shapes, shape),
+    );
+    const handles = [
+      ...(description.stops.length ? ["a wall"] : []),
+      ...(this.stage.bodyHandle ? ["the released body"] : []),
+    ];
     byId("hint").textContent =
-      (description.stops.length ? "Drag a wall or the released body" : "Drag the released body") +
-      "; arrow keys move a focused handle. Drag over a plot to move in time.";
+      (handles.length ? `Drag ${handles.join(" or ")}; arrow keys move a focused handle. ` : "") +
+      "Drag over a plot to move in time.";
     byId("impact-card").hidden = description.stops.length === 0;
     this.listen();
   }
@@ -48,7 +62,9 @@ class Page {
     byId("reset").addEventListener("click", () => this.apply(new Map(), true));
     byId("copy").addEventListener("click", () => this.copy());
     byId("download").addEventListener("click", () => this.download());
-    byId("show-links").addEventListener("change", (event) => byId("live").classList.toggle("with-links", event.target.checked));
+    byId("show-links").addEventListener("change", (event) =>
+      byId("live").classList.toggle("with-links", event.target.checked),
+    );
     window.addEventListener("hashchange", () => this.follow());
     const tabs = [byId("tab-motion"), byId("tab-modes")];
     tabs.forEach((tab, k) => {
@@ -66,7 +82,9 @@ class Page {
         this.show(true);
       }
     }).observe(byId("plots"));
-    window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.show(true));
+    window
+      .matchMedia("(prefers-color-scheme: dark)")
+      .addEventListener("change", () => this.show(true));
   }
 
   // -- values --
@@ -82,7 +100,9 @@ class Page {
   // The position of a wall [m].
   wall(k) {
     const stop = this.description.stops[k];
-    return evaluated(stop.position, { get: (name) => this.value(name) }) + this.value(stop.displacement);
+    return (
+      evaluated(stop.position, { get: (name) => this.value(name) }) + this.value(stop.displacement)
+    );
   }
 
   change(name, value, ended) {
@@ -97,7 +117,7 @@ class Page {
 
   dragged(name, value, ended) {
     this.change(name, value, ended);
-    if (ended && name === this.description.release.quantity && !still.matches) {
+    if (ended && name === this.description.release.quantity && !reducedMotion.matches) {
       this.film.replay();
     }
   }
@@ -114,7 +134,7 @@ class Page {
   // Start a simulation with changes, at once or when the present one has been shown.
   apply(changes, now) {
     this.wanted = changes;
-    if (now || !this.busy || performance.now() - this.started > PATIENCE) {
+    if (now || !this.busy || performance.now() - this.started > RUN_AGE_MIN) {
       this.begin();
     }
   }
@@ -137,7 +157,11 @@ class Page {
     try {
       const numbers = [...changes].map(([name, value]) => [this.known.get(name).slot, value]);
       simulation = new Simulation(this.kernel, this.mechanism, this.slots, new Map(numbers));
-      run = new Run(simulation, Math.round(this.description.stopTime / this.description.step), this.description.step);
+      run = new Run(
+        simulation,
+        Math.round(this.description.stopTime / this.description.step),
+        this.description.step,
+      );
     } catch (error) {
       simulation?.close();
       this.refuse(error, changes);
@@ -165,7 +189,10 @@ class Page {
       throw error;
     }
     const wrong = [...changes.keys()].find((name) => error.message.startsWith(name));
-    this.say(`${error.message}.${this.run ? " The last valid simulation is still shown." : ""}`, wrong);
+    this.say(
+      `${error.message}.${this.run ? " The last valid simulation is still shown." : ""}`,
+      wrong,
+    );
     if (!this.run) {
       this.state("error");
       if (changes.size) {
@@ -185,7 +212,7 @@ class Page {
       this.finish();
     }
     this.show();
-    if (this.wanted && (run.finished || performance.now() - this.started > PATIENCE)) {
+    if (this.wanted && (run.finished || performance.now() - this.started > RUN_AGE_MIN)) {
       this.begin();
     }
   }
@@ -196,7 +223,9 @@ class Page {
     const read = (name, output) => run.last(this.column.get(`${name}.${output}`));
     const { dataset } = document.documentElement;
     dataset.impacts = stops.reduce((sum, stop) => sum + read(stop.name, "impact_count"), 0);
-    dataset.last = JSON.stringify(Object.fromEntries(stops.map((stop) => [stop.name, read(stop.name, "impact_time")])));
+    dataset.last = JSON.stringify(
+      Object.fromEntries(stops.map((stop) => [stop.name, read(stop.name, "impact_time")])),
+    );
     this.runs += 1;
     dataset.runs = this.runs;
     dataset.milliseconds = Math.round(performance.now() - this.started);
@@ -206,7 +235,7 @@ class Page {
     this.stage.fit(this.shapes, run);
     this.film.stopTime = run.error ? Math.max(run.time, run.step) : description.stopTime;
     this.state("done");
-    if (this.runs === 1 && !still.matches) {
+    if (this.runs === 1 && !reducedMotion.matches) {
       this.film.play(true);
     }
   }
@@ -249,7 +278,9 @@ class Page {
 
   showNumbers(now) {
     const { run, description } = this;
-    this.plots.forEach((plot) => plot.draw(run, now, plot.plot.walls ? this.wallLines() : [], description.stopTime));
+    this.plots.forEach((plot) =>
+      plot.draw(run, now, plot.plot.walls ? this.wallLines() : [], description.stopTime),
+    );
     const key = `${this.runs} ${run.count} ${this.started}`;
     if (key !== this.listed) {
       this.listed = key;
@@ -276,9 +307,13 @@ class Page {
     const length = FLASH_TIME / film.slow;
     for (let k = run.impactAfter(now) - 1; k >= 0 && run.impacts[k].time > now - length; k--) {
       const { stop, time, approach } = run.impacts[k];
-      marks.push({ stop, age: (now - time) / length, strength: Math.max(0.25, approach / strongest) });
+      marks.push({
+        stop,
+        age: (now - time) / length,
+        strength: Math.max(0.25, approach / strongest),
+      });
     }
-    return still.matches ? [] : marks;
+    return reducedMotion.matches ? [] : marks;
   }
 
   view(modes) {

@@ -28,25 +28,62 @@ class Controls {
 
   row(quantity, full) {
     const id = `q-${quantity.slot}`;
-    const label = element("label", { for: id, title: quantity.name }, labelled(full ? quantity.name : quantity.label));
+    const label = element(
+      "label",
+      { for: id, title: quantity.name },
+      labelled(full ? quantity.name : quantity.label),
+    );
     const number = element("input", {
-      id, type: "text", inputmode: "decimal", autocomplete: "off", spellcheck: "false",
-      "aria-describedby": `${id}-note`, "data-name": quantity.name,
+      id,
+      type: "text",
+      inputmode: "decimal",
+      autocomplete: "off",
+      spellcheck: "false",
+      "aria-describedby": `${id}-note`,
+      "data-name": quantity.name,
     });
     const unit = element("span", { class: "unit" }, unitText(quantity.shown));
-    const reset = element("button", {
-      type: "button", class: "undo", title: `Reset ${quantity.name}`, "aria-label": `Reset ${quantity.name}`,
-    }, "\u21ba");
+    const reset = element(
+      "button",
+      {
+        type: "button",
+        class: "undo",
+        title: `Reset ${quantity.name}`,
+        "aria-label": `Reset ${quantity.name}`,
+      },
+      "\u21ba",
+    );
     const slider = element("input", {
-      type: "range", min: 0, max: SLIDER_STEPS, step: 1, "aria-label": quantity.name,
+      type: "range",
+      min: 0,
+      max: SLIDER_STEPS,
+      step: 1,
+      "aria-label": quantity.name,
     });
-    const note = element("p", { id: `${id}-note`, class: "note" }, `${quantity.description}${bounds(quantity)}`);
-    const node = element("div", { class: "row" }, label, element("span", { class: "entry" }, number, unit, reset), slider, note);
+    const note = element(
+      "p",
+      { id: `${id}-note`, class: "note" },
+      `${quantity.description}${bounds(quantity)}`,
+    );
+    const node = element(
+      "div",
+      { class: "row" },
+      label,
+      element("span", { class: "entry" }, number, unit, reset),
+      slider,
+      note,
+    );
     const row = { quantity, node, number, slider, reset };
     this.rows.set(quantity.name, row);
-    number.addEventListener("change", () => this.change(quantity.name, parsed(number.value) / quantity.factor, true));
-    slider.addEventListener("input", () => this.change(quantity.name, fromSlider(quantity, Number(slider.value)), false));
-    slider.addEventListener("change", () => this.change(quantity.name, fromSlider(quantity, Number(slider.value)), true));
+    number.addEventListener("change", () =>
+      this.change(quantity.name, parsed(number.value) / quantity.factor, true),
+    );
+    slider.addEventListener("input", () =>
+      this.change(quantity.name, fromSlider(quantity, Number(slider.value)), false),
+    );
+    slider.addEventListener("change", () =>
+      this.change(quantity.name, fromSlider(quantity, Number(slider.value)), true),
+    );
     reset.addEventListener("click", () => this.change(quantity.name, quantity.start, true));
     return node;
   }
@@ -121,7 +158,10 @@ function bounds({ minimum, maximum, factor, shown, slider }) {
   const unit = unitText(shown);
   const text = (x) => `${digits(x * factor)}${unit ? `\u202f${unit}` : ""}`;
   const usual = BOUND_SHOWN_MAX * Math.max(Math.abs(slider.low), Math.abs(slider.high));
-  const small = minimum !== null && Math.abs(minimum) <= usual && (minimum === 0 || minimum > usual * 1e-6 || minimum < 0);
+  const small =
+    minimum !== null &&
+    Math.abs(minimum) <= usual &&
+    (minimum === 0 || minimum > usual * 1e-6 || minimum < 0);
   const large = maximum !== null && Math.abs(maximum) <= usual;
   if (small && large) {
     return ` (${text(minimum)} to ${text(maximum)})`;
@@ -141,6 +181,8 @@ function fromSlider({ slider, factor }, position) {
   const { low, high, logarithmic } = slider;
   const share = position / SLIDER_STEPS;
   const value = logarithmic ? low * (high / low) ** share : low + share * (high - low);
-  const fine = logarithmic ? Number(value.toPrecision(4)) : rounded(value, (high - low) / SLIDER_STEPS);
+  const fine = logarithmic
+    ? Number(value.toPrecision(4))
+    : rounded(value, (high - low) / SLIDER_STEPS);
   return Number((Math.round(fine * factor * 1e9) / 1e9 / factor).toPrecision(12));
 }

@@ -133,9 +133,7 @@ class Simulation {
   values() {
     const count = this.slots.length;
     this.check(
-      this.call.prbm_values(
-        this.address, count, this.slotsAt, this.valuesAt, this.kernel.message,
-      ),
+      this.call.prbm_values(this.address, count, this.slotsAt, this.valuesAt, this.kernel.message),
     );
     return this.kernel.numbers(this.valuesAt, count);
   }
@@ -161,9 +159,7 @@ class Simulation {
     const address = this.kernel.allocate(NUMBER * (n + count + count * n));
     const [q, frequencies, shapes] = [0, n, n + count].map((k) => address + NUMBER * k);
     try {
-      const found = this.call.prbm_modes(
-        this.address, q, frequencies, shapes, this.kernel.message,
-      );
+      const found = this.call.prbm_modes(this.address, q, frequencies, shapes, this.kernel.message);
       this.check(found >= 0);
       const read = (from, length) => this.kernel.numbers(from, length).slice();
       const modes = [...read(frequencies, count)].map((frequency, k) => ({

@@ -3,7 +3,7 @@
 const SPEEDS = [1, 2, 5, 10, 20, 50, 100]; // Slow motion, in units of a power of ten.
 const FILM_SECONDS = 10; // Duration of the film at the speed that is chosen first.
 
-const still = window.matchMedia("(prefers-reduced-motion: reduce)");
+const reducedMotion = window.matchMedia("(prefers-reduced-motion: reduce)");
 
 class Film {
   // Parameters: the duration of a run [s], and the function changed() that draws the new time.
@@ -13,7 +13,12 @@ class Film {
     this.now = 0;
     this.playing = false;
     this.available = 0; // Time up to which the run has been computed [s].
-    this.nodes = { play: byId("play"), restart: byId("restart"), scrub: byId("scrub"), speed: byId("speed") };
+    this.nodes = {
+      play: byId("play"),
+      restart: byId("restart"),
+      scrub: byId("scrub"),
+      speed: byId("speed"),
+    };
     this.listSpeeds();
     this.listen();
   }
@@ -25,7 +30,12 @@ class Film {
     const near = (x) => Math.abs(Math.log(x / best));
     this.slow = factors.reduce((a, b) => (near(b) < near(a) ? b : a));
     for (const factor of factors) {
-      const text = factor === 1 ? "real time" : factor > 1 ? `1/${digits(factor)}` : `${digits(1 / factor)}\u00d7`;
+      const text =
+        factor === 1
+          ? "real time"
+          : factor > 1
+            ? `1/${digits(factor)}`
+            : `${digits(1 / factor)}\u00d7`;
       const option = element("option", { value: factor }, text);
       option.selected = factor === this.slow;
       this.nodes.speed.append(option);
@@ -36,7 +46,9 @@ class Film {
     const { play, restart, scrub, speed } = this.nodes;
     play.addEventListener("click", () => this.toggle());
     restart.addEventListener("click", () => this.replay());
-    scrub.addEventListener("input", () => this.seek((Number(scrub.value) / Number(scrub.max)) * this.stopTime));
+    scrub.addEventListener("input", () =>
+      this.seek((Number(scrub.value) / Number(scrub.max)) * this.stopTime),
+    );
     speed.addEventListener("change", () => {
       this.slow = Number(speed.value);
     });

@@ -54,8 +54,18 @@ function quantityText(x, kind, count = 4) {
 
 // Return the prefix of SI that suits a largest value in SI units.
 function prefixed(largest, unit) {
-  const steps = [[1, ""], [1e3, "m"], [1e6, "µ"], [1e9, "n"], [1e12, "p"]];
-  const large = [[1e-9, "G"], [1e-6, "M"], [1e-3, "k"]];
+  const steps = [
+    [1, ""],
+    [1e3, "m"],
+    [1e6, "µ"],
+    [1e9, "n"],
+    [1e12, "p"],
+  ];
+  const large = [
+    [1e-9, "G"],
+    [1e-6, "M"],
+    [1e-3, "k"],
+  ];
   if (largest === 0) {
     return { factor: 1, shown: unit };
   }
@@ -79,7 +89,9 @@ function ticks(low, high, count) {
   const step = [1, 2, 5, 10].map((k) => k * power).find((k) => k >= rough * 0.999);
   const first = Math.ceil(low / step - 1e-9);
   const last = Math.floor(high / step + 1e-9);
-  return Array.from({ length: last - first + 1 }, (_, k) => Number(((first + k) * step).toPrecision(12)));
+  return Array.from({ length: last - first + 1 }, (_, k) =>
+    Number(((first + k) * step).toPrecision(12)),
+  );
 }
 
 // Return the largest number of the form 1, 2 or 5 times a power of ten below a limit.

@@ -17,7 +17,12 @@ const cross = ([a, b], [c, d]) => a * d - b * c;
 function unitVector(degrees) {
   const quarter = degrees / 90;
   if (Number.isInteger(quarter)) {
-    return [[1, 0], [0, 1], [-1, 0], [0, -1]][((quarter % 4) + 4) % 4];
+    return [
+      [1, 0],
+      [0, 1],
+      [-1, 0],
+      [0, -1],
+    ][((quarter % 4) + 4) % 4];
   }
   const angle = (degrees * Math.PI) / 180;
   return [Math.cos(angle), Math.sin(angle)];
@@ -78,10 +83,7 @@ function splinePart(z, k, count) {
   const slope = (u, v, w, before, after) => {
     const first = times(1 / before, minus(v, u));
     const second = times(1 / after, minus(w, v));
-    return plus(
-      times(after / (before + after), first),
-      times(before / (before + after), second),
-    );
+    return plus(times(after / (before + after), first), times(before / (before + after), second));
   };
   const start = times(q, slope(a, b, c, p, q));
   const end = times(q, slope(b, c, d, q, r));
@@ -144,7 +146,12 @@ function bodyOutline(reach, size) {
     }
   }
   const { along, x, y } = best;
-  return [[-x, -y], [x, -y], [x, y], [-x, y]].map((corner) => turned(corner, along));
+  return [
+    [-x, -y],
+    [x, -y],
+    [x, y],
+    [-x, y],
+  ].map((corner) => turned(corner, along));
 }
 
 // The drawn parts of a mechanism with given parameters, in any of its shapes.
@@ -191,7 +198,10 @@ class Shapes {
       }
     });
     const { centre } = this.drawn.get(body.name);
-    return bodyOutline(points.map((point) => minus(point, centre)), this.size);
+    return bodyOutline(
+      points.map((point) => minus(point, centre)),
+      this.size,
+    );
   }
 
   // The straight shape, in which each flexure is a line between its drawn ends.
@@ -230,7 +240,10 @@ class Shapes {
       return { curve: corners, corners };
     }
     if (!flexure.beam) {
-      return { curve: through ? splineCurve(corners) : chainCurve(corners, flexure.guided), corners };
+      return {
+        curve: through ? splineCurve(corners) : chainCurve(corners, flexure.guided),
+        corners,
+      };
     }
     const [start, end] = flexure.ends.map((place) => this.carried(place.body, place.point, poses));
     return { curve: splineCurve([start, ...corners, end]), corners: [] };

@@ -4,7 +4,7 @@ const MODES_MAX = 8; // Modes in the list.
 const MODE_AMPLITUDE = 0.1; // Largest displacement, as a share of the size of the mechanism.
 const SMALL_ANGLE = 1e-4; // rad; amplitude at which a mode is linear.
 const MODE_PERIOD = 1.6; // Seconds of the film of one period.
-const MOVING_MIN = 0.05; // Parts with a smaller share of the largest displacement are not named.
+const MOVING_RTOL = 0.05; // Parts with a smaller share of the largest displacement are not named.
 
 class ModeView {
   // Parameters: the parent element, the description of the page, and the function draw(shape).
@@ -45,13 +45,24 @@ class ModeView {
     const shown = this.found.modes.slice(0, MODES_MAX);
     this.buttons = shown.map(({ frequency }, k) => {
       const text =
-        frequency < 0 ? "unstable" : quantityText(frequency, prefixed(Math.max(frequency, 1), "Hz"), 4);
-      const button = element("button", { type: "button", "aria-pressed": "false" }, element("b", {}, `${k + 1}`), ` ${text}`);
+        frequency < 0
+          ? "unstable"
+          : quantityText(frequency, prefixed(Math.max(frequency, 1), "Hz"), 4);
+      const button = element(
+        "button",
+        { type: "button", "aria-pressed": "false" },
+        element("b", {}, `${k + 1}`),
+        ` ${text}`,
+      );
       button.addEventListener("click", () => this.choose(k));
       return button;
     });
     this.text = element("p", { class: "hint", "aria-live": "polite" });
-    const group = element("div", { class: "mode-list", role: "group", "aria-label": "Modes" }, ...this.buttons);
+    const group = element(
+      "div",
+      { class: "mode-list", role: "group", "aria-label": "Modes" },
+      ...this.buttons,
+    );
     this.parent.replaceChildren(group, this.text);
   }
 
@@ -62,9 +73,11 @@ class ModeView {
     const moves = this.parts().sort((a, b) => b[1] - a[1]);
     this.scale = (MODE_AMPLITUDE * this.shapes.size) / moves[0][1];
     const shares = moves
-      .filter(([, size]) => size > MOVING_MIN * moves[0][1])
+      .filter(([, size]) => size > MOVING_RTOL * moves[0][1])
       .map(([name, size]) => `${words(name)} ${digits((100 * size) / moves[0][1], 2)}\u202f%`);
-    const resting = moves.filter(([, size]) => size <= MOVING_MIN * moves[0][1]).map(([name]) => words(name));
+    const resting = moves
+      .filter(([, size]) => size <= MOVING_RTOL * moves[0][1])
+      .map(([name]) => words(name));
     this.text.textContent =
       `Mode ${k + 1} moves: ${shares.join(", ")}` +
       (resting.length ? `. Hardly moves: ${resting.join(", ")}.` : ".") +
@@ -86,7 +99,10 @@ class ModeView {
   }
 
   moved(amplitude) {
-    return this.shapes.shape(this.rest.map((x, i) => x + amplitude * this.slopes[i]), true);
+    return this.shapes.shape(
+      this.rest.map((x, i) => x + amplitude * this.slopes[i]),
+      true,
+    );
   }
 
   // Return the largest displacement of each body and flexure for a mode of amplitude 1.
@@ -117,7 +133,7 @@ class ModeView {
     if (!this.active || !this.found) {
       return;
     }
-    if (!still.matches) {
+    if (!reducedMotion.matches) {
       this.paint(Math.sin((2 * Math.PI * time) / 1000 / MODE_PERIOD));
       requestAnimationFrame((next) => this.frame(next));
     }

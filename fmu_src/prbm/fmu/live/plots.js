@@ -2,7 +2,7 @@
 
 const PLOT_HEIGHT = 170;
 const INSET = { left: 58, right: 12, top: 10, bottom: 24 };
-const FLAT = 1e-6; // Smaller values, as a share of the largest one, are shown as zero.
+const ZERO_RTOL = 1e-6; // Smaller values, as a share of the largest one, are shown as zero.
 const ROUND_OFF = { m: 1e-13, "m/s": 1e-12 }; // Motions below these limits are shown as zero.
 const POINTS_MAX = 2000; // Corners of a drawn curve.
 
@@ -14,18 +14,23 @@ function plotList(description, column) {
   const axis = vertical ? "y" : "x";
   const series = (name, label, extra = {}) => ({ label, column: column.get(name), ...extra });
   const moving = description.bodies.slice(0, 4).map((body) => body.name);
-  const bodies = (suffix) => moving.map((body) => series(`${body}.${suffix}`, `${words(body)} ${suffix}`));
+  const bodies = (suffix) =>
+    moving.map((body) => series(`${body}.${suffix}`, `${words(body)} ${suffix}`));
   const energies = ["kinetic", "elastic", "gravitational", "dissipated", "work"];
   const plots = [
     { title: "Displacement", unit: "m", series: bodies(axis), walls: axis },
     { title: "Velocity", unit: "m/s", series: bodies(`v${axis}`) },
     { title: "Energy", unit: "J", series: energies.map((name) => series(`energy.${name}`, name)) },
   ];
-  const forces = description.stops.slice(0, 4).map((stop) => series(`${stop.name}.force`, words(stop.name)));
+  const forces = description.stops
+    .slice(0, 4)
+    .map((stop) => series(`${stop.name}.force`, words(stop.name)));
   if (forces.length > 0) {
     plots.push({ title: "Contact force at rest", unit: "N", series: forces, quiet: true });
   }
-  const stresses = [...outputs.values()].filter((output) => output.unit === "Pa" && /\.stress$/.test(output.name));
+  const stresses = [...outputs.values()].filter(
+    (output) => output.unit === "Pa" && /\.stress$/.test(output.name),
+  );
   if (stresses.length > 0) {
     const shown = stresses.slice(0, 5).map((output) => series(output.name, words(output.name)));
     plots.push({ title: "Stress", unit: "Pa", series: shown });
@@ -79,7 +84,8 @@ class Plot {
   listen() {
     const time = (event) => {
       const box = this.canvas.getBoundingClientRect();
-      const share = (event.clientX - box.left - INSET.left) / (box.width - INSET.left - INSET.right);
+      const share =
+        (event.clientX - box.left - INSET.left) / (box.width - INSET.left - INSET.right);
       return Math.min(1, Math.max(0, share)) * this.stopTime;
     };
     this.canvas.addEventListener("pointerdown", (event) => {
@@ -124,9 +130,12 @@ class Plot {
       [low, high, largest] = [0, 0, 0];
     }
     ranges.forEach(([a, b], k) => {
-      this.keys[k].classList.toggle("flat", ranges.length > 1 && Math.max(b, -a) <= FLAT * largest);
+      this.keys[k].classList.toggle(
+        "flat",
+        ranges.length > 1 && Math.max(b, -a) <= ZERO_RTOL * largest,
+      );
     });
-    this.tiny = high === low ? Infinity : FLAT * largest;
+    this.tiny = high === low ? Infinity : ZERO_RTOL * largest;
     if (this.plot.walls) {
       low = Math.min(low, ...walls);
       high = Math.max(high, ...walls);

@@ -1,7 +1,7 @@
 // A simulation in short slices, so that the page answers while it is computed.
 
 const SLICE = 8; // Milliseconds of computation between two looks at the user's actions.
-const AT_ONCE = 10000; // Largest number of impacts that are kept for the table and the film.
+const IMPACTS_KEPT_MAX = 10000; // Largest number of impacts that are kept for the table and the film.
 
 // Call a function soon, after the browser has handled waiting events.
 const later = (() => {
@@ -51,7 +51,7 @@ class Run {
     try {
       const impacts = this.simulation.advance(this.count * this.step);
       this.impactCount += impacts.length;
-      if (this.impacts.length < AT_ONCE) {
+      if (this.impacts.length < IMPACTS_KEPT_MAX) {
         this.impacts.push(...impacts);
       }
       this.keep();
@@ -101,7 +101,8 @@ class Run {
       ends[1] = after;
     }
     const [a, b] = ends;
-    const share = b.time > a.time ? Math.min(1, Math.max(0, (time - a.time) / (b.time - a.time))) : 0;
+    const share =
+      b.time > a.time ? Math.min(1, Math.max(0, (time - a.time) / (b.time - a.time))) : 0;
     return Float64Array.from({ length: n }, (_, k) => a.q[k] + share * (b.q[k] - a.q[k]));
   }
 

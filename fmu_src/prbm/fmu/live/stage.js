@@ -1,6 +1,7 @@
 // The drawing of the mechanism as SVG: flexures, bodies, ground, and handles to drag.
 
 const MARGIN = 34; // Pixels around the motion.
+const FOOT = 16; // Further pixels below it, for the scale.
 const FLASH_TIME = 0.35; // Seconds of the film in which the mark of an impact fades.
 const HATCH_PITCH = 11; // Pixels between two strokes of a hatching.
 const HATCHES_MIN = 4; // Strokes of a hatching.
@@ -15,7 +16,17 @@ class Stage {
     this.description = description;
     this.actions = actions;
     this.layers = {};
-    for (const name of ["ground", "straight", "flexures", "bodies", "links", "walls", "marks", "handles", "scale"]) {
+    for (const name of [
+      "ground",
+      "straight",
+      "flexures",
+      "bodies",
+      "links",
+      "walls",
+      "marks",
+      "handles",
+      "scale",
+    ]) {
       this.layers[name] = drawn("g", { class: `layer-${name}` });
       svg.append(this.layers[name]);
     }
@@ -48,7 +59,9 @@ class Stage {
     this.ground = add("ground", "path", { class: "ground" });
     this.scale = add("scale", "path", { class: "scale" });
     this.scaleText = add("scale", "text", { class: "scale-text", "text-anchor": "middle" });
-    this.wallHandles = stops.map((stop) => this.handle(stop.quantity, `Wall of ${words(stop.name)}`, "wall-handle"));
+    this.wallHandles = stops.map((stop) =>
+      this.handle(stop.quantity, `Wall of ${words(stop.name)}`, "wall-handle"),
+    );
     const { release } = this.description;
     this.bodyHandle =
       release.quantity && release.start !== "angle"
@@ -79,7 +92,8 @@ class Stage {
       return;
     }
     event.preventDefault();
-    const step = ((quantity.slider.high - quantity.slider.low) / KEY_STEPS) * (event.shiftKey ? 5 : 1);
+    const step =
+      ((quantity.slider.high - quantity.slider.low) / KEY_STEPS) * (event.shiftKey ? 5 : 1);
     this.actions.drag(name, rounded(this.actions.value(name) + sign * step, step / 10), true);
   }
 
@@ -132,14 +146,24 @@ class Stage {
     const every = Math.max(1, Math.floor(run.count / BOUND_SHAPES));
     for (let row = 0; row < run.count; row += every) {
       const shape = shapes.at(run.node(row).q);
-      points.push(...shape.lines.flatMap((line) => [line.curve[0], line.curve[line.curve.length >> 1], line.curve.at(-1)]));
+      points.push(
+        ...shape.lines.flatMap((line) => [
+          line.curve[0],
+          line.curve[line.curve.length >> 1],
+          line.curve.at(-1),
+        ]),
+      );
       points.push(...this.bodies.flatMap((_, k) => shapes.body(k, shape.poses)));
     }
     const poses = shapes.drawn;
     this.description.stops.forEach((stop, k) => {
       const { point, into } = shapes.wall(k, this.actions.wall(k), poses);
       const half = times(shapes.wallLength(k) / 2, turned(into, [0, 1]));
-      points.push(plus(point, half), minus(point, half), plus(point, times(0.08 * shapes.size, into)));
+      points.push(
+        plus(point, half),
+        minus(point, half),
+        plus(point, times(0.08 * shapes.size, into)),
+      );
     });
     const sides = [0, 1].map((axis) => {
       const along = points.map((point) => point[axis]).filter(Number.isFinite);
@@ -162,13 +186,21 @@ class Stage {
     const width = this.svg.clientWidth;
     const [[left, right], [bottom, top]] = this.bounds;
     const aspect = (top - bottom) / (right - left);
-    const height = Math.round(Math.max(220, Math.min(0.62 * width + 60, 440, aspect * (width - 2 * MARGIN) + 2 * MARGIN)));
+    const height = Math.round(
+      Math.max(
+        220,
+        Math.min(0.62 * width + 60, 440, aspect * (width - 2 * MARGIN) + 2 * MARGIN + FOOT),
+      ),
+    );
     this.svg.setAttribute("height", height);
     this.svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
-    this.pixels = Math.min((width - 2 * MARGIN) / (right - left), (height - 2 * MARGIN) / (top - bottom));
+    this.pixels = Math.min(
+      (width - 2 * MARGIN) / (right - left),
+      (height - 2 * MARGIN - FOOT) / (top - bottom),
+    );
     this.origin = [
       width / 2 - (this.pixels * (left + right)) / 2,
-      height / 2 + (this.pixels * (bottom + top)) / 2,
+      (height - FOOT) / 2 + (this.pixels * (bottom + top)) / 2,
     ];
     this.drawFixed(shapes, width, height);
   }
@@ -178,7 +210,13 @@ class Stage {
   }
 
   path(points) {
-    return `M${points.map((point) => this.screen(point).map((x) => x.toFixed(2)).join(",")).join("L")}`;
+    return `M${points
+      .map((point) =>
+        this.screen(point)
+          .map((x) => x.toFixed(2))
+          .join(","),
+      )
+      .join("L")}`;
   }
 
   // -- parts --
@@ -287,7 +325,10 @@ class Stage {
     const value = this.actions.value(name);
     const quantity = this.actions.quantity(name);
     handle.along = along;
-    handle.setAttribute("transform", `translate(${x.toFixed(2)},${y.toFixed(2)}) rotate(${angle.toFixed(2)})`);
+    handle.setAttribute(
+      "transform",
+      `translate(${x.toFixed(2)},${y.toFixed(2)}) rotate(${angle.toFixed(2)})`,
+    );
     handle.setAttribute("aria-valuemin", digits(quantity.slider.low));
     handle.setAttribute("aria-valuemax", digits(quantity.slider.high));
     handle.setAttribute("aria-valuenow", digits(value));

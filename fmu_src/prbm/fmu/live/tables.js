@@ -28,7 +28,12 @@ function headline(description, run, column) {
     : "moving";
   return [
     ["Impacts", `${impactCount}`],
-    ["First impact", first ? `${timeText(first.time, first.time)} at ${quantityText(first.approach, speed, 4)}` : "none"],
+    [
+      "First impact",
+      first
+        ? `${timeText(first.time, first.time)} at ${quantityText(first.approach, speed, 4)}`
+        : "none",
+    ],
     ["Last impact", last ? timeText(last.time, last.time) : "none"],
     ["Lost in impacts", quantityText(lost, prefixed(lost, "J"), 3)],
     ["At the end", state],
@@ -37,7 +42,9 @@ function headline(description, run, column) {
 
 function showHeadline(parent, pairs) {
   parent.replaceChildren(
-    ...pairs.map(([term, text]) => element("div", {}, element("dt", {}, term), element("dd", {}, text))),
+    ...pairs.map(([term, text]) =>
+      element("div", {}, element("dt", {}, term), element("dd", {}, text)),
+    ),
   );
 }
 
@@ -60,7 +67,11 @@ function showImpacts(table, description, run, seek) {
   const body = rows.map((row, i) => {
     const cells = columns.map(([, unit, value], k) => {
       const x = value(row, i);
-      return element("td", {}, unit ? digits(x * units[k].factor, 5).replace("-", "\u2212") : String(x));
+      return element(
+        "td",
+        {},
+        unit ? digits(x * units[k].factor, 5).replace("-", "\u2212") : String(x),
+      );
     });
     const line = element("tr", { "data-time": row.time }, ...cells);
     line.addEventListener("click", () => seek(row.time));
