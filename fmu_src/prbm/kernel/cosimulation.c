@@ -185,8 +185,8 @@ static bool advance_some(Simulation *sim, double time, Stops stops, bool *event,
     return true;
 }
 
-/* Prepare a communication step to a time: keep a backup, unless nothing can fail because the time is
- * within the latest integration step, no event is due and nothing has been set. */
+/* Prepare a communication step to a time: keep a backup, unless nothing can fail because the time
+ * is within the latest integration step, no event is due and nothing has been set. */
 static void prepare_step(Simulation *sim, double time) {
     bool known = time <= sim->state.front_time && goes_on(sim) && !event_due(&sim->state, time);
     sim->present.fresh = NOTHING;

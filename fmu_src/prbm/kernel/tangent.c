@@ -213,7 +213,7 @@ static Complex inertial_change(const Tangent *t, int j) {
     return scaled(-1.0, times_i(change));
 }
 
-/* Compute the change of the loads on the arms: forces, moments, inertia, mass-proportional damping. */
+/* Compute the change of the loads on the arms: forces, moments, inertia, damping with the mass. */
 static void arm_load_change(const Tangent *t, const Complex *dw, const double *dmoment) {
     const Equations *q = t->q;
     for (int j = 0; j < q->system->d; j++) {

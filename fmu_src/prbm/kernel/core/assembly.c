@@ -150,8 +150,8 @@ static void add_frictions(System *system, const Complex *e0, Scratch *scratch) {
     scratch->used = mark;
 }
 
-/* Return the end of the block of a symmetric matrix (size, size) that begins at start.  linked marks
- * the elements that are not zero.  The columns from the end on share none with the block. */
+/* Return the end of the block of a symmetric matrix (size, size) that begins at start.  linked
+ * marks the elements that are not zero.  The columns from the end on share none with the block. */
 static int end_of_block(int size, const bool *linked, int start) {
     int end = start + 1;
     for (int j = start; j < end; j++) {

@@ -207,8 +207,8 @@ static void set_nodes(Beam *beam, const Section *sections, const double *x, cons
         for (int i = first; i < first + nodes; i++) {
             interpolation(nodes, x[i], lengths);
             for (int m = 0; m < N; m++) {
-                Complex own = m < first + nodes ? scaled(lengths[m < first ? 0 : m - first], steps[m])
-                                                : complex_of(0.0, 0.0);
+                double length = m < first || m >= first + nodes ? 0.0 : lengths[m - first];
+                Complex own = scaled(length, steps[m]);
                 beam->A[i * N + m] = m < first ? beam->whole[m] : own;
             }
         }

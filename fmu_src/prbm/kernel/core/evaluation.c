@@ -599,7 +599,8 @@ SHARED bool motion_of_length(int even, const Equations *q, const Reference *near
 }
 
 PRBM bool evaluate_equations(const Equations *equations, double t, const double *q,
-                             const double *v, const Reference *near, Evaluation *result, Problem *problem) {
+                             const double *v, const Reference *near, Evaluation *result,
+                             Problem *problem) {
     int n = equations->system->n;
     pad(n, q, result->at.angle);
     pad(n, v, result->at.speed);

@@ -184,7 +184,7 @@ static int end_angle(const Walk *walk, int type, int pin, int body) {
     return type == PIN ? pin : body == GROUND ? FIXED : walk->body[body];
 }
 
-/* Add a beam: pins, coefficients, strain, the body at its far end, and the directions of its nodes. */
+/* Add a beam: pins, coefficients, strain, the body at its far end, and the directions of nodes. */
 static void add_beam(const FlexureType *kind, const Flexure *flexure, Walk *walk, int reached) {
     int start_pin = flexure->type_at_start == PIN ? add_angle(walk) : FIXED;
     int end_pin = flexure->type_at_end == PIN ? add_angle(walk) : FIXED;

@@ -132,8 +132,8 @@ typedef struct {
     int first_direction;    /* The first direction that the part adds. */
 } Step;
 
-/* A coordinate: an angle or a strain of a flexure, or the angle of a body.  Two of the three numbers
- * are -1, -1 and 0. */
+/* A coordinate: an angle or a strain of a flexure, or the angle of a body.  Two of the three
+ * numbers are -1, -1 and 0. */
 typedef struct {
     int link;   /* Index among the angles of the flexures, or -1. */
     int strain; /* Index among the strains, or -1. */
@@ -171,7 +171,7 @@ typedef struct {
     const Step *steps;             /* Flexures and joints in the order of the assembly. */
     const Coordinate *coordinates; /* (coordinate_count,) */
     const int *links, *strains;    /* Coordinates that are angles and strains of flexures. */
-    const int *arms;               /* (direction_count,) the arm that a direction turns or stretches */
+    const int *arms;               /* (direction_count,) arm that a direction turns or stretches */
     const int *stretches;          /* Directions that are stretches. */
     DirectionMap map;
     const int *independent; /* Coordinates that are states of model exchange. */

@@ -84,7 +84,8 @@ static void place_scratch(Scratch *scratch, const Mechanism *m, Memory *memory) 
     }
     /* The number of unknowns of a complementarity problem of all contacts. */
     size_t forces = 4 * s + 3 * (size_t)m->friction_count, pivots_size = forces * (2 * forces + 2);
-    size_t single = size * size + 4 * size + 2 * drawn + 4 * pieces + 16 + pivots_size + m->beam_size;
+    size_t single =
+        size * size + 4 * size + 2 * drawn + 4 * pieces + 16 + pivots_size + m->beam_size;
     scratch->size = 12 * size * size + 60 * size + 2 * drawn + 16 * pieces + 64 + pivots_size +
                     forces * forces + 16 * forces + m->beam_size;
     scratch->base = place(memory, scratch->size, sizeof(double));
