@@ -43,7 +43,7 @@ enum {
     BEAM_ENTRIES = 10, /* of a symmetric matrix of the coordinates */
     BEAM_DIRECTIONS_MIN = 5,
     BEAM_DIRECTIONS_MAX = 7,
-    BEAM_CHANGES = 28 /* of the most directions with all coordinates */
+    BEAM_CHANGES = BEAM_DIRECTIONS_MAX * BEAM_COORDINATES
 };
 
 /* A block of the mass matrix of the directions, and its map from the coordinates. */
