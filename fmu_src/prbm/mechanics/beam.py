@@ -102,6 +102,17 @@ class Beam:
         return np.column_stack([1.0 - S[:, 0], S])
 
     @property
+    def moments(self) -> Real:
+        """Values of the polynomials of the bending moment at the nodes, (N, n + 1) [-]."""
+        result: Real = np.asarray(legvander(self._quadrature[0], self.order), float)
+        return result
+
+    @property
+    def places(self) -> Real:
+        """Arc lengths of the nodes from the start, (N,) [m]."""
+        return 0.5 * self.L * (1.0 + self._quadrature[0])
+
+    @property
     def masses(self) -> Real:
         """Masses of the nodes, (N,) [kg]."""
         return self._quadrature[1] * (self.mass / 2)

@@ -12,7 +12,8 @@ from ..mechanism.flexure import PIN, Segments, segments
 from ..mechanism.parts import LENGTH_MIN, Flexure, FlexureType, body_of, value
 from .arrays import Real
 from .beam import Beam
-from .collection import Collection
+from .collection import ROD_POINTS, Collection
+from .free_body import of_beam, of_links
 from .system import Place
 
 CURVE_POINTS = 33  # Points of a drawn beam.
@@ -73,13 +74,16 @@ def _add_links(parts: Collection, flexure: Flexure, pieces: Segments) -> None:
     ]
     known = far in parts.origin
     owners = [owner, *links, parts.index[far] if known else parts.turn(far)]
+    first, points = len(parts.masses), _Points(pieces)
     for i, (length, j) in enumerate(zip(pieces.lengths[:-1], owners[:-1], strict=True)):
         # In the drawing the angle of a body is 0, that of a link its direction.
         vector = length * (1.0 if j in links else direction)
         parts.rod(pieces.rods[i], place, j, vector)
+        points.rod(i, len(parts.masses) - first)
         place = place.plus(j, vector)
         corners.append(place)
         parts.mass(place, pieces.lumps[i])
+        points.lump(i, len(parts.masses) - first)
         parts.spring(pieces.rates[i], parts.angle(owners[i]), parts.angle(owners[i + 1]))
     last = pieces.lengths[-1] * direction
     if known:
@@ -89,8 +93,35 @@ def _add_links(parts: Collection, flexure: Flexure, pieces: Segments) -> None:
     else:
         parts.reach(far, place, z_end - last, owners[-1])
     parts.rod(pieces.rods[-1], place, owners[-1], last)
+    points.rod(len(links) + 1, len(parts.masses) - first)
+    angles, ends = [parts.angle(j) for j in owners], (owners[0], owners[-1])
+    masses, forwards = slice(first, len(parts.masses)), start == flexure.start
+    free = of_links(flexure.name, forwards, pieces, direction, ends, angles, masses, points.found)
+    parts.connect(root, far, known, free)
     corners.append(parts.on(far, z_end))
     parts.lines.append((flexure.name, "flexure", corners))
+
+
+class _Points:
+    """The mass points of a flexure of links, as :func:`prbm.mechanics.free_body.of_links` needs."""
+
+    def __init__(self, pieces: Segments) -> None:
+        self.pieces = pieces
+        self.found: list[tuple[int, float, float]] = []
+
+    def rod(self, i: int, count: int) -> None:
+        """Add the points of segment i if there are then as many as the given number."""
+        first, last = self.pieces.lengths[0], self.pieces.lengths[-1]
+        for fraction in ROD_POINTS:
+            near = first * (fraction if i == 0 else 1.0)
+            far = last * (fraction if i == len(self.pieces.lengths) - 1 else 0.0)
+            if len(self.found) < count:
+                self.found.append((2 * i, near, far))
+
+    def lump(self, i: int, count: int) -> None:
+        """Add the point at pivot i if there are then as many as the given number."""
+        if len(self.found) < count:
+            self.found.append((2 * i + 1, self.pieces.lengths[0], 0.0))
 
 
 def _add_link(parts: Collection, direction: complex, length: float, axial: float) -> int:
@@ -134,7 +165,7 @@ def _add_beam(parts: Collection, flexure: Flexure, beam: Beam, axial: bool) -> N
     ]
     arms = [_add_node(parts, [*ends, *bends], turns, strain) for turns in beam.turns]
     reached = None if turned is None else parts.direction({turned: 1.0})
-    _place_beam(parts, flexure, beam, arms, reached)
+    _place_beam(parts, flexure, beam, arms, reached, (ends, bends))
     rates = beam.rates.tolist()
     parts.spring(rates[0], *ends)
     for j, rate in zip(bends, rates[1:], strict=True):
@@ -155,7 +186,12 @@ def _add_node(
 
 
 def _place_beam(
-    parts: Collection, flexure: Flexure, beam: Beam, arms: list[int], turned: int | None
+    parts: Collection,
+    flexure: Flexure,
+    beam: Beam,
+    arms: list[int],
+    turned: int | None,
+    coordinates: tuple[list[int | None], list[int]],
 ) -> None:
     """Place the masses and the far end of a beam.
 
@@ -171,6 +207,8 @@ def _place_beam(
         Directions of the nodes.
     turned : int or None
         Direction of the body that the beam reaches; None: both bodies have been reached before.
+    coordinates : pair of lists
+        Coordinates of the rotations of its ends (None: the ground), and of its coefficients.
     """
     z_start, z_end = parts.end(flexure, flexure.start), parts.end(flexure, flexure.end)
     direction = (z_end - z_start) / abs(z_end - z_start)
@@ -186,6 +224,7 @@ def _place_beam(
             place = place.plus(arm, float(length) * direction)
         return place
 
+    masses = slice(len(parts.masses), len(parts.masses) + beam.nodes)
     for mass, lengths in zip(beam.masses, beam.node_positions, strict=True):
         parts.mass(at(lengths), float(mass))
     tip = at(whole if forwards else 0.0 * whole)
@@ -193,6 +232,8 @@ def _place_beam(
         parts.close(flexure.name, tip, parts.on(body_of(far), z_far))
     else:
         parts.reach(body_of(far), tip, z_far, turned)
+    free = of_beam(flexure.name, forwards, beam, direction, coordinates, arms, masses)
+    parts.connect(body_of(near), body_of(far), turned is None, free)
     curve = beam.positions(np.linspace(-1.0, 1.0, CURVE_POINTS))
     parts.lines.append((flexure.name, "flexure", [at(lengths) for lengths in curve]))
 
