@@ -239,7 +239,7 @@ CHANGES = {
     ),
     "key of another part": (
         "n = 8",
-        "stroke = 8",
+        "travel = 8",
         "allowed keys are name, model, n, order, nodes, thickness, width",
     ),
     "missing key": ("inertia = 1e-6\n", "", "bodies.1.inertia (of anvil) is missing: add the key"),

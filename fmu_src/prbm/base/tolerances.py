@@ -138,3 +138,7 @@ DEPENDENT_PIVOT_RTOL = 1e-7  # Of the largest pivot: smaller pivots make the sta
 # --- beams ---
 
 GAUSS_ITERATIONS_MAX = 8  # The nodes of Gauss' quadrature need four iterations of Newton's method.
+
+# --- stress ---
+
+STRESS_TIE_RTOL = 1e-9  # Stresses of two sections that differ less are equal apart from round-off.

@@ -220,12 +220,18 @@ class Section(Named):
     youngs_modulus: Annotated[Quantity, measured(parts.FlexureType, "youngs_modulus")] | None = None
     density: Annotated[Quantity, measured(parts.FlexureType, "density")] | None = None
     axial: StrictBool = Field(False, description="Whether the flexures can stretch")
+    stress: StrictBool = Field(
+        False, description="Whether the stress of the flexures, and its peak, are outputs"
+    )
     coefficients: dict[StrictStr, Annotated[Quantity, Measured("Coefficient", "")]] = Field(
         {}, description="Values that replace the published coefficients of the model"
     )
 
 
-_OWN = ("model", "n", "order", "nodes", *SECTION, "material", *MATERIAL, "axial", "coefficients")
+_OWN = (
+    "model", "n", "order", "nodes", *SECTION, "material", *MATERIAL, "axial", "stress",
+    "coefficients",
+)  # fmt: skip
 _NO_MATERIAL_TWICE: list[Any] = [{"not": {"required": ["material", key]}} for key in MATERIAL]
 _MADE_OF: Any = {"anyOf": [{"required": ["material"]}, {"required": [*MATERIAL]}]}
 _OF_A_TYPE: Any = {"required": ["type"]}
@@ -473,7 +479,7 @@ def _type(table: Section, materials: Mapping[str, dict[str, Quantity]]) -> parts
             raise MechanismError(
                 f"{table.name}.{key} is missing: add the key, or the type of the flexure"
             )
-    keys = ("name", "model", "order", "nodes", *SECTION, "axial", "coefficients")
+    keys = ("name", "model", "order", "nodes", *SECTION, "axial", "stress", "coefficients")
     given: dict[str, Any] = {key: getattr(table, key) for key in keys}
     return parts.FlexureType(**given | _material(table, materials), n=table.n or 0)
 

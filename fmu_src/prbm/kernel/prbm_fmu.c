@@ -20,6 +20,7 @@
 #include "core/constraints.c"
 #include "core/collection.c"
 #include "core/beam.c"
+#include "core/free_body.c"
 #include "core/flexures.c"
 #include "core/block_map.c"
 #include "core/assembly.c"
@@ -34,6 +35,7 @@
 #include "core/equations.c"
 #include "core/evaluation.c"
 #include "core/dynamics.c"
+#include "core/sections.c"
 #include "core/projection.c"
 #include "core/runge_kutta.c"
 #include "hybrid/configuration.c"
@@ -45,6 +47,7 @@
 #include "hybrid/rest.c"
 #include "hybrid/contact_modes.c"
 #include "hybrid/stability.c"
+#include "hybrid/peaks.c"
 #include "hybrid/stepping.c"
 #include "hybrid/simulation.c"
 #include "hybrid/snapshot.c"
@@ -57,6 +60,7 @@
 #include "values.c"
 #include "tangent.c"
 #include "tangent_indicators.c"
+#include "tangent_stress.c"
 #ifdef PRBM_ENGINE
 #include "engine.c"
 #else

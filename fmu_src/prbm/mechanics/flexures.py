@@ -29,7 +29,7 @@ def add_flexure(parts: Collection, flexure: Flexure) -> None:
     ParameterError
         If the flexure has no length, or its links are longer than the flexure.
     """
-    kind = next(k for k in parts.mechanism.flexure_types if k.name == flexure.type)
+    kind = _type_of(parts, flexure)
     if parts.length(flexure) < LENGTH_MIN:
         raise ParameterError(
             f"flexure {flexure.name} from {flexure.start} to {flexure.end} has the length "
@@ -39,6 +39,11 @@ def add_flexure(parts: Collection, flexure: Flexure) -> None:
         _add_beam(parts, flexure, _beam(parts, flexure, kind), kind.axial)
     else:
         _add_links(parts, flexure, _segments(parts, flexure, kind))
+
+
+def _type_of(parts: Collection, flexure: Flexure) -> FlexureType:
+    """Return the type of a flexure."""
+    return next(k for k in parts.mechanism.flexure_types if k.name == flexure.type)
 
 
 def _segments(parts: Collection, flexure: Flexure, kind: FlexureType) -> Segments:
@@ -55,6 +60,12 @@ def _section(parts: Collection, kind: FlexureType) -> tuple[float, float, float]
     fields = ("thickness", "width", "youngs_modulus", "density")
     h, b, E, rho = (value(kind, name, parts.values) for name in fields)
     return E * b * h**3 / 12, E * b * h, rho * b * h
+
+
+def _strength(parts: Collection, kind: FlexureType) -> tuple[float, float]:
+    """Return area [m^2] and section modulus [m^3]."""
+    h, b = (value(kind, name, parts.values) for name in ("thickness", "width"))
+    return b * h, b * h**2 / 6
 
 
 def _add_links(parts: Collection, flexure: Flexure, pieces: Segments) -> None:
@@ -94,9 +105,12 @@ def _add_links(parts: Collection, flexure: Flexure, pieces: Segments) -> None:
         parts.reach(far, place, z_end - last, owners[-1])
     parts.rod(pieces.rods[-1], place, owners[-1], last)
     points.rod(len(links) + 1, len(parts.masses) - first)
-    angles, ends = [parts.angle(j) for j in owners], (owners[0], owners[-1])
+    angles, kind = [parts.angle(j) for j in owners], _type_of(parts, flexure)
     masses, forwards = slice(first, len(parts.masses)), start == flexure.start
-    free = of_links(flexure.name, forwards, pieces, direction, ends, angles, masses, points.found)
+    free = of_links(
+        flexure.name, forwards, pieces, direction, _strength(parts, kind), owners, angles, masses,
+        points.found,
+    )  # fmt: skip
     parts.connect(root, far, known, free)
     corners.append(parts.on(far, z_end))
     parts.lines.append((flexure.name, "flexure", corners))
@@ -232,7 +246,8 @@ def _place_beam(
         parts.close(flexure.name, tip, parts.on(body_of(far), z_far))
     else:
         parts.reach(body_of(far), tip, z_far, turned)
-    free = of_beam(flexure.name, forwards, beam, direction, coordinates, arms, masses)
+    section = _strength(parts, _type_of(parts, flexure))
+    free = of_beam(flexure.name, forwards, beam, direction, section, coordinates, arms, masses)
     parts.connect(body_of(near), body_of(far), turned is None, free)
     curve = beam.positions(np.linspace(-1.0, 1.0, CURVE_POINTS))
     parts.lines.append((flexure.name, "flexure", [at(lengths) for lengths in curve]))

@@ -33,6 +33,8 @@ class SectionLoads(NamedTuple):
     bending : (m,)
         Bending moment in each section, positive if the flexure turns counter-clockwise from its
         start to its end [N m].
+    area, modulus : (m,)
+        Area [m^2] and section modulus [m^3] of each section.
     """
 
     name: str
@@ -41,6 +43,8 @@ class SectionLoads(NamedTuple):
     position: Real
     tension: Real
     bending: Real
+    area: Real
+    modulus: Real
 
 
 @dataclass(frozen=True)
@@ -78,10 +82,15 @@ class FreeBody:
         flexure turns counter-clockwise from its start to its end.
     position : (m,)
         Positions of the sections, measured from the start of the flexure [m].
-    turns : (m, c)
-        Rotations of the sections with the coordinates [-].
-    direction : complex
-        Direction of the flexure as drawn, from the near end to the far end.
+    tangents : (m, 2) int
+        Two arms whose mean is the tangent of a section: directions, counted from the end -1 for
+        the ground, before it the arms that turn with the coordinates ``turned``.
+    drawn : (m, 2) complex
+        Directions of the flexure at these arms as drawn, from the near end to the far end.
+    turned : (2,) int
+        Coordinates of the rotations of the ends, if they are used in the tangents; else empty.
+    area, modulus : (m,)
+        Area [m^2] and section modulus [m^3] of the sections.
     beyond : (m, p)
         Share of each mass point that lies beyond a section, seen from the near end [-].
     """
@@ -97,8 +106,11 @@ class FreeBody:
     end_rates: Real
     bends: Real
     position: Real
-    turns: Real
-    direction: complex
+    tangents: Whole
+    drawn: Complex
+    turned: Whole
+    area: Real
+    modulus: Real
     beyond: Real
 
     def section_loads(
@@ -124,15 +136,17 @@ class FreeBody:
         near_moment, far_moment = (self.end_rates @ strain - work).tolist()
         near = -far - complex(loads.sum())
         through = far + self.beyond @ loads
-        tangents = self.direction * np.exp(1j * (self.turns @ deflection[self.coordinates]))
-        tension = (through.conj() * tangents).real
+        every = np.concatenate([e, np.exp(1j * deflection[self.turned]), [1.0]])
+        mean = (every[self.tangents] * self.drawn).sum(axis=1)
+        tension = (through.conj() * mean).real / np.abs(mean)
         forces, moments, order = (near, far), (near_moment, far_moment), slice(None)
         if not self.forwards:
             forces, moments, order = (far, near), (far_moment, near_moment), slice(None, None, -1)
         bending = np.concatenate([[-moments[0]], (self.bends @ strain)[order], [moments[1]]])
         return SectionLoads(
-            self.name, forces, moments, self.position[order], tension[order], bending
-        )
+            self.name, forces, moments, self.position[order], tension[order], bending,
+            self.area[order], self.modulus[order],
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -184,7 +198,8 @@ def of_links(
     forwards: bool,
     pieces: Segments,
     direction: complex,
-    ends: tuple[int | None, int | None],
+    section: tuple[float, float],
+    owners: Sequence[int | None],
     angles: Sequence[int | None],
     masses: slice,
     points: Sequence[tuple[int, float, float]],
@@ -199,10 +214,10 @@ def of_links(
         Segments, from the near end to the far end.
     direction : complex
         Direction as drawn, from the near end to the far end.
-    ends : pair of int or None
-        Directions of the bodies at the near end and the far end; None: the ground.
-    angles : (n + 2,) sequence of int or None
-        Coordinates of the segments, stubs included; None: the ground.
+    section : pair of float
+        Area [m^2] and section modulus [m^3].
+    owners, angles : (n + 2,) sequences of int or None
+        Directions and coordinates of the segments, stubs included; None: the ground.
     points : sequence of (int, float, float)
         For each mass point: twice the number of its segment, or of its pivot plus 1; its distance
         from the start of the near stub, and of the far stub [m].
@@ -211,9 +226,12 @@ def of_links(
     known = list(dict.fromkeys(j for j in angles if j is not None))
     sign = 1.0 if forwards else -1.0
     torques = [[(angles[i], -rates[i]), (angles[i + 1], rates[i])] for i in range(n + 1)]
-    turned = [[(a, 0.5), (b, 0.5)] for a, b in pairwise(angles)]
     # The section at a pin turns with the link there.
-    near, far = angles[0 if rates[0] else 1], angles[-1 if rates[-1] else -2]
+    at_ends = (0 if rates[0] else 1, n + 1 if rates[-1] else n)
+    pairs = [(at_ends[0],) * 2, *pairwise(range(n + 2)), (at_ends[1],) * 2]
+    arms = [-1 if j is None else j for j in owners]
+    # In the drawing the angle of a body is 0, that of a link its direction.
+    drawn = [direction, *[1.0 + 0.0j] * n, direction]
     place = np.concatenate([[0.0], np.cumsum(pieces.lengths)[:-1], [sum(pieces.lengths)]])
     ranks = np.array([point[0] for point in points], float)
     levers = np.array([*(point[1:] for point in points), (pieces.lengths[0], pieces.lengths[-1])])
@@ -222,15 +240,18 @@ def of_links(
         forwards=forwards,
         masses=masses,
         stub=sum(point[0] == 2 * (n + 1) for point in points),
-        arms=np.array([-1 if j is None else j for j in ends]),
+        arms=np.array([arms[0], arms[-1]]),
         levers=levers.reshape(-1, 2) * direction,
         turning=np.eye(2),
         coordinates=np.array(known, int),
         end_rates=np.vstack([-rows(known, torques[0]), rows(known, torques[-1])]),
         bends=sign * rows(known, *torques),
         position=place if forwards else place[-1] - place,
-        turns=rows(known, [(near, 1.0)], *turned, [(far, 1.0)]),
-        direction=direction,
+        tangents=np.array([[arms[i] for i in pair] for pair in pairs]),
+        drawn=np.array([[drawn[i] for i in pair] for pair in pairs]),
+        turned=np.zeros(0, int),
+        area=np.full(n + 3, section[0]),
+        modulus=np.full(n + 3, section[1]),
         beyond=shares_beyond(
             ranks, np.array([-1.0, *(2.0 * i + 1.0 for i in range(n + 1)), np.inf])
         ),
@@ -242,6 +263,7 @@ def of_beam(
     forwards: bool,
     beam: Beam,
     direction: complex,
+    section: tuple[float, float],
     coordinates: tuple[Sequence[int | None], Sequence[int]],
     arms: Sequence[int],
     masses: slice,
@@ -256,6 +278,8 @@ def of_beam(
         The beam.
     direction : complex
         Direction as drawn, from the start to the end.
+    section : pair of float
+        Area [m^2] and section modulus [m^3].
     coordinates : pair of sequences
         Coordinates of the rotations of start and end (None: the ground), and of the coefficients.
     arms : (N,) sequence of int
@@ -267,10 +291,6 @@ def of_beam(
     whole, nodes = beam.positions(np.array([1.0])), beam.nodes
     levers: Real = np.vstack([beam.node_positions, whole if forwards else 0.0 * whole])
     rate = float(beam.rates[0])
-    turning = [
-        [(j, float(turn)) for j, turn in zip((start, end, *bends), row, strict=True)]
-        for row in beam.turns
-    ]
     bending = [
         [
             (start, -rate),
@@ -280,7 +300,10 @@ def of_beam(
         for row in beam.moments[:, 1:]
     ]
     twist = rows(known, [(start, -rate), (end, rate)])
-    section = rows(known, [(start, 1.0)], *turning, [(end, 1.0)])
+    turned = [j for j in (start, end) if j is not None]
+    last = -1 - len(turned)
+    at_ends = [-1 if j is None else last + turned.index(j) for j in (start, end)]
+    tangents = np.array([[j, j] for j in (at_ends[0], *arms, at_ends[1])])
     ranks = np.arange(float(nodes))[order]
     if not forwards:
         levers -= whole
@@ -296,7 +319,10 @@ def of_beam(
         end_rates=np.vstack([-twist, twist])[order],
         bends=rows(known, *bending)[order],
         position=np.concatenate([[0.0], beam.places, [beam.L]])[order],
-        turns=section[order],
-        direction=direction if forwards else -direction,
+        tangents=tangents[order],
+        drawn=np.full((nodes + 2, 2), 0.5 * direction if forwards else -0.5 * direction),
+        turned=np.array(turned, int),
+        area=np.full(nodes + 2, section[0]),
+        modulus=np.full(nodes + 2, section[1]),
         beyond=shares_beyond(ranks, np.array([-1.0, *range(nodes), np.inf])),
     )

@@ -64,6 +64,8 @@ class FlexureType:
         Number of nodes of a beam; None: its order + 3.
     axial : bool
         Whether the flexures can stretch.
+    stress : bool
+        Whether the stress of the flexures, and its peak, are outputs.
     """
 
     name: str
@@ -77,6 +79,7 @@ class FlexureType:
     order: int | None = None
     nodes: int | None = None
     axial: bool = False
+    stress: bool = False
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,7 @@ PRBM void integrals(int order, double x, double *S) {
 PRBM Beam take_beam(int order, int nodes, Scratch *scratch) {
     size_t n = (size_t)order + 1, N = (size_t)nodes;
     Beam beam = {order, nodes, take(scratch, N * n), take(scratch, N * N), take(scratch, N),
-                 take(scratch, N), take(scratch, n)};
+                 take(scratch, N), take(scratch, N), take(scratch, N * n), take(scratch, n)};
     return beam;
 }
 
@@ -76,6 +76,8 @@ PRBM void set_beam(Beam *beam, double L, double EI, double mass, Scratch *scratc
         integrals(beam->order, nodes[i], beam->S + i * (beam->order + 1));
         set_positions(beam, L, nodes[i], nodes, weights, beam->A + i * N);
         beam->masses[i] = weights[i] * (mass / 2);
+        beam->places[i] = 0.5 * L * (1.0 + nodes[i]);
+        legendre(beam->order, nodes[i], beam->moments + i * (beam->order + 1));
     }
     set_positions(beam, L, 1.0, nodes, weights, beam->whole);
     for (int k = 0; k <= beam->order; k++) {

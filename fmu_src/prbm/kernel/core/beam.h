@@ -11,6 +11,8 @@ typedef struct {
     double *A;      /* (N, N) integrals of the interpolated directions up to the nodes [m] */
     double *whole;  /* (N,) those up to the end [m] */
     double *masses; /* (N,) [kg] */
+    double *places; /* (N,) arc lengths of the nodes [m] */
+    double *moments; /* (N, order + 1) the polynomials of the bending moment at the nodes */
     double *rates;  /* (order + 1,) rotation between the ends, and coefficients [N m/rad] */
 } Beam;
 

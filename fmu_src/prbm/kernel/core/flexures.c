@@ -5,6 +5,7 @@
 #include "core/beam.h"
 #include "core/flexure.h"
 #include "core/flexures.h"
+#include "core/free_body.h"
 #include "core/matrix.h"
 
 static double length_of(const System *system, const Flexure *flexure) {
@@ -87,6 +88,7 @@ static bool walk_links(System *system, const Step *step, Scratch *scratch, Probl
     Place spot = new_place(system, scratch), spare = new_place(system, scratch);
     on_body(system, span.root, span.z_start, &spot);
     int *owners = take_integers(scratch, pieces.n + 2), next = step->first_direction;
+    FreeBody *free_body = begin_free_body(system, step);
     owners[0] = system->origins[span.root].j;
     for (int i = 1; i <= pieces.n; i++) {
         owners[i] = next;
@@ -99,8 +101,10 @@ static bool walk_links(System *system, const Step *step, Scratch *scratch, Probl
         Complex vector = i == 0 ? scaled(pieces.lengths[i], direction)
                                 : complex_of(pieces.lengths[i], 0.0);
         add_rod(system, pieces.rods[i], &spot, owners[i], vector, &spare);
+        rank_points(free_body, system, 2 * i);
         extend(&spot, owners[i], vector);
         add_mass(system, &spot, pieces.lumps[i]);
+        rank_points(free_body, system, 2 * i + 1);
         add_spring(system, pieces.rates[i], coordinate_of(system, owners[i]),
                    coordinate_of(system, owners[i + 1]));
     }
@@ -113,6 +117,8 @@ static bool walk_links(System *system, const Step *step, Scratch *scratch, Probl
         reach(system, span.far, &spot, minus(span.z_end, last), last_one);
     }
     add_rod(system, pieces.rods[pieces.n + 1], &spot, last_one, last, &spare);
+    rank_points(free_body, system, 2 * (pieces.n + 1));
+    keep_links(system, step, &pieces, direction, owners);
     return true;
 }
 
@@ -177,8 +183,9 @@ static void beam_place(const System *system, const Step *step, const Beam *beam,
     }
 }
 
-static void place_beam(System *system, const Step *step, const Beam *beam, bool axial,
-                       Scratch *scratch) {
+/* Place the masses and the far end of a beam; return its direction as drawn. */
+static Complex place_beam(System *system, const Step *step, const Beam *beam, bool axial,
+                          Scratch *scratch) {
     Place root = new_place(system, scratch), spot = new_place(system, scratch);
     Span span = span_of(system, step);
     int stride = axial ? 2 : 1, nodes = beam->nodes;
@@ -199,6 +206,7 @@ static void place_beam(System *system, const Step *step, const Beam *beam, bool 
     } else {
         reach(system, span.far, &spot, span.z_end, step->first_direction + nodes * stride);
     }
+    return direction;
 }
 
 static void walk_beam(System *system, const Step *step, Scratch *scratch) {
@@ -210,7 +218,11 @@ static void walk_beam(System *system, const Step *step, Scratch *scratch) {
     set_beam(&beam, L, section.EI, section.mass * L, scratch);
     BeamCoordinates at = beam_coordinates(system, step);
     turn_nodes(system, step, &beam, &at, kind->axial);
-    place_beam(system, step, &beam, kind->axial, scratch);
+    FreeBody *free_body = begin_free_body(system, step);
+    Complex direction = place_beam(system, step, &beam, kind->axial, scratch);
+    const int ends[2] = {at.start, at.end};
+    rank_points(free_body, system, 0);
+    keep_beam(system, step, &beam, direction, ends, at.first);
     add_spring(system, beam.rates[0], at.start, at.end);
     for (int k = 0; k < kind->order; k++) {
         add_spring(system, beam.rates[k + 1], FIXED, at.first + k);
