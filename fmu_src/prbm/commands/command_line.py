@@ -125,6 +125,7 @@ def parser() -> argparse.ArgumentParser:
     _modes(commands)
     _equilibrium(commands)
     _simulate(commands)
+    _stress(commands)
     _fit(commands)
     _impact_map(commands)
     _sweep(commands)
@@ -239,6 +240,24 @@ def _simulate(commands: Commands) -> None:
         "--spectrum-time", default="0.2", metavar="T",
         help="duration of the vibration after the first impact [s] (default: %(default)s)",
     )  # fmt: skip
+    engine_argument(parser)
+    _out(parser)
+
+
+def _stress(commands: Commands) -> None:
+    parser = _command(
+        commands, "stress", "stress:print_stress",
+        "largest stress, safety factor and fatigue of the flexures, in motion or held",
+        _examples("prbm stress PRBDM2R", "prbm stress PRBDM2R --held 5 10 mm"),
+    )  # fmt: skip
+    _mechanism(parser)
+    parser.add_argument(
+        "--held", nargs="+", metavar="X",
+        help="displacements [m] or angles [rad] at which the body is held (default: in motion)",
+    )  # fmt: skip
+    stop_time_argument(parser)
+    set_argument(parser, "value of a parameter or input")
+    input_argument(parser)
     engine_argument(parser)
     _out(parser)
 

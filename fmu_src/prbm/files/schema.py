@@ -41,6 +41,9 @@ from .units import check_coherent, number, quantity, si_unit
 NAME_LENGTH_MAX = 100  # Characters; names become parts of file names.
 MATERIAL = ("youngs_modulus", "density")
 SECTION = ("thickness", "width")
+STRENGTHS = ("yield_strength", "tensile_strength", "fatigue_strength", "fatigue_cycles")
+CYCLES: Any = {"minimum": 1e4, "maximum": 1e12}  # Range of the cycles of a fatigue strength.
+KNEE_SHARE = 0.9  # Of the tensile strength; the fatigue strength is less.
 TEXT, LIST = TAGS = ("<text>", "<list>")  # Tags of the two forms of a point, or of the ends.
 IDENTIFIER = "^[A-Za-z_][A-Za-z0-9_]*$"
 
@@ -103,6 +106,29 @@ class InUnit:
 
     def __get_pydantic_json_schema__(self, _: CoreSchema, __: GetJsonSchemaHandler) -> Any:
         return {"anyOf": [{"type": "number"}, {"type": "string", "pattern": r"\d"}]}
+
+
+@dataclass(frozen=True)
+class Strength(Measured):
+    """Type of a strength, which is a number with a unit: a plain number is ambiguous."""
+
+    unit: str = "Pa"
+    minimum: float = 1.0
+    maximum: float = 1e12
+    expression: bool = False
+
+    def read(self, written: object) -> Quantity:
+        """Return the strength [Pa]."""
+        if not isinstance(written, str):
+            raise ValueError('write the strength with its unit, for example "1500 MPa"')
+        strength = super().read(written)
+        assert isinstance(strength, float)
+        if not self.minimum <= strength <= self.maximum:
+            raise ValueError(f"must be between {self.minimum:g} and {self.maximum:g} {self.unit}")
+        return strength
+
+    def __get_pydantic_json_schema__(self, _: CoreSchema, __: GetJsonSchemaHandler) -> Any:
+        return {"description": f"{self.description} [Pa]", "type": "string", "pattern": r"\d"}
 
 
 def measured(part: type, key: str) -> Measured:
@@ -193,6 +219,37 @@ class MaterialTable(Named):
 
     youngs_modulus: Annotated[Quantity, measured(parts.FlexureType, "youngs_modulus")]
     density: Annotated[Quantity, measured(parts.FlexureType, "density")]
+    yield_strength: Annotated[float, Strength("Yield strength, with a unit")] | None = None
+    tensile_strength: Annotated[float, Strength("Tensile strength, with a unit")] | None = None
+    fatigue_strength: (
+        Annotated[
+            float,
+            Strength(
+                "Amplitude of a fully reversed stress that the material survives for "
+                "fatigue_cycles, with a unit"
+            ),
+        ]
+        | None
+    ) = None
+    fatigue_cycles: Annotated[float, Field(json_schema_extra=CYCLES)] | None = Field(
+        None, description="Number of cycles of fatigue_strength"
+    )
+
+    @model_validator(mode="after")
+    def _complete(self) -> "MaterialTable":
+        if (self.fatigue_strength is None) != (self.fatigue_cycles is None):
+            raise ValueError("give fatigue_strength and fatigue_cycles, or none of them")
+        if self.fatigue_strength is None:
+            return self
+        if not CYCLES["minimum"] <= (self.fatigue_cycles or 0.0) <= CYCLES["maximum"]:
+            raise ValueError("fatigue_cycles must be between 10000 and 1e12")
+        if self.tensile_strength is None:
+            raise ValueError("fatigue_strength needs tensile_strength: add it")
+        if self.fatigue_strength >= KNEE_SHARE * self.tensile_strength:
+            raise ValueError(
+                f"fatigue_strength must be less than {KNEE_SHARE:g} of tensile_strength"
+            )
+        return self
 
 
 class Section(Named):
@@ -445,9 +502,13 @@ def _parameters(file: MechanismTable) -> Iterator[parameters.Parameter]:
                 yield parameters.Parameter(name, given, unit, about, least, most, nominal)
 
 
-def _materials(file: MechanismTable) -> dict[str, dict[str, Quantity]]:
-    """Return Young's modulus and density of each material, as a flexure type refers to them."""
-    return {m.name: {key: _referred(m, key) for key in MATERIAL} for m in file.materials}
+def _materials(file: MechanismTable) -> dict[str, dict[str, Any]]:
+    """Return Young's modulus, density and strengths of each material, as types refer to them."""
+    return {
+        m.name: {key: _referred(m, key) for key in MATERIAL}
+        | {key: getattr(m, key) for key in STRENGTHS}
+        for m in file.materials
+    }
 
 
 def _check_names(file: MechanismTable) -> None:
@@ -472,7 +533,7 @@ def _referred(material: MaterialTable, key: str) -> Quantity:
     return given if isinstance(given, str) else f"{material.name}.{key}"
 
 
-def _type(table: Section, materials: Mapping[str, dict[str, Quantity]]) -> parts.FlexureType:
+def _type(table: Section, materials: Mapping[str, dict[str, Any]]) -> parts.FlexureType:
     """Return the flexure type of a table; the type of a flexure's own section has its name."""
     for key in ("model", *SECTION):
         if getattr(table, key) is None:
@@ -484,8 +545,8 @@ def _type(table: Section, materials: Mapping[str, dict[str, Quantity]]) -> parts
     return parts.FlexureType(**given | _material(table, materials), n=table.n or 0)
 
 
-def _material(table: Section, materials: Mapping[str, dict[str, Quantity]]) -> dict[str, Quantity]:
-    """Return Young's modulus and density of a type or flexure."""
+def _material(table: Section, materials: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
+    """Return Young's modulus, density and strengths of a type or flexure."""
     own = {key: getattr(table, key) for key in MATERIAL if key in table.model_fields_set}
     if table.material is None:
         if len(own) < len(MATERIAL):

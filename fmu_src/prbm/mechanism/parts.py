@@ -66,6 +66,12 @@ class FlexureType:
         Whether the flexures can stretch.
     stress : bool
         Whether the stress of the flexures, and its peak, are outputs.
+    yield_strength, tensile_strength : float or None
+        Strengths of the material [Pa].
+    fatigue_strength : float or None
+        Amplitude of a fully reversed stress that the material survives for ``fatigue_cycles`` [Pa].
+    fatigue_cycles : float or None
+        This number of cycles [-].
     """
 
     name: str
@@ -80,6 +86,10 @@ class FlexureType:
     nodes: int | None = None
     axial: bool = False
     stress: bool = False
+    yield_strength: float | None = None
+    tensile_strength: float | None = None
+    fatigue_strength: float | None = None
+    fatigue_cycles: float | None = None
 
 
 @dataclass(frozen=True)
