@@ -187,3 +187,36 @@ def set_argument(parser: ArgumentParser, meaning: str = "value of a parameter") 
         "--set", action="append", default=[], metavar="NAME=VALUE",
         help=f'{meaning}, in SI or with a unit: "release.displacement=-10 mm"; repeatable',
     )  # fmt: skip
+
+
+def stress_arguments(parser: ArgumentParser) -> None:
+    """Add the arguments of ``prbm stress``."""
+    parser.add_argument(
+        "--held", nargs="+", metavar="X",
+        help="displacements [m] or angles [rad] at which the body is held (default: in motion)",
+    )  # fmt: skip
+    stop_time_argument(parser)
+    set_argument(parser, "value of a parameter or input")
+    input_argument(parser)
+    engine_argument(parser)
+
+
+def shock_arguments(parser: ArgumentParser) -> None:
+    """Add the arguments of ``prbm shock``."""
+    add = parser.add_argument
+    add(
+        "--pulse", default="half-sine", choices=("half-sine", "sawtooth", "trapezoid"),
+        help="shape of the pulse (default: %(default)s); the sawtooth ends at its peak",
+    )  # fmt: skip
+    add("--peak", metavar="A", help='largest acceleration of the base [m/s2], "500 g"')
+    add("--height", metavar="H", help="drop height onto a pad without rebound [m]")
+    add("--duration", metavar="T", help="duration of the pulse [s]")
+    add("--axis", default="x", choices=("x", "y"), help="direction (default: %(default)s)")
+    add(
+        "--peaks", nargs="+", metavar="A",
+        help="several peaks, for the level at which a flexure yields",
+    )  # fmt: skip
+    add("--record", metavar="FILE.csv", help="acceleration over time, in place of a pulse")
+    stop_time_argument(parser)
+    set_argument(parser, "value of a parameter or input")
+    engine_argument(parser)

@@ -27,7 +27,9 @@ from .arguments import (
     input_argument,
     picture_arguments,
     set_argument,
+    shock_arguments,
     stop_time_argument,
+    stress_arguments,
     study_arguments,
     sweep_arguments,
 )
@@ -126,6 +128,7 @@ def parser() -> argparse.ArgumentParser:
     _equilibrium(commands)
     _simulate(commands)
     _stress(commands)
+    _shock(commands)
     _fit(commands)
     _impact_map(commands)
     _sweep(commands)
@@ -251,14 +254,22 @@ def _stress(commands: Commands) -> None:
         _examples("prbm stress PRBDM2R", "prbm stress PRBDM2R --held 5 10 mm"),
     )  # fmt: skip
     _mechanism(parser)
-    parser.add_argument(
-        "--held", nargs="+", metavar="X",
-        help="displacements [m] or angles [rad] at which the body is held (default: in motion)",
+    stress_arguments(parser)
+    _out(parser)
+
+
+def _shock(commands: Commands) -> None:
+    parser = _command(
+        commands, "shock", "shock:run_shock",
+        "effect of a shock of the base: displacement, impacts, stress, level of failure",
+        _examples(
+            'prbm shock PRBDM2R --peak "20 g" --duration "2 ms"',
+            'prbm shock PRBDM2R --pulse sawtooth --duration "2 ms" --peaks 20 50 100 g',
+        ),
+        details="The mechanism starts at rest in its equilibrium.",
     )  # fmt: skip
-    stop_time_argument(parser)
-    set_argument(parser, "value of a parameter or input")
-    input_argument(parser)
-    engine_argument(parser)
+    _mechanism(parser)
+    shock_arguments(parser)
     _out(parser)
 
 
