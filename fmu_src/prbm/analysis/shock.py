@@ -21,12 +21,11 @@ from ..runs.experiment import STEPS, experiment
 from ..runs.quantities import settling
 from ..runs.result import Result
 from ..runs.run import simulate
-from ..runs.signals import Signal, Table, Wave
+from ..runs.signals import RAMP_SHARE, Signal, Wave, sawtooth, trapezoid
 from .strength import Loading, loadings, with_stress
 
 HALF_SINE, SAWTOOTH, TRAPEZOID = "half-sine", "sawtooth", "trapezoid"
 PULSES = (HALF_SINE, SAWTOOTH, TRAPEZOID)
-RAMP_SHARE = 0.1  # Of the duration: the rise and the fall of a trapezoid.
 PULSE_STEPS = 50  # Communication steps of a pulse, at least.
 GRAVITY = 9.80665  # Standard acceleration of gravity [m/s^2].
 LEVEL_RTOL = 1e-3  # Error of the level at which a flexure yields.
@@ -98,10 +97,7 @@ class Pulse:
         A, T = self.peak, self.duration
         if self.kind == HALF_SINE:
             return Wave(A, f=0.5 / T, f1=0.5 / T, start=0.0, end=T)
-        if self.kind == SAWTOOTH:
-            return Table((0.0, T, T, 2.0 * T), (0.0, A, 0.0, 0.0))
-        ramp = RAMP_SHARE * T
-        return Table((0.0, ramp, T - ramp, T), (0.0, A, A, 0.0))
+        return sawtooth(A, 0.0, T) if self.kind == SAWTOOTH else trapezoid(A, 0.0, T)
 
     @property
     def input(self) -> str:

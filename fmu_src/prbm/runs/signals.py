@@ -15,6 +15,7 @@ import numpy as np
 from ..base.errors import ParameterError
 from ..mechanics.arrays import Real
 
+RAMP_SHARE = 0.1  # Of the duration: the rise and the fall of a trapezoid.
 SLOPE_STEP = 1e-6  # Difference for the slope of a function, relative to the time or to 1 s.
 
 
@@ -294,3 +295,27 @@ def after(signal: Signal, t: float) -> float:
 def table(times: Real, values: Real) -> Table:
     """Return a table from arrays (m,) of times [s] and values."""
     return Table(*(tuple(np.asarray(x, float).ravel().tolist()) for x in (times, values)))
+
+
+def sawtooth(height: float, start: float, end: float) -> Table:
+    """Return a pulse that rises from a start to its height at an end [s], where it falls to 0.
+
+    Examples
+    --------
+    >>> pulse = sawtooth(3.0, 0.0, 0.2)
+    >>> pulse.value(0.1, inside=0.1), pulse.value(0.2, inside=0.19), pulse.value(0.2, inside=0.21)
+    (1.5, 3.0, 0.0)
+    """
+    return Table((start, end, end), (0.0, height, 0.0))
+
+
+def trapezoid(height: float, start: float, end: float) -> Table:
+    """Return a pulse that rises and falls in a tenth of its duration each.
+
+    Examples
+    --------
+    >>> trapezoid(3.0, 0.0, 0.2).value(0.1, inside=0.1)
+    3.0
+    """
+    ramp = RAMP_SHARE * (end - start)
+    return Table((start, start + ramp, end - ramp, end), (0.0, height, height, 0.0))
