@@ -79,6 +79,21 @@ def test_peak_does_not_depend_on_communication_points_and_is_known_only_afterwar
 
 
 @ENGINES
+def test_a_step_that_an_impulse_shortens_has_no_peak_at_its_end(engine):
+    """An impulse stops the shuttle while the stress rises: the rest of the step never happens."""
+    simulation = engine(guide("1R"), THROWN)
+    simulation.advance(0.02)
+    out = simulation.outputs()
+    stopping = -2.0 * out["energy.kinetic"] / out["shuttle.vx"]
+    simulation.set({"force.impulse.x": stopping})
+    seen = [out["left_flexure.stress"]]
+    for t in np.linspace(0.02, 0.021, 21)[1:]:
+        simulation.advance(float(t))
+        seen.append(simulation.outputs()["left_flexure.stress"])
+    assert simulation.outputs()["left_flexure.peak_stress"] <= max(seen) * (1 + 1e-5)
+
+
+@ENGINES
 def test_a_saved_state_continues_with_the_same_peaks(engine):
     simulation = engine(guide(), THROWN)
     simulation.advance(0.03)
