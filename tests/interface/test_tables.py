@@ -225,7 +225,9 @@ class Comparison:
         for kind in m.flexure_types:
             model = m.model(kind)
             assert r.text() == kind.name
-            assert r.take("III") == (model.lumped, model.rate_with_gamma, kind.axial)
+            assert r.take("IIII") == (
+                model.lumped, model.rate_with_gamma, kind.axial, kind.stress,
+            )  # fmt: skip
             assert r.take("II") == (len(model.gamma), kind.n)
             assert r.take("II") == (model.order, model.nodes)
             assert r.take("I") == ("leaf", "taper", "notch").index(kind.profile)
@@ -358,14 +360,14 @@ def test_mechanisms_too_large_for_the_kernel_are_not_written(parts, counted):
     [
         ("knock", 1, 2, "a stop whose wall is on its own body"),
         ("knock", 1, 9, "an index out of range"),
-        ("leaf", 3, 0, "a flexure type without a model, or with several"),
-        ("leaf", 4, 3, "a flexure type without a model, or with several"),
+        ("leaf", 4, 0, "a flexure type without a model, or with several"),
         ("leaf", 5, 3, "a flexure type without a model, or with several"),
         ("leaf", 6, 3, "a flexure type without a model, or with several"),
-        ("leaf", 5, 13, "an index out of range"),
+        ("leaf", 7, 3, "a flexure type without a model, or with several"),
+        ("leaf", 6, 13, "an index out of range"),
         ("leaf", 2, 2, "an index out of range"),
-        ("chain", 4, 100000, "an index out of range"),
-        ("chain", 4, 200, "a wrong number of independent coordinates"),
+        ("chain", 5, 100000, "an index out of range"),
+        ("chain", 5, 200, "a wrong number of independent coordinates"),
         ("hook", 0, 1, "a part that connects a body with itself"),
         ("hook", 0, 2, "a body without a connection to the ground"),
         ("tip", 0, 9, "an index out of range"),

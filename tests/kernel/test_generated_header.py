@@ -44,7 +44,7 @@ ALLOWED = {
     "fmi/resources.c": {
         "64": "kB a block", "248": "length of paths on Windows", "1024": "bytes a kB",
     },
-    "hybrid/state.h": {"6.283185307179586": "2 pi", "32": "flag", "64": "flag"},
+    "hybrid/state.h": {"6.283185307179586": "2 pi", "32": "flag", "64": "flag", "128": "flag"},
     "hybrid/guards.c": {"4.5e-16": "spacing of doubles, by R. P. Brent"},
     "hybrid/contact_modes.c": {"53": "binary digits of doubles"},
     "hybrid/simulation.c": {"60": "working memory", "64": "working memory"},

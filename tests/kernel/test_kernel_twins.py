@@ -47,6 +47,7 @@ from prbm.mechanics import (
     modal,
     profile,
     statics,
+    stress,
 )
 from prbm.mechanics import inputs as input_data
 from prbm.mechanics import system as system_arrays
@@ -1354,6 +1355,22 @@ def test_reactions_on_the_base_are_the_same(name):
         expected = dynamics.base_reaction(theirs, q, v, a)
         assert_same(force[0], expected[0])
         assert_same(moment[0], expected[1], scale=abs(expected[0]) * theirs.system.length)
+
+
+@twin(stresses=stress.stresses)
+@pytest.mark.parametrize("name", [*OWN_MECHANISMS])
+def test_stresses_of_flexures_are_the_same(name):
+    for theirs, mine, y, rng in equations(name):
+        n = theirs.n
+        q, v, a = y[:n], y[n : 2 * n], 100.0 * rng.normal(size=n)
+        lam = rng.normal(size=len(theirs.rows))
+        e = theirs.system.directions(q)
+        expected = [tuple(x) for x in stress.stresses(theirs, q, v, a, lam).values()]
+        found = np.full((len(expected), 5), np.nan)
+        kernel().stresses(mine.structure, e, q, v, a, lam, found.ctypes.data)
+        scale = max(one[2] for one in expected)
+        assert_same(found[:, :3], [one[:3] for one in expected], 1e-11, scale=scale)
+        assert_same(found[:, 3:], [one[3:] for one in expected], 1e-12)
 
 
 PAIR = runge_kutta.TSITOURAS_PAPAKOSTAS

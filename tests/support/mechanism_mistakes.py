@@ -29,6 +29,10 @@ value = 0.5
 name = "steel"
 youngs_modulus = "181.5 GPa"
 density = "7.8 g/cm3"
+yield_strength = "1.2 GPa"
+tensile_strength = "1500 MPa"
+fatigue_strength = "450 MPa"
+fatigue_cycles = 1e7
 
 [[flexure_types]]
 name = "leaf"
@@ -36,6 +40,7 @@ model = "2R"
 thickness = "0.1 mm"
 width = "8 mm"
 material = "steel"
+stress = true
 
 [ground]
 foot = [0, 0]
@@ -247,14 +252,14 @@ CHANGES = {
     ),
     "key of another part": (
         "n = 8",
-        "stroke = 8",
+        "travel = 8",
         "allowed keys are name, model, n, order, nodes, thickness, width",
     ),
     "missing key": ("inertia = 1e-6\n", "", "anvil.inertia is missing: add the key, or outline"),
     "body without mass": ('mass = "2e-3 kg"\n', "", "anvil.mass is missing: add the key, or"),
     "missing release": ("[release]", "[relaese]", "unknown key relaese; did you mean release?"),
     "key defined twice": ("damping_zeta = 0.01", "name = 'x'", "(at line 6, column "),
-    "table defined twice": ("[release]", "[ground]", "line 116"),
+    "table defined twice": ("[release]", "[ground]", "line 121"),
     # names
     "name of two parts": ('name = "anvil"', 'name = "arm"', "the name 'arm' is used twice"),
     "name of two types": ('name = "hanger"', 'name = "leaf"', "the name 'leaf' is used twice"),
@@ -364,6 +369,33 @@ CHANGES = {
         "geometry.1.value (of ratio",
     ),
     # materials and sections
+    "strength without a unit": (
+        'yield_strength = "1.2 GPa"',
+        "yield_strength = 1.2e9",
+        'write the strength with its unit, for example "1500 MPa"',
+    ),
+    "strength of another quantity": ('"1500 MPa"', '"1500 mm"', "tensile_strength"),
+    "strength of zero": ('"1.2 GPa"', '"0 GPa"', "must be between 1 and 1e+12 Pa"),
+    "fatigue without cycles": (
+        "fatigue_cycles = 1e7",
+        "",
+        "give fatigue_strength and fatigue_cycles, or none of them",
+    ),
+    "fatigue without tensile strength": (
+        'tensile_strength = "1500 MPa"',
+        "",
+        "fatigue_strength needs tensile_strength: add it",
+    ),
+    "fatigue strength as large as the tensile strength": (
+        '"450 MPa"',
+        '"1.5 GPa"',
+        "fatigue_strength must be less than 0.9 of tensile_strength",
+    ),
+    "too few cycles": (
+        "fatigue_cycles = 1e7",
+        "fatigue_cycles = 100",
+        "fatigue_cycles must be between",
+    ),
     "material unknown": (
         'material = "steel"\naxial',
         'material = "stel"\naxial',

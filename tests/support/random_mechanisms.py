@@ -85,7 +85,7 @@ class _Builder:
             FlexureType(
                 f"type{len(self.types)}", model, self.real(*section["thickness"]),
                 self.real(5e-3, 2e-2), self.real(*section["modulus"]), self.real(1e3, 8e3),
-                axial=axial, **given,
+                axial=axial, stress=not self.types, **given,
             )
         )  # fmt: skip
 

@@ -20,7 +20,8 @@ from ..base import reading
 from ..base.errors import MechanismError, ParameterError, PrbmError
 from ..base.names import proposal
 from ..mechanism.description import Mechanism
-from .schema import MechanismTable, RepeatTable, Table, mechanism
+from .schema import MechanismTable, mechanism
+from .tables import RepeatTable, Table
 from .toml_lines import key_length, line_of, lines
 from .values import NAME_LENGTH_MAX, TAGS
 

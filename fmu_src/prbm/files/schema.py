@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictInt, StrictStr, model_validator
+from pydantic import ConfigDict, Field, StrictBool, StrictInt, StrictStr
 
 from ..base.errors import MechanismError, PrbmError
 from ..mechanism import parameters, parts
@@ -36,18 +36,17 @@ from .copies import (
     origins,
 )
 from .outlines import plate
-from .units import check_coherent, si_unit
+from .tables import STRENGTHS, MaterialTable, Named, ParameterTable, RepeatTable, Table
+from .units import check_coherent
 from .values import (
     NAME_LENGTH_MAX,
     Acceleration,
     Angle,
     Corner,
     EndOrEnds,
-    InUnit,
     LineOrLines,
     Measured,
     Model,
-    Name,
     Point,
     PointName,
     PointOrName,
@@ -56,7 +55,6 @@ from .values import (
     measured,
 )
 
-REPEAT_MAX = 1000  # Largest number of equal parts in a row or on a circle.
 GIVEN = ("mass", "inertia", "centre")
 PLATE = ("thickness", "material", "density")
 MATERIAL = ("youngs_modulus", "density")
@@ -71,64 +69,8 @@ IDENTIFIER = "^[A-Za-z_][A-Za-z0-9_]*$"
 # --- tables -----------------------------------------------------------------------------------
 
 
-class Table(BaseModel):
-    """A table that rejects unknown keys."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Named(Table):
-    """A table with a name."""
-
-    name: Name = Field(description="Name")
-
-
-class RepeatTable(Table):
-    """Equal parts in a row or on a circle."""
-
-    count: Annotated[StrictInt, Field(ge=1, le=REPEAT_MAX)] = Field(
-        description="Number of equal parts, with the original"
-    )
-    step: Point | None = Field(None, description="Displacement from one part to the next [m]")
-    angle: Angle | None = Field(
-        None, description="Rotation from one part to the next, in place of step [deg]"
-    )
-    about: Point = Field((0.0, 0.0), description="Centre of the rotation [m]")
-
-
 MIRROR: Any = Field((), description='Line of symmetry, "x = ..." or "y = ...", or a list of both')
 REPEAT: Any = Field(None, description="Equal parts in a row or on a circle")
-
-
-class ParameterTable(Named):
-    """A parameter that points and other quantities refer to."""
-
-    unit: StrictStr = Field("", description="SI unit of the parameter (default: that of the value)")
-    value: Annotated[float, InUnit()] = Field(description="Default value")
-    description: StrictStr = Field("", description="Description of the FMU parameter")
-    minimum: Annotated[float, InUnit(bound=True)] | None = Field(None, description="Smallest value")
-    maximum: Annotated[float, InUnit(bound=True)] | None = Field(None, description="Largest value")
-    nominal: Annotated[float, InUnit(bound=True)] | None = Field(
-        None, description="Typical magnitude"
-    )
-    tunable: StrictBool = Field(False, description="Whether it may change during a simulation")
-
-    @model_validator(mode="before")
-    @classmethod
-    def _unit_of_value(cls, data: Any) -> Any:
-        if isinstance(data, dict) and "unit" not in data and isinstance(data.get("value"), str):
-            try:
-                return {"unit": si_unit(data["value"]), **data}
-            except MechanismError:
-                pass  # The value is read later, and rejected there.
-        return data
-
-
-class MaterialTable(Named):
-    """A material, with the parameters name.youngs_modulus and name.density."""
-
-    youngs_modulus: Annotated[Quantity, measured(parts.FlexureType, "youngs_modulus")]
-    density: Annotated[Quantity, measured(parts.FlexureType, "density")]
 
 
 class Section(Named):
@@ -168,13 +110,18 @@ class Section(Named):
     waist_length: Annotated[Quantity, measured(parts.FlexureType, "waist_length")] | None = None
     curvature: Annotated[Quantity, measured(parts.FlexureType, "curvature")] | None = None
     rise: Annotated[Quantity, measured(parts.FlexureType, "rise")] | None = None
+    stress: StrictBool = Field(
+        False, description="Whether the stress of the flexures, and its peak, are outputs"
+    )
     coefficients: dict[StrictStr, Annotated[Quantity, Measured("Coefficient", "")]] = Field(
         {}, description="Values that replace the published coefficients of the model"
     )
 
 
-_OWN = ("model", "n", "order", "nodes", *SECTION, "material", *MATERIAL, "axial", "coefficients",
-        *PROFILE)  # fmt: skip
+_OWN = (
+    "model", "n", "order", "nodes", *SECTION, "material", *MATERIAL, "axial", "stress",
+    "coefficients", *PROFILE,
+)  # fmt: skip
 _NO_MATERIAL_TWICE: list[Any] = [{"not": {"required": ["material", key]}} for key in MATERIAL]
 _MADE_OF: Any = {"anyOf": [{"required": ["material"]}, {"required": [*MATERIAL]}]}
 _OF_A_TYPE: Any = {"required": ["type"]}
@@ -447,9 +394,13 @@ def _parameters(file: MechanismTable) -> Iterator[parameters.Parameter]:
             yield parameters.Parameter(name, given, unit, about, least, most, nominal)
 
 
-def _materials(file: MechanismTable) -> dict[str, dict[str, Quantity]]:
-    """Return Young's modulus and density of each material, as a flexure type refers to them."""
-    return {m.name: {key: _referred(m, key) for key in MATERIAL} for m in file.materials}
+def _materials(file: MechanismTable) -> dict[str, dict[str, Any]]:
+    """Return Young's modulus, density and strengths of each material, as types refer to them."""
+    return {
+        m.name: {key: _referred(m, key) for key in MATERIAL}
+        | {key: getattr(m, key) for key in STRENGTHS}
+        for m in file.materials
+    }
 
 
 def _check_names(file: MechanismTable) -> None:
@@ -481,20 +432,22 @@ def _referred(material: MaterialTable, key: str) -> Quantity:
     return given if isinstance(given, str) else f"{material.name}.{key}"
 
 
-def _type(table: Section, materials: Mapping[str, dict[str, Quantity]]) -> parts.FlexureType:
+def _type(table: Section, materials: Mapping[str, dict[str, Any]]) -> parts.FlexureType:
     """Return the flexure type of a table; the type of a flexure's own section has its name."""
     for key in ("model", *SECTION):
         if getattr(table, key) is None:
             raise MechanismError(
                 f"{table.name}.{key} is missing: add the key, or the type of the flexure"
             )
-    keys = ("name", "model", "order", "nodes", *SECTION, "axial", "coefficients", *PROFILE)
+    keys = (
+        "name", "model", "order", "nodes", *SECTION, "axial", "stress", "coefficients", *PROFILE,
+    )  # fmt: skip
     given: dict[str, Any] = {key: getattr(table, key) for key in keys}
     return parts.FlexureType(**given | _material(table, materials), n=table.n or 0)
 
 
-def _material(table: Section, materials: Mapping[str, dict[str, Quantity]]) -> dict[str, Quantity]:
-    """Return Young's modulus and density of a type or flexure."""
+def _material(table: Section, materials: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
+    """Return Young's modulus, density and strengths of a type or flexure."""
     own = {key: getattr(table, key) for key in MATERIAL if key in table.model_fields_set}
     if table.material is None:
         if len(own) < len(MATERIAL):

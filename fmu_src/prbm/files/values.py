@@ -88,6 +88,29 @@ class InUnit:
         return {"anyOf": [{"type": "number"}, {"type": "string", "pattern": r"\d"}]}
 
 
+@dataclass(frozen=True)
+class Strength(Measured):
+    """Type of a strength, which is a number with a unit: a plain number is ambiguous."""
+
+    unit: str = "Pa"
+    minimum: float = 1.0
+    maximum: float = 1e12
+    expression: bool = False
+
+    def read(self, written: object) -> Quantity:
+        """Return the strength [Pa]."""
+        if not isinstance(written, str):
+            raise ValueError('write the strength with its unit, for example "1500 MPa"')
+        strength = super().read(written)
+        assert isinstance(strength, float)
+        if not self.minimum <= strength <= self.maximum:
+            raise ValueError(f"must be between {self.minimum:g} and {self.maximum:g} {self.unit}")
+        return strength
+
+    def __get_pydantic_json_schema__(self, _: CoreSchema, __: GetJsonSchemaHandler) -> Any:
+        return {"description": f"{self.description} [Pa]", "type": "string", "pattern": r"\d"}
+
+
 def measured(part: type, key: str) -> Measured:
     """Return the type of a field that is a parameter of the mechanism."""
     unit, description, minimum, maximum, *_ = FIELDS[part][key]

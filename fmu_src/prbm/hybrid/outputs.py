@@ -8,15 +8,22 @@ from ..mechanics import contact, forces
 from ..mechanics.arrays import Complex, Real
 from ..mechanics.dynamics import Equations, base_reaction
 from ..mechanics.kinetics import kinetic_energy
+from ..mechanics.stress import stresses
 from ..mechanics.system import ANGLE, STRAIN, System
 from ..mechanism.parts import value
 from .front import Latched
+from .peaks import PeakRecord
 
 Outputs = dict[str, float | int | bool]
 
 
 def all_outputs(
-    equations: Equations, latched: Sequence[Latched], t: float, y: Real, others: Mapping[str, float]
+    equations: Equations,
+    latched: Sequence[Latched],
+    peaks: PeakRecord,
+    t: float,
+    y: Real,
+    others: Mapping[str, float],
 ) -> Outputs:
     """Return all outputs.
 
@@ -26,6 +33,8 @@ def all_outputs(
         Equations of motion at the time.
     latched : (s,) sequence of Latched
         The last impact of each stop.
+    peaks : PeakRecord
+        The peaks of the stress.
     t, y : float, (2 n + 2,)
         Time [s] and state.
     others : mapping
@@ -49,6 +58,7 @@ def all_outputs(
         out[f"{stop.name}.contact"] = equations.contacts.modes[i].closed
         out |= {f"{stop.name}.{name}": x for name, x in vars(latched[i]).items()}
     out |= _links(system, q, v)
+    out |= _stress(equations, peaks, (q, v, a, lam))
     out |= others
     return out
 
@@ -98,4 +108,18 @@ def _links(system: System, q: Real, v: Real) -> dict[str, float]:
         for j in group:
             for name, x in zip(names, (q, v), strict=True):
                 out[f"{system.owners[j]}.{name}"] = float(x[j])
+    return out
+
+
+def _stress(
+    equations: Equations, peaks: PeakRecord, at: tuple[Real, Real, Real, Real]
+) -> dict[str, float]:
+    """Return the stress of flexures and its peaks; ``at`` has q, v, a and the multipliers."""
+    out = {}
+    for (name, one), peak in zip(stresses(equations, *at).items(), peaks.peaks, strict=True):
+        out[f"{name}.stress_start"], out[f"{name}.stress_end"] = one.start, one.end
+        out[f"{name}.stress"] = one.largest
+        out[f"{name}.peak_stress"] = peak.stress
+        out[f"{name}.peak_stress_time"] = peak.time
+        out[f"{name}.peak_stress_position"] = peak.position
     return out

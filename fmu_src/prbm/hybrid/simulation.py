@@ -41,6 +41,7 @@ from .given import changed_values, checked_times, start_values
 from .guards import StepView
 from .impacts import Impact
 from .outputs import Outputs, all_outputs, motions
+from .peaks import PeakRecord
 from .release import released
 from .stability import FastestMode
 from .stepping import StepSizeController, check_projection, closed, error_norm, take_step
@@ -102,6 +103,7 @@ class Simulation:
         self.course, at_start = walls.start(self.configuration, self.given, self.time)
         inputs = Inputs.of(mechanism, self.given, at_start)
         self.front = released(self.configuration, inputs, self.time)
+        self.peaks = PeakRecord.at(self.front)
         self.fastest = FastestMode.at(self.front.equations, self.time, self.front.y)
         # The step that leads to the front, the event at its end, and the rates at its end.
         self.arc: Arc | None = None
@@ -300,6 +302,7 @@ class Simulation:
 
     def _set_front(self, front: Front, counted: list[Impact]) -> None:
         """Continue from a front without the step that led there."""
+        self.peaks = self.peaks.continued(front, reached=front.time >= self.front.time)
         self.front, self.arc, self.pending, self.k1 = front, None, None, None
         if self.record is not None:
             self.record += counted
@@ -323,12 +326,14 @@ class Simulation:
         event = events.first_event(view)
         if event is None:
             y, self.k1 = step.y, step.k[-1]
+            a, lam = step.k[-1][equations.n : 2 * equations.n], step.forces[-1]
         else:
             # The event does not shorten the next step.
             controller = StepSizeController(step.h, controller.last_error)
             event, arc, y = _cut(configuration, event, view)
-            self.k1 = None
+            self.k1 = a = lam = None
         self.front = Front(arc.end, y, equations, front.latched)
+        self.peaks = self.peaks.stepped(self.front, a, lam)
         self.arc, self.pending, self.controller = arc, event, controller
 
     def check_effort(self, step: float) -> None:
@@ -389,7 +394,10 @@ class Simulation:
         """
         if self._output_cache is None or self._output_cache[0] != self.time:
             constant = {"mode.frequency": self.frequency, **self.configuration.calculated}
-            out = all_outputs(self.equations, self.latched, self.time, self.state(), constant)
+            peaks = self.peaks.passed() if self.time >= self.front.time else self.peaks
+            out = all_outputs(
+                self.equations, self.latched, peaks, self.time, self.state(), constant
+            )
             self._output_cache = (self.time, out)
         return dict(self._output_cache[1])
 
@@ -453,6 +461,7 @@ class Simulation:
             "arc": snapshot.plain_arc(self.arc),
             "pending": snapshot.plain_event(self.pending),
             "k1": snapshot.plain_array(self.k1),
+            "peaks": asdict(self.peaks),
         }
 
     def restore(self, saved: Mapping[str, Any]) -> None:
@@ -482,6 +491,7 @@ class Simulation:
         self.arc = snapshot.arc_of(saved["arc"])
         self.pending = snapshot.event_of(saved["pending"])
         self.k1 = snapshot.array_of(saved["k1"])
+        self.peaks = snapshot.peaks_of(saved["peaks"])
         self._output_cache = None
 
 

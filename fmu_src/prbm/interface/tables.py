@@ -15,6 +15,7 @@ import numpy as np
 from ..base.errors import MechanismError
 from ..mechanics.assembly import assemble
 from ..mechanics.inputs import input_names
+from ..mechanics.stress import stressed
 from ..mechanism.description import Mechanism
 from ..mechanism.expressions import Affine, Quantity, affine
 from ..mechanism.flexure import ENDS, PROFILES
@@ -40,13 +41,15 @@ from .variables import (
     ENERGIES,
     INDICATORS,
     LATCHED,
+    PEAK_OUTPUTS,
     PROBE_OUTPUTS,
     STOP_OUTPUTS,
+    STRESS_OUTPUTS,
     Variable,
 )
 
 FILE = "mechanism.bin"
-MAGIC, VERSION = b"PRBM", 5
+MAGIC, VERSION = b"PRBM", 6
 HEAD = 16  # Bytes before those that the checksum covers.
 DIMENSIONS = (
     "end_thickness", "end_width", "notch_radius", "notch_depth", "waist_length", "curvature",
@@ -64,7 +67,7 @@ GROUND_POINTS_MAX = 4096  # The kernel computes the distance of every pair of po
 GROUND_NUMBER = 0  # Bodies are counted from 1.
 SLOT_GROUPS = (
     "parameters", "inputs", "bodies", "stops", "base", "energies", "latched", "links", "stretches",
-    "probes", "frequency", "calculated", "derivatives", "indicators", "time",
+    "probes", "stresses", "frequency", "calculated", "derivatives", "indicators", "time",
 )  # fmt: skip
 """The groups of values in the order of the vector of all values."""
 FIXED_NAMES = ("gravity.x", "gravity.y", "solver.tolerance", "damping.zeta", "damping.beta")
@@ -165,6 +168,11 @@ def _groups(mechanism: Mechanism, independent: Sequence[int]) -> dict[str, Itera
         "links": links,
         "stretches": stretches,
         "probes": [f"{p.name}.{output}" for p in mechanism.probes for output in PROBE_OUTPUTS],
+        "stresses": [
+            f"{mechanism.flexures[i].name}.{output}"
+            for i in stressed(mechanism)
+            for output in (*STRESS_OUTPUTS, *PEAK_OUTPUTS)
+        ],
         "frequency": ["mode.frequency"],
         "calculated": [f"{name}.gamma0" for name in several],
         "derivatives": state_derivatives(coordinates, independent),
@@ -314,7 +322,7 @@ class _Writer:
             self._field(f"{kind.name}.{c.name}", kind.coefficients.get(c.name, c.value))
             for c in model.coefficients
         )
-        flags = _u32(model.lumped, model.rate_with_gamma, kind.axial)
+        flags = _u32(model.lumped, model.rate_with_gamma, kind.axial, kind.stress)
         numbers = flags + _u32(len(model.gamma), model.links, model.order, model.nodes)
         given = sum(1 << i for i, n in enumerate(DIMENSIONS) if field_of(kind, n) is not None)
         numbers += _u32(PROFILES.index(kind.profile), given)

@@ -36,7 +36,7 @@ UNITS = {
     "kg": Unit({"kg": 1}, {"g": 1e3}),
     "kg.m2": Unit({"kg": 1, "m": 2}, {"g.mm2": 1e9}),
     "kg/m3": Unit({"kg": 1, "m": -3}, {"g/cm3": 1e-3}),
-    "Pa": Unit({"kg": 1, "m": -1, "s": -2}, {"GPa": 1e-9}),
+    "Pa": Unit({"kg": 1, "m": -1, "s": -2}, {"GPa": 1e-9, "MPa": 1e-6}),
     "N": Unit({"kg": 1, "m": 1, "s": -2}, {"mN": 1e3}),
     "N/m": Unit({"kg": 1, "s": -2}, {"N/mm": 1e-3}),
     "N.m": Unit({"kg": 1, "m": 2, "s": -2}, {"mN.m": 1e3}),

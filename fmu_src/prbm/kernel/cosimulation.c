@@ -8,6 +8,7 @@
 #include "hybrid/contact_modes.h"
 #include "hybrid/events.h"
 #include "hybrid/impacts.h"
+#include "hybrid/peaks.h"
 #include "hybrid/simulation.h"
 #include "hybrid/snapshot.h"
 #include "hybrid/stepping.h"
@@ -21,6 +22,9 @@ static bool leave_arc(Simulation *sim, bool shown, Problem *problem) {
     State *state = &sim->state;
     bool within = state->arc.valid && state->time < state->front_time;
     bool ok = true;
+    if (within) {
+        drop_peaks(sim);
+    }
     if (within && !shown) {
         ok = end_step(sim, state->time, problem);
     } else {
@@ -41,7 +45,8 @@ static void take_inputs(Simulation *sim) {
 /* Continue from the front with the inputs that have been set. */
 static bool restart(Simulation *sim, Problem *problem) {
     take_inputs(sim);
-    return receive_impulses(sim, problem) && settle_moved(sim, problem);
+    return receive_impulses(sim, problem) && settle_moved(sim, problem) &&
+           restart_peaks(sim, problem);
 }
 
 static bool event_due(const State *state, double time) {
@@ -52,7 +57,7 @@ static bool apply_pending(Simulation *sim, Problem *problem) {
     Event event = sim->state.pending;
     sim->state.arc.valid = false;
     sim->state.pending.kind = EVENT_NONE;
-    return apply_event(sim, &event, problem);
+    return apply_event(sim, &event, problem) && restart_peaks(sim, problem);
 }
 
 /* Reject a target time in the past or more than STEPS_MAX steps ahead. */

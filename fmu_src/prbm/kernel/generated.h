@@ -115,6 +115,7 @@ enum { EFFORT_MAX = 1000000 };
 #define NOTCH_PEAK_FACTOR 0.7
 enum { FINE_POINTS = 8 };
 enum { GAUSS_ITERATIONS_MAX = 8 };
+#define STRESS_TIE_RTOL 1e-09
 
 /* --- prbm.mechanics.contact_state --------------------------------------------------------------- */
 
@@ -162,7 +163,7 @@ typedef enum {
 
 /* --- prbm.interface.tables ---------------------------------------------------------------------- */
 
-enum { TABLES_VERSION = 5 };
+enum { TABLES_VERSION = 6 };
 enum { TABLES_HEAD = 16 };
 enum { COORDINATES_MAX = 512 };
 enum { DIRECTIONS_MAX = 1024 };
@@ -182,12 +183,13 @@ typedef enum {
     SLOTS_LINKS = 7,
     SLOTS_STRETCHES = 8,
     SLOTS_PROBES = 9,
-    SLOTS_FREQUENCY = 10,
-    SLOTS_CALCULATED = 11,
-    SLOTS_DERIVATIVES = 12,
-    SLOTS_INDICATORS = 13,
-    SLOTS_TIME = 14,
-    SLOTS_GROUPS = 15,
+    SLOTS_STRESSES = 10,
+    SLOTS_FREQUENCY = 11,
+    SLOTS_CALCULATED = 12,
+    SLOTS_DERIVATIVES = 13,
+    SLOTS_INDICATORS = 14,
+    SLOTS_TIME = 15,
+    SLOTS_GROUPS = 16,
 } SlotGroup;
 typedef enum {
     REAL = 0,
@@ -275,6 +277,15 @@ typedef enum {
     PROBE_VY = 3,
 } ProbeOutput;
 enum { PER_PROBE = 4 };
+typedef enum {
+    STRESS_STRESS_START = 0,
+    STRESS_STRESS_END = 1,
+    STRESS_STRESS = 2,
+    STRESS_PEAK_STRESS = 3,
+    STRESS_PEAK_STRESS_TIME = 4,
+    STRESS_PEAK_STRESS_POSITION = 5,
+} StressOutput;
+enum { PER_STRESS = 6 };
 typedef enum {
     INDICATOR_IMPACT = 0,
     INDICATOR_RELEASE = 1,

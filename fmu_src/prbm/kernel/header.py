@@ -28,8 +28,10 @@ from ..interface.variables import (
     INDICATORS,
     LATCHED,
     LINK_OUTPUTS,
+    PEAK_OUTPUTS,
     PROBE_OUTPUTS,
     STOP_OUTPUTS,
+    STRESS_OUTPUTS,
     STRETCH_OUTPUTS,
 )
 from ..mechanics.contact_state import ContactMode
@@ -170,6 +172,7 @@ def _groups() -> Iterator[str]:
         ("LINK", LINK_OUTPUTS),
         ("STRETCH", STRETCH_OUTPUTS),
         ("PROBE", PROBE_OUTPUTS),
+        ("STRESS", (*STRESS_OUTPUTS, *PEAK_OUTPUTS)),
     ):
         yield _enumeration(f"{name.capitalize()}Output", name, _numbers(outputs))
         yield _constant(f"PER_{name}", len(outputs))

@@ -36,8 +36,8 @@ UNFINISHED = -2  # Result of a call that is to be repeated, ENGINE_UNFINISHED in
 IMPACT = 9  # Numbers of a recorded impact before its states, ENGINE_IMPACT in C.
 MOTION_GROUPS = ("bodies", "probes")
 OUTPUT_GROUPS = (
-    *MOTION_GROUPS, "stops", "base", "energies", "latched", "links", "stretches", "frequency",
-    "calculated",
+    *MOTION_GROUPS, "stops", "base", "energies", "latched", "links", "stretches", "stresses",
+    "frequency", "calculated",
 )  # fmt: skip
 """The groups of values that are outputs, in the order of the Python engine."""
 

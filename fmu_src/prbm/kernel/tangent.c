@@ -7,6 +7,7 @@
 #include "dependents.h"
 #include "tangent.h"
 #include "tangent_indicators.h"
+#include "tangent_stress.h"
 #include "values.h"
 
 static Complex times_i(Complex z) {
@@ -540,6 +541,7 @@ static void all_changes(const Tangent *t, const double *dx, const Complex *dw,
     stop_changes(t, out + slots->stops);
     base_changes(t, out + slots->base);
     energy_changes(t, dx, out + slots->energies);
+    stress_changes(t, out + slots->stresses);
     for (int k = 0; k < m->independent_count; k++) {
         out[slots->derivatives + k] = t->dx[m->independent[k]];
     }

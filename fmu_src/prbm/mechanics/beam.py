@@ -27,6 +27,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss, legvander
@@ -95,7 +96,7 @@ def orthogonal(order: int, u: Real, weights: Real) -> Real:
     order : int
         Highest order of the polynomials.
     u, weights : (m,)
-        Points, and positive weights with the sum 1.
+        Points, and their weights with the sum 1.  Points of the weight 0 have no influence.
 
     Returns
     -------
@@ -127,6 +128,31 @@ class Material:
 
     youngs_modulus: float
     density: float
+
+
+class Cuts(NamedTuple):
+    """Sections in which a beam is cut: both ends, the nodes, and the waists of notches.
+
+    Parameters
+    ----------
+    position : (m,)
+        Arc lengths from the start of the beam [m].
+    rank : (m,)
+        Numbers of the nodes from 0, -1 at the start, N at the end; a half between two nodes.
+    moments : (m, n + 1)
+        The polynomials of the bending moment [-].
+    tangent : (m,) complex
+        Directions as drawn, in units of the direction of the chord.
+    area, modulus : (m,)
+        Area [m^2] and section modulus [m^3].
+    """
+
+    position: Real
+    rank: Real
+    moments: Real
+    tangent: Complex
+    area: Real
+    modulus: Real
 
 
 @dataclass(frozen=True)
@@ -200,19 +226,29 @@ class Beam:
     # -- bending --
 
     @cached_property
-    def turns(self) -> Real:
-        """Rotations of the nodes with the end angles and the coefficients, (N, n + 2) [-]."""
+    def _polynomials(self) -> tuple[Real, Real]:
+        """The polynomials of the bending moment at the fine points and at the cuts."""
         shares, _ = self._flexibility()
-        u = 2.0 * self._fine[1].v / self.line.length - 1.0
-        steps = (orthogonal(self.order, u, shares) * shares[:, None]).reshape(
-            -1, FINE_POINTS, self.order + 1
-        )
-        sums = np.cumsum(steps.sum(axis=1), axis=0)
+        v = np.concatenate([self._fine[1].v, self._cut_sections[1].v])
+        weights = np.concatenate([shares, np.zeros(len(v) - len(shares))])
+        P = orthogonal(self.order, 2.0 * v / self.line.length - 1.0, weights)
+        return P[: len(shares)], P[len(shares) :]
+
+    def _up_to_nodes(self, steps: Real) -> Real:
+        """Return the sums of steps (Q, k) at the fine points up to the nodes, (N, k)."""
+        intervals = steps.reshape(-1, FINE_POINTS, steps.shape[1])
+        sums = np.cumsum(intervals.sum(axis=1), axis=0)
         last, at_nodes = 0, []
         for panel in self.panels:  # Each panel has one interval more than nodes.
             at_nodes.append(sums[last : last + panel.nodes])
             last += panel.nodes + 1
-        S = np.concatenate(at_nodes)
+        return np.concatenate(at_nodes)
+
+    @cached_property
+    def turns(self) -> Real:
+        """Rotations of the nodes with the end angles and the coefficients, (N, n + 2) [-]."""
+        shares, _ = self._flexibility()
+        S = self._up_to_nodes(self._polynomials[0] * shares[:, None])
         return np.column_stack([1.0 - S[:, 0], S])
 
     @property
@@ -256,12 +292,17 @@ class Beam:
         return 0.5 * self._nodes[1].thickness / math.sqrt(3.0)
 
     @cached_property
-    def _steps(self) -> Complex:
-        """Changes dz/dx at the nodes as drawn, in units of the direction of the chord, (N,) [m]."""
+    def _scale(self) -> complex:
+        """Factor on the tangents of the line: its quadrature ends exactly at the drawn end."""
         weights, sections = self._nodes
         steps = sections.dv * self.line.tangent(sections.v)
-        # The quadrature of the line ends exactly at the end that is drawn.
-        result: Complex = steps * (self.line.chord / (weights @ steps))
+        return complex(self.line.chord / (weights @ steps))
+
+    @cached_property
+    def _steps(self) -> Complex:
+        """Changes dz/dx at the nodes as drawn, in units of the direction of the chord, (N,) [m]."""
+        sections = self._nodes[1]
+        result: Complex = sections.dv * self.line.tangent(sections.v) * self._scale
         return result
 
     @cached_property
@@ -297,6 +338,39 @@ class Beam:
     def node_positions(self) -> Complex:
         """The lengths A for the nodes, (N, N) [m]."""
         return self.positions([leggauss(panel.nodes)[0] for panel in self.panels])
+
+    # -- cuts --
+
+    @cached_property
+    def _cut_sections(self) -> tuple[Real, Sections]:
+        """Ranks and sections of the cuts, from the start."""
+        ranks, found = [np.array([-1.0])], [self.panels[0].at(np.array([-1.0]))]
+        first = 0
+        for panel in self.panels:
+            nodes, waists = leggauss(panel.nodes)[0], np.array(panel.waists)
+            rank = np.append(np.arange(panel.nodes), np.searchsorted(nodes, waists) - 0.5)
+            order = np.argsort(rank)
+            ranks.append(first + rank[order])
+            found.append(panel.at(np.append(nodes, waists)[order]))
+            first += panel.nodes
+        ranks.append(np.array([float(first)]))
+        found.append(self.panels[-1].at(np.array([1.0])))
+        return np.concatenate(ranks), _joined(found)
+
+    @property
+    def cuts(self) -> Cuts:
+        """The sections in which the beam is cut."""
+        rank, sections = self._cut_sections
+        tangent = self.line.tangent(sections.v) * self._scale
+        # A beam with waists is straight: v is the arc length.
+        position, ds = sections.v.copy(), self._fine[0]
+        position[np.isin(rank, np.arange(len(self.whole)))] = self._up_to_nodes(ds[:, None])[:, 0]
+        position[-1] = ds.sum()
+        area = sections.width * sections.thickness
+        return Cuts(
+            position, rank, self._polynomials[1], tangent / abs(tangent), area,
+            area * sections.thickness / 6,
+        )  # fmt: skip
 
 
 def _joined(parts: Sequence[Sections]) -> Sections:

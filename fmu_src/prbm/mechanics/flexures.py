@@ -12,7 +12,8 @@ from ..mechanism.flexure import NOTCH, PIN, TAPER, Segments, segments
 from ..mechanism.parts import LENGTH_MIN, Flexure, FlexureType, body_of, value
 from .arrays import Complex, Real
 from .beam import Beam, Material
-from .collection import Collection
+from .collection import ROD_POINTS, Collection
+from .free_body import of_beam, of_links
 from .profile import Line, Notch, Panel, Straight, notch_panels
 from .system import Place
 
@@ -30,7 +31,7 @@ def add_flexure(parts: Collection, flexure: Flexure) -> None:
         If the flexure has no length, its links or its notch are longer than the flexure, its notch
         vanishes, or its ends are impossible for its curvature or rise.
     """
-    kind = next(k for k in parts.mechanism.flexure_types if k.name == flexure.type)
+    kind = _type_of(parts, flexure)
     if parts.length(flexure) < LENGTH_MIN:
         raise ParameterError(
             f"flexure {flexure.name} from {flexure.start} to {flexure.end} has the length "
@@ -40,6 +41,11 @@ def add_flexure(parts: Collection, flexure: Flexure) -> None:
         _add_beam(parts, flexure, _beam(parts, flexure, kind), kind)
     else:
         _add_links(parts, flexure, _segments(parts, flexure, kind))
+
+
+def _type_of(parts: Collection, flexure: Flexure) -> FlexureType:
+    """Return the type of a flexure."""
+    return next(k for k in parts.mechanism.flexure_types if k.name == flexure.type)
 
 
 def _segments(parts: Collection, flexure: Flexure, kind: FlexureType) -> Segments:
@@ -56,6 +62,12 @@ def _section(parts: Collection, kind: FlexureType) -> tuple[float, float, float]
     fields = ("thickness", "width", "youngs_modulus", "density")
     h, b, E, rho = (value(kind, name, parts.values) for name in fields)
     return E * b * h**3 / 12, E * b * h, rho * b * h
+
+
+def _strength(parts: Collection, kind: FlexureType) -> tuple[float, float]:
+    """Return area [m^2] and section modulus [m^3]."""
+    h, b = (value(kind, name, parts.values) for name in ("thickness", "width"))
+    return b * h, b * h**2 / 6
 
 
 def _add_links(parts: Collection, flexure: Flexure, pieces: Segments) -> None:
@@ -75,13 +87,16 @@ def _add_links(parts: Collection, flexure: Flexure, pieces: Segments) -> None:
     ]
     known = far in parts.origin
     owners = [owner, *links, parts.index[far] if known else parts.turn(far)]
+    first, points = len(parts.masses), _Points(pieces)
     for i, (length, j) in enumerate(zip(pieces.lengths[:-1], owners[:-1], strict=True)):
         # In the drawing the angle of a body is 0, that of a link its direction.
         vector = length * (1.0 if j in links else direction)
         parts.rod(pieces.rods[i], place, j, vector)
+        points.rod(i, len(parts.masses) - first)
         place = place.plus(j, vector)
         corners.append(place)
         parts.mass(place, pieces.lumps[i])
+        points.lump(i, len(parts.masses) - first)
         parts.spring(pieces.rates[i], parts.angle(owners[i]), parts.angle(owners[i + 1]))
     last = pieces.lengths[-1] * direction
     if known:
@@ -91,8 +106,38 @@ def _add_links(parts: Collection, flexure: Flexure, pieces: Segments) -> None:
     else:
         parts.reach(far, place, z_end - last, owners[-1])
     parts.rod(pieces.rods[-1], place, owners[-1], last)
+    points.rod(len(links) + 1, len(parts.masses) - first)
+    angles, kind = [parts.angle(j) for j in owners], _type_of(parts, flexure)
+    masses, forwards = slice(first, len(parts.masses)), start == flexure.start
+    free = of_links(
+        flexure.name, forwards, pieces, direction, _strength(parts, kind), owners, angles, masses,
+        points.found,
+    )  # fmt: skip
+    parts.connect(root, far, known, free)
     corners.append(parts.on(far, z_end))
     parts.lines.append((flexure.name, "flexure", corners))
+
+
+class _Points:
+    """The mass points of a flexure of links, as :func:`prbm.mechanics.free_body.of_links` needs."""
+
+    def __init__(self, pieces: Segments) -> None:
+        self.pieces = pieces
+        self.found: list[tuple[int, float, float]] = []
+
+    def rod(self, i: int, count: int) -> None:
+        """Add the points of segment i if there are then as many as the given number."""
+        first, last = self.pieces.lengths[0], self.pieces.lengths[-1]
+        for fraction in ROD_POINTS:
+            near = first * (fraction if i == 0 else 1.0)
+            far = last * (fraction if i == len(self.pieces.lengths) - 1 else 0.0)
+            if len(self.found) < count:
+                self.found.append((2 * i, near, far))
+
+    def lump(self, i: int, count: int) -> None:
+        """Add the point at pivot i if there are then as many as the given number."""
+        if len(self.found) < count:
+            self.found.append((2 * i + 1, self.pieces.lengths[0], 0.0))
 
 
 def _add_link(parts: Collection, direction: complex, length: float, axial: float) -> int:
@@ -180,7 +225,7 @@ def _add_beam(parts: Collection, flexure: Flexure, beam: Beam, kind: FlexureType
     known = zip(beam.turns, beam.strains, strict=True)
     arms = [_add_node(parts, [*ends, *bends], turns, strain, own) for turns, own in known]
     reached = None if turned is None else parts.direction({turned: 1.0})
-    _place_beam(parts, flexure, beam, arms, reached, thick=kind.profile == NOTCH)
+    _place_beam(parts, flexure, beam, arms, reached, (ends, bends), thick=kind.profile == NOTCH)
     rates = beam.rates.tolist()
     parts.spring(rates[0], *ends)
     for j, rate in zip(bends, rates[1:], strict=True):
@@ -206,6 +251,7 @@ def _place_beam(
     beam: Beam,
     arms: list[int],
     turned: int | None,
+    coordinates: tuple[list[int | None], list[int]],
     *,
     thick: bool,
 ) -> None:
@@ -223,6 +269,8 @@ def _place_beam(
         Directions of the nodes.
     turned : int or None
         Direction of the body that the beam reaches; None: both bodies have been reached before.
+    coordinates : pair of lists
+        Coordinates of the rotations of its ends (None: the ground), and of its coefficients.
     thick : bool
         Whether the sections have rotary inertia.
     """
@@ -240,22 +288,44 @@ def _place_beam(
             place = place.plus(arm, complex(length) * direction)
         return place
 
-    sections = zip(arms, beam.masses, beam.radii, beam.node_positions, strict=True)
-    for arm, mass, radius, lengths in sections:
-        place = at(lengths)
-        if thick:  # Two masses across the flexure have the moment of inertia of the section.
-            for across in (-radius, radius):
-                parts.mass(place.plus(arm, 1j * across * direction), float(mass) / 2)
-        else:
-            parts.mass(place, float(mass))
+    first = len(parts.masses)
+    across = 1j * direction if thick else 0j
+    points = _add_masses(parts, beam, arms, [at(row) for row in beam.node_positions], across)
     tip = at(whole if forwards else 0.0 * whole)
     if turned is None:
         parts.close(flexure.name, tip, parts.on(body_of(far), z_far))
     else:
         parts.reach(body_of(far), tip, z_far, turned)
-    points = np.linspace(-1.0, 1.0, CURVE_POINTS)
-    curve = beam.positions([points, *[points[1:]] * (len(beam.panels) - 1)])
+    masses = slice(first, len(parts.masses))
+    free = of_beam(flexure.name, forwards, beam, direction, coordinates, arms, masses, points)
+    parts.connect(body_of(near), body_of(far), turned is None, free)
+    curve_points = np.linspace(-1.0, 1.0, CURVE_POINTS)
+    curve = beam.positions([curve_points, *[curve_points[1:]] * (len(beam.panels) - 1)])
     parts.lines.append((flexure.name, "flexure", [at(lengths) for lengths in curve]))
+
+
+def _add_masses(
+    parts: Collection, beam: Beam, arms: list[int], places: list[Place], across: complex
+) -> list[tuple[int, float]]:
+    """Add the masses of a beam at its nodes.
+
+    Two masses across the flexure, in the given direction, have the moment of inertia of a section.
+    With the direction 0 there is one mass.
+
+    Returns
+    -------
+    list of (int, float)
+        For each mass: the number of its node, and its distance from it to the left [m].
+    """
+    first, points = len(parts.masses), list[tuple[int, float]]()
+    nodes = zip(arms, beam.masses.tolist(), beam.radii.tolist(), places, strict=True)
+    for i, (arm, mass, radius, place) in enumerate(nodes):
+        for left in (-radius, radius) if across else (0.0,):
+            spot = place.plus(arm, left * across) if across else place
+            parts.mass(spot, mass / 2 if across else mass)
+            if len(parts.masses) - first > len(points):
+                points.append((i, left))
+    return points
 
 
 def coefficients(

@@ -65,6 +65,11 @@ class Straight:
     thickness: tuple[float, float]
     width: tuple[float, float]
 
+    @property
+    def waists(self) -> tuple[float, ...]:
+        """Points x of waists: none."""
+        return ()
+
     def at(self, x: Real) -> Sections:
         """Return the sections at points x (m,)."""
         part = 0.5 * (1.0 + x)
@@ -110,12 +115,24 @@ class Round:
     width: float
     angles: tuple[float, float]
 
-    def at(self, x: Real) -> Sections:
-        """Return the sections at points x (m,)."""
-        a, b = self.axes
-        pole = 2.0 * math.asinh(math.sqrt(self.thickness / (4.0 * b)))
+    @property
+    def waists(self) -> tuple[float, ...]:
+        """The point x of the waist, unless it is a node."""
+        _, first, last = self._range
+        x = -(first + last) / (last - first)
+        return () if x == 0.0 and self.nodes % 2 == 1 else (x,)
+
+    @property
+    def _range(self) -> tuple[float, float, float]:
+        """The factor c w, and tau at the start and at the end."""
+        pole = 2.0 * math.asinh(math.sqrt(self.thickness / (4.0 * self.axes[1])))
         scale = NOTCH_PEAK_FACTOR * pole
         first, last = (math.asinh(angle / scale) for angle in self.angles)
+        return scale, first, last
+
+    def at(self, x: Real) -> Sections:
+        """Return the sections at points x (m,)."""
+        (a, b), (scale, first, last) = self.axes, self._range
         tau = first + 0.5 * (last - first) * (1.0 + x)
         beta = scale * np.sinh(tau)
         return Sections(

@@ -92,6 +92,14 @@ class FlexureType:
     rise : Quantity or None
         Distance of the parallel tangents at the ends of a beam that is drawn as half a period of a
         cosine [m].  It is positive if the end is to the left of the tangent at the start.
+    stress : bool
+        Whether the stress of the flexures, and its peak, are outputs.
+    yield_strength, tensile_strength : float or None
+        Strengths of the material [Pa].
+    fatigue_strength : float or None
+        Amplitude of a fully reversed stress that the material survives for ``fatigue_cycles`` [Pa].
+    fatigue_cycles : float or None
+        This number of cycles [-].
     """
 
     name: str
@@ -135,6 +143,12 @@ class FlexureType:
         if quantity is None:
             quantity = self.default(name)
         return quantity if isinstance(quantity, str) else f"{self.name}.{name}"
+
+    stress: bool = False
+    yield_strength: float | None = None
+    tensile_strength: float | None = None
+    fatigue_strength: float | None = None
+    fatigue_cycles: float | None = None
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,18 @@ from ..base.errors import ParameterError
 from ..base.names import proposal, unknown
 from ..mechanics.inputs import input_units
 from ..mechanism.description import Mechanism
-from .signals import Function, RowError, Signal, Slope, Steps, Table, Wave, table
+from .signals import (
+    Function,
+    RowError,
+    Signal,
+    Slope,
+    Steps,
+    Table,
+    Wave,
+    sawtooth,
+    table,
+    trapezoid,
+)
 
 Source = str | float | Signal | Callable[[float], float] | Sequence[Any]
 """A text, a number, a signal, a function of time, or a pair of arrays (times, values)."""
@@ -24,6 +35,8 @@ SHAPES: dict[str, Arguments] = {  # Arguments with their units and default value
     "step": {"height": (SIGNAL, REQUIRED), "start": ("s", 0.0)},
     "pulse": {"height": (SIGNAL, REQUIRED), "duration": ("s", REQUIRED), "start": ("s", 0.0)},
     "half-sine": {"height": (SIGNAL, REQUIRED), "duration": ("s", REQUIRED), "start": ("s", 0.0)},
+    "sawtooth": {"height": (SIGNAL, REQUIRED), "duration": ("s", REQUIRED), "start": ("s", 0.0)},
+    "trapezoid": {"height": (SIGNAL, REQUIRED), "duration": ("s", REQUIRED), "start": ("s", 0.0)},
     "sine": {
         "amplitude": (SIGNAL, REQUIRED), "frequency": ("Hz", REQUIRED), "start": ("s", 0.0),
         "duration": ("s", math.inf), "phase": ("rad", 0.0),
@@ -172,7 +185,8 @@ def read_signal(name: str, text: str, unit: str) -> Signal:
         Name of the input, for messages.
     text : str
         A quantity; ``step(height, start)``, ``pulse(height, duration, start)``,
-        ``half-sine(height, duration, start)``, ``sine(amplitude, frequency, start, duration,
+        ``half-sine(height, duration, start)``, ``sawtooth(height, duration, start)``,
+        ``trapezoid(height, duration, start)``, ``sine(amplitude, frequency, start, duration,
         phase)``, ``chirp(amplitude, from, to, duration, start, phase)``, where ``start`` is 0 by
         default; or ``csv(FILE, COLUMN)``.  Arguments may be named: ``start=10 ms``.
     unit : str
@@ -270,6 +284,10 @@ def _shaped(shape: str, x: Mapping[str, float]) -> Signal:
     if shape == "half-sine":
         f = 0.5 / x["duration"]
         return Wave(x["height"], f, f, start, end)
+    if shape == "sawtooth":
+        return sawtooth(x["height"], start, end)
+    if shape == "trapezoid":
+        return trapezoid(x["height"], start, end)
     if shape == "sine":
         return Wave(x["amplitude"], x["frequency"], x["frequency"], start, end, x["phase"])
     return Wave(x["amplitude"], x["from"], x["to"], start, end, x["phase"])

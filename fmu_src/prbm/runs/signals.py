@@ -17,6 +17,7 @@ from ..base.errors import ParameterError
 from ..mechanics.arrays import Real
 from ..mechanism.parameters import finite
 
+RAMP_SHARE = 0.1  # Of the duration: the rise and the fall of a trapezoid.
 SLOPE_STEP = 1e-6  # Difference for the slope of a function, relative to the time or to 1 s.
 SLOPE_WEIGHTS = (11 / 6, -3.0, 3 / 2, -1 / 3)
 """Weights of the values at t, t - h, t - 2 h and t - 3 h in h times the slope, of third order."""
@@ -368,3 +369,27 @@ def after(signal: Signal, t: float) -> float:
 def table(times: Real, values: Real) -> Table:
     """Return a table from arrays (m,) of times [s] and values."""
     return Table(*(tuple(np.asarray(x, float).ravel().tolist()) for x in (times, values)))
+
+
+def sawtooth(height: float, start: float, end: float) -> Table:
+    """Return a pulse that rises from a start to its height at an end [s], where it falls to 0.
+
+    Examples
+    --------
+    >>> pulse = sawtooth(3.0, 0.0, 0.2)
+    >>> pulse.value(0.1, inside=0.1), pulse.value(0.2, inside=0.19), pulse.value(0.2, inside=0.21)
+    (1.5, 3.0, 0.0)
+    """
+    return Table((start, end, end), (0.0, height, 0.0))
+
+
+def trapezoid(height: float, start: float, end: float) -> Table:
+    """Return a pulse that rises and falls in a tenth of its duration each.
+
+    Examples
+    --------
+    >>> trapezoid(3.0, 0.0, 0.2).value(0.1, inside=0.1)
+    3.0
+    """
+    ramp = RAMP_SHARE * (end - start)
+    return Table((start, start + ramp, end - ramp, end), (0.0, height, height, 0.0))

@@ -70,6 +70,9 @@ static void add_body(System *system, int body, Scratch *scratch) {
     Complex drawn = at_point(system, part->centre);
     Place centre = new_place(system, scratch);
     on_body(system, body, drawn, &centre);
+    if (system->mechanism->stressed_count > 0) {
+        system->body_masses[body - 1] = system->p;
+    }
     add_mass(system, &centre, evaluate(part->mass, system->values));
     add_frame(system, body, drawn, frame, scratch);
     system->J[frame->arm] += evaluate(part->inertia, system->values);

@@ -94,13 +94,18 @@ typedef struct {
     Section *sections; /* (count,) */
 } Fine;
 
-enum { SECTION_DOUBLES = sizeof(Section) / sizeof(double) };
+enum {
+    SECTION_DOUBLES = sizeof(Section) / sizeof(double),
+    CUT_DOUBLES = sizeof(Cut) / sizeof(double)
+};
 
 PRBM size_t beam_size(int order, int nodes, int panels) {
     size_t n = (size_t)order + 1, N = (size_t)nodes;
     size_t Q = (N + (size_t)panels) * FINE_POINTS;
-    size_t arrays = N * (n + 2 * N + 5) + n;
-    return arrays + N * (SECTION_DOUBLES + 5) + Q * (SECTION_DOUBLES + n + 5) + n;
+    size_t cuts = N + CUTS_BESIDE_NODES;
+    size_t arrays = N * (n + 2 * N + 5) + n + cuts * (CUT_DOUBLES + n);
+    return arrays + N * (SECTION_DOUBLES + 6) + Q * (SECTION_DOUBLES + n + 5) + n +
+           cuts * (SECTION_DOUBLES + n + 5);
 }
 
 static Section *take_sections(Scratch *scratch, int count) {
@@ -110,6 +115,10 @@ static Section *take_sections(Scratch *scratch, int count) {
 /* Return the arc length per x at a section [m]. */
 static double arc(const Beam *beam, Section section) {
     return section.dv * modulus(tangent(beam->line, section.v));
+}
+
+static double area_of(Section section) {
+    return section.width * section.thickness;
 }
 
 static Fine fine_points(const Beam *beam, Scratch *scratch) {
@@ -136,11 +145,12 @@ static Fine fine_points(const Beam *beam, Scratch *scratch) {
 
 /* --- bending and stretch ---------------------------------------------------------------------- */
 
-/* Set the integrals of the polynomials up to the nodes, and the rates. */
-static void set_bending(Beam *beam, const Fine *fine, Scratch *scratch) {
-    int n = beam->order + 1, Q = fine->count, node = 0, interval = 0;
-    double *u = take(scratch, (size_t)Q), *shares = take(scratch, (size_t)Q), total = 0.0;
-    double *P = take_matrix(scratch, Q, n), *sums = take(scratch, (size_t)n);
+/* Set the integrals of the polynomials up to the nodes, the polynomials at the cuts, and the rates.
+ * The cuts follow the fine points, with the weight 0. */
+static void set_bending(Beam *beam, const Fine *fine, const Section *cuts, Scratch *scratch) {
+    int n = beam->order + 1, Q = fine->count, all = Q + beam->cut_count, node = 0, interval = 0;
+    double *u = take(scratch, (size_t)all), *shares = take(scratch, (size_t)all), total = 0.0;
+    double *P = take_matrix(scratch, all, n), *sums = take(scratch, (size_t)n);
     for (int i = 0; i < Q; i++) {
         const Section *s = &fine->sections[i];
         u[i] = 2.0 * s->v / line_length(beam->line) - 1.0;
@@ -150,7 +160,12 @@ static void set_bending(Beam *beam, const Fine *fine, Scratch *scratch) {
     for (int i = 0; i < Q; i++) {
         shares[i] /= total;
     }
-    orthogonal(Q, beam->order, u, shares, P, scratch);
+    for (int i = Q; i < all; i++) {
+        u[i] = 2.0 * cuts[i - Q].v / line_length(beam->line) - 1.0;
+        shares[i] = 0.0;
+    }
+    orthogonal(all, beam->order, u, shares, P, scratch);
+    copy(beam->cut_count * n, P + Q * n, beam->moments);
     zeros(n, sums);
     for (int p = 0; p < beam->panel_count; p++) {
         for (int k = 0; k <= beam->panels[p].nodes; k++, interval++) {
@@ -171,11 +186,11 @@ static void set_stretch(Beam *beam, const Fine *fine, const Section *sections) {
     double length = 0.0, flexibility = 0.0;
     for (int i = 0; i < fine->count; i++) {
         length += fine->ds[i];
-        flexibility += fine->ds[i] / (fine->sections[i].width * fine->sections[i].thickness);
+        flexibility += fine->ds[i] / area_of(fine->sections[i]);
     }
     flexibility /= beam->youngs_modulus;
     for (int i = 0; i < beam->nodes; i++) {
-        double area = sections[i].width * sections[i].thickness;
+        double area = area_of(sections[i]);
         beam->strains[i] = length / (beam->youngs_modulus * area * flexibility);
     }
     beam->axial_rate = length * length / flexibility;
@@ -184,14 +199,14 @@ static void set_stretch(Beam *beam, const Fine *fine, const Section *sections) {
 /* --- masses and positions --------------------------------------------------------------------- */
 
 /* Set the masses, the radii of gyration, and the lengths for the end and for the nodes.  The
- * quadrature of the line ends exactly at the end that is drawn. */
-static void set_nodes(Beam *beam, const Section *sections, const double *x, const double *weights,
-                      Scratch *scratch) {
+ * quadrature of the line ends exactly at the end that is drawn: return its factor on tangents. */
+static Complex set_nodes(Beam *beam, const Section *sections, const double *x,
+                         const double *weights, Scratch *scratch) {
     int N = beam->nodes, first = 0;
     Complex *steps = take_complex(scratch, N, 1), sum = {0.0, 0.0};
     double *lengths = take(scratch, (size_t)N);
     for (int i = 0; i < N; i++) {
-        double area = sections[i].width * sections[i].thickness;
+        double area = area_of(sections[i]);
         beam->masses[i] = beam->density * area * (weights[i] * arc(beam, sections[i]));
         beam->radii[i] = 0.5 * sections[i].thickness / sqrt(3.0);
         steps[i] = scaled(sections[i].dv, tangent(beam->line, sections[i].v));
@@ -214,6 +229,72 @@ static void set_nodes(Beam *beam, const Section *sections, const double *x, cons
         }
         first += nodes;
     }
+    return factor;
+}
+
+/* --- cuts ------------------------------------------------------------------------------------- */
+
+static void add_cut(Beam *beam, Section *sections, const Panel *panel, double x, double rank) {
+    sections[beam->cut_count] = section_at(panel, x);
+    beam->cuts[beam->cut_count++].rank = rank;
+}
+
+/* Set the ranks of the cuts and their sections.  x (N,) are the nodes. */
+static void collect_cuts(Beam *beam, const double *x, Section *sections) {
+    int i = 0, last = beam->panel_count - 1;
+    beam->cut_count = 0;
+    add_cut(beam, sections, &beam->panels[0], -1.0, -1.0);
+    for (int p = 0; p <= last; p++) {
+        const Panel *panel = &beam->panels[p];
+        double waist = 2.0; /* beyond the panel */
+        bool ahead = waist_at(panel, &waist);
+        for (int k = 0; k <= panel->nodes; k++) {
+            if (ahead && (k == panel->nodes || x[i] > waist)) {
+                add_cut(beam, sections, panel, waist, i - 0.5);
+                ahead = false;
+            }
+            if (k < panel->nodes) {
+                add_cut(beam, sections, panel, x[i], i);
+                i++;
+            }
+        }
+    }
+    add_cut(beam, sections, &beam->panels[last], 1.0, i);
+}
+
+/* Compute the arc lengths (N,) from the start to the nodes; return that to the end [m]. */
+static double arc_lengths(const Beam *beam, const Fine *fine, double *places) {
+    double length = 0.0;
+    int i = 0, node = 0;
+    for (int p = 0; p < beam->panel_count; p++) {
+        for (int k = 0; k <= beam->panels[p].nodes; k++) {
+            for (int q = 0; q < FINE_POINTS; q++) {
+                length += fine->ds[i++];
+            }
+            if (k < beam->panels[p].nodes) {
+                places[node++] = length;
+            }
+        }
+    }
+    return length;
+}
+
+/* Set the cuts.  A beam with waists is straight: v is the arc length. */
+static void set_cuts(Beam *beam, const Fine *fine, const Section *sections, Complex factor,
+                     Scratch *scratch) {
+    double *places = take(scratch, (size_t)beam->nodes);
+    double length = arc_lengths(beam, fine, places);
+    for (int k = 0; k < beam->cut_count; k++) {
+        Cut *cut = &beam->cuts[k];
+        int node = (int)cut->rank;
+        Complex along = product(tangent(beam->line, sections[k].v), factor);
+        bool at_node = cut->rank == node && node >= 0 && node < beam->nodes;
+        cut->position = at_node ? places[node] : sections[k].v;
+        cut->tangent = scaled(1.0 / modulus(along), along);
+        cut->area = area_of(sections[k]);
+        cut->modulus = cut->area * sections[k].thickness / 6;
+    }
+    beam->cuts[beam->cut_count - 1].position = length;
 }
 
 static void take_arrays(Beam *beam, Scratch *scratch) {
@@ -225,6 +306,8 @@ static void take_arrays(Beam *beam, Scratch *scratch) {
     beam->radii = take(scratch, N);
     beam->strains = take(scratch, N);
     beam->rates = take(scratch, (size_t)beam->order + 1);
+    beam->cuts = (Cut *)(void *)take(scratch, (N + CUTS_BESIDE_NODES) * CUT_DOUBLES);
+    beam->moments = take_matrix(scratch, beam->nodes + CUTS_BESIDE_NODES, beam->order + 1);
 }
 
 PRBM void set_beam(Beam *beam, Scratch *scratch) {
@@ -241,7 +324,10 @@ PRBM void set_beam(Beam *beam, Scratch *scratch) {
     }
     Fine fine = fine_points(beam, scratch);
     set_stretch(beam, &fine, sections);
-    set_nodes(beam, sections, x, weights, scratch);
-    set_bending(beam, &fine, scratch);
+    Complex factor = set_nodes(beam, sections, x, weights, scratch);
+    Section *cuts = take_sections(scratch, N + CUTS_BESIDE_NODES);
+    collect_cuts(beam, x, cuts);
+    set_cuts(beam, &fine, cuts, factor, scratch);
+    set_bending(beam, &fine, cuts, scratch);
     scratch->used = mark;
 }

@@ -4,6 +4,17 @@
 
 #include "core/profile.h"
 
+/* A section in which a beam is cut: an end, a node, or the waist of a notch. */
+typedef struct {
+    double position;      /* arc length from the start of the beam [m] */
+    double rank;          /* number of the node, -1 or N at the ends, a half between two nodes */
+    Complex tangent;      /* direction as drawn, in units of the direction of the chord */
+    double area, modulus; /* [m^2], [m^3] */
+} Cut;
+
+/* Both ends, and at most two waists. */
+enum { CUTS_BESIDE_NODES = 4 };
+
 /* A beam of N nodes in all panels, as in the twin. */
 typedef struct {
     int order, nodes, panel_count;
@@ -18,6 +29,9 @@ typedef struct {
     double *strains; /* (N,) strains with the mean strain [-] */
     double *rates;   /* (order + 1,) rotation between the ends, and coefficients [N m/rad] */
     double axial_rate; /* rate of the mean strain [N m] */
+    int cut_count;
+    Cut *cuts;         /* (cut_count,) from the start */
+    double *moments;   /* (cut_count, order + 1) polynomials of the bending moment at the cuts */
 } Beam;
 
 /* Compute the nodes and weights (count,) of Gauss' quadrature from -1 to 1. */

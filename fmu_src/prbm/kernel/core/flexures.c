@@ -5,6 +5,7 @@
 #include "core/beam.h"
 #include "core/flexure.h"
 #include "core/flexures.h"
+#include "core/free_body.h"
 #include "core/matrix.h"
 
 static double length_of(const System *system, const Flexure *flexure) {
@@ -88,6 +89,7 @@ static bool walk_links(System *system, const Step *step, Scratch *scratch, Probl
     on_body(system, span.root, span.z_start, &spot);
     add_corner(system, &spot);
     int *owners = take_integers(scratch, pieces.n + 2), next = step->first_direction;
+    FreeBody *free_body = begin_free_body(system, step);
     owners[0] = system->origins[span.root].j;
     for (int i = 1; i <= pieces.n; i++) {
         owners[i] = next;
@@ -100,9 +102,11 @@ static bool walk_links(System *system, const Step *step, Scratch *scratch, Probl
         Complex vector = i == 0 ? scaled(pieces.lengths[i], direction)
                                 : complex_of(pieces.lengths[i], 0.0);
         add_rod(system, pieces.rods[i], &spot, owners[i], vector, &spare);
+        rank_points(free_body, system, 2 * i);
         extend(&spot, owners[i], vector);
         add_corner(system, &spot);
         add_mass(system, &spot, pieces.lumps[i]);
+        rank_points(free_body, system, 2 * i + 1);
         add_spring(system, pieces.rates[i], coordinate_of(system, owners[i]),
                    coordinate_of(system, owners[i + 1]));
     }
@@ -117,6 +121,8 @@ static bool walk_links(System *system, const Step *step, Scratch *scratch, Probl
     add_rod(system, pieces.rods[pieces.n + 1], &spot, last_one, last, &spare);
     extend(&spot, last_one, last);
     add_corner(system, &spot);
+    rank_points(free_body, system, 2 * (pieces.n + 1));
+    keep_links(system, step, &pieces, direction, owners);
     return true;
 }
 
@@ -191,8 +197,10 @@ static void add_section(System *system, const Place *spot, int arm, double mass,
     }
 }
 
-static void place_beam(System *system, const Step *step, const Beam *beam,
-                       const FlexureType *kind, Scratch *scratch) {
+/* Place the masses and the far end of a beam; return its direction as drawn. */
+static Complex place_beam(System *system, const Step *step, const Beam *beam,
+                          const FlexureType *kind, Scratch *scratch) {
+    FreeBody *free_body = begin_free_body(system, step);
     Place root = new_place(system, scratch), spot = new_place(system, scratch);
     Place spare = new_place(system, scratch);
     Span span = span_of(system, step);
@@ -208,6 +216,7 @@ static void place_beam(System *system, const Step *step, const Beam *beam,
         } else {
             add_mass(system, &spot, beam->masses[i]);
         }
+        rank_points(free_body, system, i);
         add_corner(system, &spot);
     }
     Complex *none = take_complex(scratch, nodes, 1);
@@ -220,6 +229,7 @@ static void place_beam(System *system, const Step *step, const Beam *beam,
     } else {
         reach(system, span.far, &spot, span.z_end, step->first_direction + nodes * stride);
     }
+    return direction;
 }
 
 static double dimension(const System *system, const FlexureType *kind, int which) {
@@ -288,7 +298,9 @@ static bool walk_beam(System *system, const Step *step, Scratch *scratch, Proble
     set_beam(&beam, scratch);
     BeamCoordinates at = beam_coordinates(system, step);
     turn_nodes(system, step, &beam, &at, kind->axial);
-    place_beam(system, step, &beam, kind, scratch);
+    Complex direction = place_beam(system, step, &beam, kind, scratch);
+    const int ends[2] = {at.start, at.end};
+    keep_beam(system, step, &beam, direction, ends, at.first);
     add_spring(system, beam.rates[0], at.start, at.end);
     for (int k = 0; k < kind->order; k++) {
         add_spring(system, beam.rates[k + 1], FIXED, at.first + k);

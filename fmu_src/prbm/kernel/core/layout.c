@@ -76,6 +76,7 @@ PRBM void count_coordinates(Reader *reader, Mechanism *m) {
         masses += more.masses;
         map += more.map;
         corners += more.arms + CORNERS_BESIDE_ARMS;
+        m->stressed_count += kind_of(m, &m->flexures[i])->stress;
         m->longest = more.arms > m->longest ? more.arms : m->longest;
         size_t size = kind_of(m, &m->flexures[i])->order > 0
                           ? size_of_beam(kind_of(m, &m->flexures[i]))
@@ -344,6 +345,7 @@ PRBM void lay_out_slots(Mechanism *m) {
         [SLOTS_LINKS] = PER_LINK * m->link_count,
         [SLOTS_STRETCHES] = PER_STRETCH * m->strain_count,
         [SLOTS_PROBES] = PER_PROBE * m->probe_count,
+        [SLOTS_STRESSES] = PER_STRESS * m->stressed_count,
         [SLOTS_FREQUENCY] = 1,
         [SLOTS_CALCULATED] = calculated_count(m),
         [SLOTS_DERIVATIVES] = m->independent_count + 2,
@@ -363,6 +365,7 @@ PRBM void lay_out_slots(Mechanism *m) {
         .links = at[SLOTS_LINKS],
         .stretches = at[SLOTS_STRETCHES],
         .probes = at[SLOTS_PROBES],
+        .stresses = at[SLOTS_STRESSES],
         .frequency = at[SLOTS_FREQUENCY],
         .calculated = at[SLOTS_CALCULATED],
         .derivatives = at[SLOTS_DERIVATIVES],

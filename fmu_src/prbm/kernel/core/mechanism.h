@@ -31,6 +31,7 @@ typedef struct {
 typedef struct {
     const char *name;
     bool lumped, rate_with_gamma, axial;
+    bool stress; /* Whether the stress of the flexures is an output. */
     int pivots; /* Pivots of a cantilever; 0 for a chain. */
     int links;  /* Links of a chain; 0 for a model with coefficients. */
     int order;  /* Order of the bending moment of a beam; 0 for links. */
@@ -113,7 +114,7 @@ typedef struct {
 /* The first slot of each group in the vector of all values. */
 typedef struct {
     int parameters, inputs, bodies, stops, base, energies, latched, links, stretches, probes,
-        frequency, calculated, derivatives, indicators, time, count;
+        stresses, frequency, calculated, derivatives, indicators, time, count;
 } Slots;
 
 /* The first index of each group of inputs; the forces begin at 0. */
@@ -181,6 +182,7 @@ typedef struct {
     /* Sizes of the assembled system. */
     int coordinate_count, direction_count, loop_count, link_count, strain_count, stretch_count,
         mass_count, spring_count, corner_count;
+    int stressed_count; /* Number of flexures whose stress is an output. */
     int longest; /* Largest number of links or nodes of a flexure. */
     size_t beam_size; /* Largest number of doubles that a beam needs. */
     Slots slots;

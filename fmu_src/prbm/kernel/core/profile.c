@@ -26,12 +26,28 @@ static double inverse_hyperbolic_sine(double x) {
     return x < 0.0 ? -natural_log(root - x) : natural_log(root + x);
 }
 
-static Section round_section(const Panel *panel, double x) {
-    double a = panel->axes[0], b = panel->axes[1], h = panel->thickness[0];
-    double pole = 2.0 * inverse_hyperbolic_sine(sqrt(h / (4.0 * b)));
+/* Set tau at the start and the end of a round panel; return the factor c w. */
+static double round_range(const Panel *panel, double *first, double *last) {
+    double pole = 2.0 * inverse_hyperbolic_sine(sqrt(panel->thickness[0] / (4.0 * panel->axes[1])));
     double scale = NOTCH_PEAK_FACTOR * pole;
-    double first = inverse_hyperbolic_sine(panel->angles[0] / scale);
-    double last = inverse_hyperbolic_sine(panel->angles[1] / scale);
+    *first = inverse_hyperbolic_sine(panel->angles[0] / scale);
+    *last = inverse_hyperbolic_sine(panel->angles[1] / scale);
+    return scale;
+}
+
+PRBM bool waist_at(const Panel *panel, double *x) {
+    double first, last;
+    if (!panel->round) {
+        return false;
+    }
+    round_range(panel, &first, &last);
+    *x = -(first + last) / (last - first);
+    return *x != 0.0 || panel->nodes % 2 == 0;
+}
+
+static Section round_section(const Panel *panel, double x) {
+    double a = panel->axes[0], b = panel->axes[1], h = panel->thickness[0], first, last;
+    double scale = round_range(panel, &first, &last);
     double tau = first + 0.5 * (last - first) * (1.0 + x);
     double beta = scale * hyperbolic_sine(tau), half = 0.5 * beta;
     Complex whole, halved;

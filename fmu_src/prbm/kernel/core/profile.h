@@ -37,6 +37,8 @@ typedef struct {
 
 /* Return the section of a panel at x, from -1 to 1. */
 PRBM Section section_at(const Panel *panel, double x);
+/* Set the point x of the waist of a round panel; false if there is none, or if it is a node. */
+PRBM bool waist_at(const Panel *panel, double *x);
 PRBM Panel straight_panel(int nodes, double start, double length, double thickness, double width);
 /* Return the largest angle from the waist, at the edges of a notch [rad]. */
 PRBM double notch_angle(const Notch *notch);

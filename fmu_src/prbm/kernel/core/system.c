@@ -8,6 +8,7 @@
  */
 #include "core/system.h"
 #include "core/block_map.h"
+#include "core/free_body.h"
 #include "core/kinetics.h"
 #include "core/matrix.h"
 #include "core/vectors.h"
@@ -85,6 +86,7 @@ PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memor
     result.own = place(memory, d, sizeof(double));
     result.straight = place(memory, (size_t)result.even, sizeof(double));
     result.calculated = place(memory, (size_t)m->type_count, sizeof(double));
+    place_free_bodies(&result, memory);
     *system = result;
 }
 

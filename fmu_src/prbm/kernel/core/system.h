@@ -30,6 +30,27 @@ typedef struct {
     int a, b;
 } Spring;
 
+/* The index TURNED - j stands for an arm that turns with coordinate j. */
+enum { TURNED = -2 };
+
+/* A flexure as a free body between its near end and its far end, as in the twin.  Arrays are in the
+ * order from the near end to the far end. */
+typedef struct {
+    bool forwards;          /* whether the near end is the start of the flexure */
+    int first, count, stub; /* mass points; the last ones, of the stub beyond a closed loop */
+    int sections, arm_count;
+    double *position, *area, *modulus; /* (sections,) */
+    double *ranks, *section_ranks;     /* (count,), (sections,) order along the flexure */
+    int *tangents;          /* (sections, 2) directions, FIXED or TURNED - coordinate */
+    Complex *drawn;         /* (sections, 2) */
+    int *arms;              /* (arm_count,) directions that turn with the ends, or FIXED */
+    Complex *levers;        /* (count + 1, arm_count) */
+    double *turning;        /* (2, arm_count) */
+    int *angles;            /* links: coordinates of the segments; beam: of start, end, first a_k */
+    double *rates;          /* links: of the springs; beam: of the rotation between the ends */
+    double *moments;        /* (sections, order + 1) polynomials of a beam, from its start */
+} FreeBody;
+
 /* A block on the diagonal of the mass matrix, for example that of the links of a flexure that
  * closes a loop.  The rows after the row apart, counted in the block, are zero in the columns
  * before it. */
@@ -93,6 +114,8 @@ typedef struct {
     BodyFrame *pushed;        /* points of the forces */
     BodyFrame *probes;        /* points of the probes */
     Place *origins;           /* (b + 1,), the ground's first */
+    FreeBody *free_bodies;    /* of all flexures, if the stress of one is an output */
+    int *body_masses;         /* (b,) mass points of the bodies, if so */
     int stretch_count;
     const int *stretches;     /* directions that are stretches */
     int corner_count;

@@ -111,6 +111,7 @@ static void read_types(Reader *reader, Mechanism *m) {
         t->lumped = read_flag(reader);
         t->rate_with_gamma = read_flag(reader);
         t->axial = read_flag(reader);
+        t->stress = read_flag(reader);
         t->pivots = read_index(reader, 0, LINKS_MAX + 1);
         t->links = read_index(reader, 0, LINKS_MAX + 1);
         t->order = read_index(reader, 0, ORDER_MAX + 1);

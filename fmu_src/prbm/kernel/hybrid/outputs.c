@@ -1,9 +1,11 @@
 /* The outputs at the present state: the twin of hybrid/outputs.py. */
 #include <string.h>
 
+#include "core/sections.h"
 #include "hybrid/configuration.h"
 #include "hybrid/impacts.h"
 #include "hybrid/outputs.h"
+#include "hybrid/peaks.h"
 #include "hybrid/simulation.h"
 
 static void output_bodies(const Simulation *sim, double *out) {
@@ -135,6 +137,23 @@ static void output_base(Simulation *sim) {
     out[BASE_FORCE_Y] = force.im;
 }
 
+static void output_stresses(Simulation *sim) {
+    size_t mark = sim->scratch.used;
+    const Mechanism *m = sim->configuration.mechanism;
+    const Present *present = &sim->present;
+    double *out = sim->present.outputs + m->slots.stresses;
+    Stress *found = take_stresses(&sim->scratch, m->stressed_count);
+    stresses(&sim->equations, present->e, present->y, present->y + system_of(sim)->n,
+             present->evaluation.a, present->evaluation.lam, found, &sim->scratch);
+    for (int i = 0; i < m->stressed_count; i++) {
+        out[PER_STRESS * i + STRESS_STRESS_START] = found[i].start;
+        out[PER_STRESS * i + STRESS_STRESS_END] = found[i].end;
+        out[PER_STRESS * i + STRESS_STRESS] = found[i].largest;
+        peak_outputs(sim, i, out + PER_STRESS * i + STRESS_PEAK_STRESS);
+    }
+    sim->scratch.used = mark;
+}
+
 static void output_energies(Simulation *sim) {
     size_t mark = sim->scratch.used;
     const System *system = system_of(sim);
@@ -180,6 +199,9 @@ PRBM bool compute_outputs(Simulation *sim, int groups, bool near, Problem *probl
     if (groups & ENERGIES) {
         output_energies(sim);
     }
+    if (groups & STRESSES) {
+        output_stresses(sim);
+    }
     return !(groups & MOBILITIES) || output_mobilities(sim, problem);
 }
 
@@ -196,6 +218,9 @@ PRBM int output_groups(const Simulation *sim, int slot) {
     }
     if (slot >= slots->base && slot < slots->energies) {
         return PLACES | MOTION | BASE;
+    }
+    if (slot >= slots->stresses && slot < slots->frequency) {
+        return PLACES | MOTION | STRESSES;
     }
     bool potential = slot == slots->energies + ENERGY_ELASTIC ||
                      slot == slots->energies + ENERGY_GRAVITATIONAL;

@@ -7,6 +7,7 @@
 #include "hybrid/configuration.h"
 #include "hybrid/contact_modes.h"
 #include "hybrid/impacts.h"
+#include "hybrid/peaks.h"
 #include "hybrid/present.h"
 #include "hybrid/simulation.h"
 #include "hybrid/stability.h"
@@ -50,6 +51,7 @@ static void place_numbers(State *state, const Mechanism *m, Memory *memory) {
         {&state->arc.y, ny},         {&state->arc.k, STAGES * ny},
         {&state->arc.before.y, ny - 2}, {&state->arc.before.a, (size_t)m->coordinate_count},
         {&state->fastest, (size_t)m->coordinate_count},
+        {&state->peaks, PEAK_NUMBERS * (size_t)m->stressed_count},
         {&state->floors, s},         {&state->accepted, (size_t)m->coordinate_count},
         {&state->states, 2 * (size_t)m->independent_count + 2},
     };
@@ -433,6 +435,7 @@ PRBM bool start_motion(Simulation *sim, double start_time, double tolerance, Sim
     }
     state->tolerance = lesser(state->tolerance, TOLERANCE_USED_MAX);
     set_scales(configuration, state->frequency);
-    state->started = release_mechanism(sim, problem);
+    clear_peaks(sim);
+    state->started = release_mechanism(sim, problem) && restart_peaks(sim, problem);
     return state->started;
 }

@@ -94,10 +94,25 @@ typedef struct {
     double *received;                     /* (3 per force): impulses that have acted */
     double *front, *k1;                   /* (ny,): state at the end of the last step, its rates */
     double *fastest;                      /* (n,): shape of the fastest mode */
+    double *peaks;                        /* (stressed flexures, PEAK_NUMBERS), see peaks.c */
     double *floors;                       /* (s,): depth below zero at which gaps close */
     double *accepted;                     /* model exchange: (n,) angles of the last step */
     double *states;                       /* model exchange: the states as they were set */
 } State;
+
+/* The largest stress in a flexure at one time, with the number and position of its section. */
+typedef struct {
+    double time, stress, place, position;
+} Sample;
+
+/* The largest stress in a flexure so far.  known: the number of the last samples of the smooth
+ * motion; ahead: whether next is a sample at the front, which counts once the time reaches it. */
+typedef struct {
+    double stress, time, position, known, ahead;
+    Sample last[2], next;
+} Peak;
+
+enum { PEAK_NUMBERS = sizeof(Peak) / sizeof(double) };
 
 /* Equations in a contact state that is being tried, and their evaluation. */
 typedef struct {
@@ -140,7 +155,7 @@ typedef struct {
 /* Groups of present quantities: outputs, the rates and, in model exchange, the front itself. */
 enum {
     NOTHING = 0, PLACES = 1, MOTION = 2, BASE = 4, ENERGIES = 8, MOBILITIES = 16, RATES = 32,
-    FRONT = 64
+    FRONT = 64, STRESSES = 128
 };
 
 /* The present state, its outputs and rates.  They are valid only if they are fresh: read them by

@@ -4,6 +4,7 @@
 #include "core/vectors.h"
 #include "hybrid/arc.h"
 #include "hybrid/events.h"
+#include "hybrid/peaks.h"
 #include "hybrid/simulation.h"
 #include "hybrid/stability.h"
 #include "hybrid/stepping.h"
@@ -261,9 +262,12 @@ PRBM bool take_step(Simulation *sim, Problem *problem) {
     Stepping *stepping = &sim->stepping;
     int ny = state_size(sim);
     double h = 0.0, longest = sim->equations.walls_move ? follow_cubics(sim) : HUGE_VAL;
-    if (!state->has_k1 && !rate(&sim->equations, state->front_time, state->front, NULL,
-                                &stepping->evaluation, state->k1, problem)) {
-        return false;
+    if (!state->has_k1) {
+        if (!rate(&sim->equations, state->front_time, state->front, NULL, &stepping->evaluation,
+                  state->k1, problem)) {
+            return false;
+        }
+        restart_peaks_from(sim, &stepping->evaluation);
     }
     sim->steps += 1.0;
     if (!find_step(sim, longest, &h, problem)) {
@@ -284,9 +288,10 @@ PRBM bool take_step(Simulation *sim, Problem *problem) {
     }
     state->arc.valid = true;
     if (event.kind != EVENT_NONE) {
-        return cut_step(sim, &event, problem);
+        return cut_step(sim, &event, problem) && step_peaks_to_event(sim, problem);
     }
     state->front_time = end;
+    step_peaks(sim, &stepping->evaluation);
     state->has_k1 = true;
     copy(ny, state->arc.k + (STAGES - 1) * ny, state->k1);
     return true;
