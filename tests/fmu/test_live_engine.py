@@ -124,7 +124,7 @@ def test_modes_equal_those_of_the_python_package():
 
 
 def test_repeated_runs_need_no_more_memory():
-    found = simulated(mechanism("PRBDM"), ["stop.gap"], steps=100, repeat=200, drawing=True)
+    found = simulated(mechanism("PRBDM"), ["stop.gap"], steps=100, repeat=50, drawing=True)
     first, last = found["memory"]
     assert last == first
 
