@@ -6,6 +6,7 @@ message is raised as :class:`KernelError`.  After each call the working memory m
 """
 
 import ctypes
+import math
 import re
 import shutil
 import subprocess
@@ -119,7 +120,9 @@ def constants() -> dict[str, int]:
         number = -1
         for entry in filter(None, (part.strip() for part in body.split(","))):
             name, _, given = (part.strip() for part in entry.partition("="))
-            number = int(given) if given else number + 1
+            factors = (factor.strip() for factor in given.split("*"))
+            known = (found[x] if x in found else int(x) for x in factors if x)
+            number = math.prod(known) if given else number + 1
             found[name] = number
     return found
 

@@ -278,7 +278,8 @@ class Stage {
       this.pivots[k].setAttribute("d", circles.join(""));
     });
     description.bodies.forEach((body, k) => {
-      this.bodies[k].setAttribute("d", `${this.path(shapes.body(k, shape.poses))}Z`);
+      const lines = [shapes.body(k, shape.poses), ...shapes.holes(k, shape.poses)];
+      this.bodies[k].setAttribute("d", lines.map((line) => `${this.path(line)}Z`).join(""));
       const [x, y] = this.screen(shape.poses.get(body.name).centre);
       this.centres[k].setAttribute("d", `M${x - 5},${y}h10M${x},${y - 5}v10`);
     });
