@@ -528,7 +528,7 @@ def test_a_missing_package_is_named(monkeypatch, capsys):
 FILE_MISTAKES = {
     ("title =", "titel ="): "unknown key titel; did you mean title?",
     ("mass = 0.053187", "mass = [1]"): "bodies.0.mass (of shuttle) = [1]: write a number, or an",
-    ("mass = 0.053187", ""): "bodies.0.mass (of shuttle) is missing: add the key",
+    ("mass = 0.053187", ""): "shuttle.mass is missing: add the key, or outline",
     (
         'point = ["shuttle.width"',
         'bounce = 1\npoint = ["shuttle.width"',

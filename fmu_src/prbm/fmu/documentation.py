@@ -200,7 +200,7 @@ def _flexures(mechanism: Mechanism) -> str:
 
 def _summary(mechanism: Mechanism, flavour: str, live: LivePart | None = None) -> str:
     drawing = escape(mechanism.drawing.strip("\n"))
-    figure = f'<figure class="static-figure"><pre>{drawing}</pre></figure>' if drawing else ""
+    figure = f"<figure><pre>{drawing}</pre></figure>" if drawing else ""
     return (
         f"<h1>{escape(mechanism.name)}</h1>\n"
         f"<p><strong>{escape(mechanism.title)}.</strong> "

@@ -392,7 +392,6 @@ async function open() {
   const [tables, bytes] = await Promise.all([unpacked("live-tables"), unpacked("live-module")]);
   const kernel = await Kernel.compile(bytes);
   byId("live").hidden = false;
-  document.documentElement.classList.add("is-live");
   const page = new Page(description, kernel, tables);
   page.follow();
 }

@@ -11,8 +11,8 @@ from ...mechanics.assembly import assemble
 from ...mechanics.system import Outline, System
 from ...mechanism.description import Mechanism
 from ...mechanism.expressions import Quantity, affine
-from ...mechanism.flexure import PIN
-from ...mechanism.parts import Flexure, Joint, Part, Point, Stop, body_of
+from ...mechanism.flexure import FILLET_NODES, NOTCH, PIN, THICK_NODES
+from ...mechanism.parts import Flexure, FlexureType, Joint, Part, Point, Stop, body_of
 from ...runs.experiment import Experiment
 
 Json = Any
@@ -68,6 +68,8 @@ def content(
                 "name": body.name,
                 "centre": _point(body.centre),
                 "points": [_point(point) for point in body.points.values()],
+                "outline": [_point(corner) for corner in body.outline],
+                "holes": [[_point(corner) for corner in hole] for hole in body.holes],
             }
             for body in mechanism.bodies
         ],
@@ -210,7 +212,8 @@ def _flexures(mechanism: Mechanism, system: System) -> list[dict[str, Json]]:
         if outline.kind != "flexure":
             continue
         flexure = named[outline.name]
-        model = mechanism.model(types[flexure.type])
+        kind = types[flexure.type]
+        model = mechanism.model(kind)
         beam, ends = bool(model.order), _ends(mechanism, flexure)
         guided = [end != PIN for end in flexure.ends]
         if not beam and _backwards(mechanism, system, flexure, outline):
@@ -220,12 +223,19 @@ def _flexures(mechanism: Mechanism, system: System) -> list[dict[str, Json]]:
             {
                 "name": flexure.name,
                 "beam": beam,
-                "corners": model.nodes if beam else len(outline.c),
+                "corners": _nodes(kind, model.nodes) if beam else len(outline.c),
                 "guided": guided,
                 "ends": ends,
             }
         )
     return result
+
+
+def _nodes(kind: FlexureType, nodes: int) -> int:
+    """Return the number of nodes in all panels of a beam, see :mod:`prbm.mechanics.profile`."""
+    if kind.profile != NOTCH:
+        return nodes
+    return nodes + 2 * THICK_NODES + (0 if kind.hinge else 2 * FILLET_NODES)
 
 
 def _backwards(mechanism: Mechanism, system: System, flexure: Flexure, outline: Outline) -> bool:

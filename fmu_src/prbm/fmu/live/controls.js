@@ -150,7 +150,7 @@ function parsed(text) {
 }
 
 function shownText(quantity, value) {
-  return String(Number((value * quantity.factor).toPrecision(10)));
+  return String(Number((value * quantity.factor).toPrecision(7)));
 }
 
 // Return the bounds of a quantity as text, without those that are far from usual values.

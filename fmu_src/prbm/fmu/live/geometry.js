@@ -180,7 +180,7 @@ class Shapes {
   extent() {
     const { bodies, flexures } = this.description;
     const points = [
-      ...bodies.flatMap((body) => [body.centre, ...body.points]),
+      ...bodies.flatMap((body) => [body.centre, ...body.points, ...body.outline]),
       ...flexures.flatMap((flexure) => flexure.ends.map((end) => end.point)),
     ].map((point) => pointOf(point, this.values));
     const spans = [0, 1].map((axis) => {
@@ -190,14 +190,18 @@ class Shapes {
     return Math.max(...spans);
   }
 
+  // Return the corners of a body: those of its outline, or of a shape around its points.
   outline(body) {
+    const { centre } = this.drawn.get(body.name);
+    if (body.outline.length) {
+      return body.outline.map((corner) => minus(pointOf(corner, this.values), centre));
+    }
     const points = body.points.map((point) => pointOf(point, this.values));
     this.description.stops.forEach((stop, k) => {
       if (stop.body === body.name) {
         points.push(this.hits[k]);
       }
     });
-    const { centre } = this.drawn.get(body.name);
     return bodyOutline(
       points.map((point) => minus(point, centre)),
       this.size,
@@ -262,6 +266,12 @@ class Shapes {
   body(k, poses) {
     const pose = poses.get(this.description.bodies[k].name);
     return this.outlines[k].map((corner) => plus(pose.centre, turned(corner, pose.arm)));
+  }
+
+  // Return the holes of a body, each as a list of corners.
+  holes(k, poses) {
+    const { name, holes } = this.description.bodies[k];
+    return holes.map((hole) => hole.map((corner) => this.carried(name, corner, poses)));
   }
 
   hitPoint(k, poses) {

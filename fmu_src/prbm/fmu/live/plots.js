@@ -17,9 +17,16 @@ function plotList(description, column) {
   const bodies = (suffix) =>
     moving.map((body) => series(`${body}.${suffix}`, `${words(body)} ${suffix}`));
   const energies = ["kinetic", "elastic", "gravitational", "dissipated", "work"];
-  const plots = [
+  const displacements = [
     { title: "Displacement", unit: "m", series: bodies(axis), walls: axis },
     { title: "Velocity", unit: "m/s", series: bodies(`v${axis}`) },
+  ];
+  const rotations = [
+    { title: "Rotation", unit: "rad", series: bodies("angle") },
+    { title: "Angular velocity", unit: "rad/s", series: bodies("omega") },
+  ];
+  const plots = [
+    ...(release.start === "angle" ? rotations : displacements),
     { title: "Energy", unit: "J", series: energies.map((name) => series(`energy.${name}`, name)) },
   ];
   const forces = description.stops

@@ -63,10 +63,9 @@ class Stage {
       this.handle(stop.quantity, `Wall of ${words(stop.name)}`, "wall-handle"),
     );
     const { release } = this.description;
-    this.bodyHandle =
-      release.quantity && release.start !== "angle"
-        ? this.handle(release.quantity, `Released ${words(release.body)}`, "body-handle")
-        : null;
+    this.bodyHandle = release.quantity
+      ? this.handle(release.quantity, `Released ${words(release.body)}`, "body-handle")
+      : null;
   }
 
   // Add a handle, which is a slider for assistive technology.
@@ -105,7 +104,7 @@ class Stage {
     const start = this.world(event);
     const value = this.actions.value(name);
     const along = node.along;
-    const fine = 0.25 / this.pixels;
+    const fine = (0.25 / this.pixels) * norm(along);
     this.actions.grab(name);
     this.holding = true;
     const amount = (moved) => {
@@ -279,7 +278,8 @@ class Stage {
       this.pivots[k].setAttribute("d", circles.join(""));
     });
     description.bodies.forEach((body, k) => {
-      this.bodies[k].setAttribute("d", `${this.path(shapes.body(k, shape.poses))}Z`);
+      const lines = [shapes.body(k, shape.poses), ...shapes.holes(k, shape.poses)];
+      this.bodies[k].setAttribute("d", lines.map((line) => `${this.path(line)}Z`).join(""));
       const [x, y] = this.screen(shape.poses.get(body.name).centre);
       this.centres[k].setAttribute("d", `M${x - 5},${y}h10M${x},${y - 5}v10`);
     });
@@ -313,10 +313,24 @@ class Stage {
       this.place(this.wallHandles[k], plus(point, beside), into, stop.quantity);
     });
     if (this.bodyHandle) {
-      const { body, direction, quantity } = this.description.release;
-      const { centre } = shape.poses.get(body);
-      this.place(this.bodyHandle, centre, unitVector(direction), quantity);
+      this.placeBodyHandle(shapes, shape);
     }
+  }
+
+  // Place the handle of the released body at its centre or, for a release by an angle, at the corner
+  // that is farthest from it.
+  placeBodyHandle(shapes, shape) {
+    const { body, direction, quantity, start } = this.description.release;
+    const { centre } = shape.poses.get(body);
+    if (start !== "angle") {
+      this.place(this.bodyHandle, centre, unitVector(direction), quantity);
+      return;
+    }
+    const index = this.description.bodies.findIndex(({ name }) => name === body);
+    const arms = shapes.body(index, shape.poses).map((corner) => minus(corner, centre));
+    const arm = arms.reduce((a, b) => (norm(b) > 1.001 * norm(a) ? b : a));
+    const along = times(1 / norm(arm) ** 2, turned([0, 1], arm)); // Radians for a metre.
+    this.place(this.bodyHandle, plus(centre, arm), along, quantity);
   }
 
   place(handle, point, along, name) {
