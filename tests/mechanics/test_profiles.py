@@ -13,7 +13,9 @@ from scipy.optimize import newton
 from prbm.base.errors import MechanismError, ParameterError
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.modal import modes
+from prbm.mechanics.sections import static_section_loads
 from prbm.mechanics.statics import equilibrium
+from prbm.mechanics.stress import faces, stress
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.parts import Body, Flexure, FlexureType, Force, Release
 
@@ -418,3 +420,101 @@ def test_a_curved_beam_is_the_same_from_either_end(name):
         systems.append(cantilever(k, backwards=backwards))
     load = 0.3j / L * E * WIDTH * 5e-4**3 / 12 / L
     assert tip(systems[0], load)[0] == pytest.approx(tip(systems[1], load)[0], abs=1e-9 * L)
+
+
+# --- forces, moments and stress in the sections -------------------------------------------------
+
+
+def sections_of(system, force, moment):
+    """Return the loads in the sections of a cantilever whose tip is loaded [N], [N m]."""
+    loads = {"force.x": force.real, "force.y": force.imag, "force.moment": moment}
+    shape = equilibrium(system, loads=loads)
+    return static_section_loads(system, shape, {"force.x": force.real, "force.y": force.imag})[0]
+
+
+def exact_loads(name, force, moment, position):
+    """Return normal force and bending moment of a straight cantilever at positions [N], [N m]."""
+    y = np.array([elastica(name, force, moment)[1], 0.0, 0.0])
+    ends = np.unique([*panels(name), *position])[::-1]
+    found = {}
+    for start, end in [(L, L), *pairwise(ends)]:
+
+        def change(s, y):
+            M = moment - (complex(y[1], -y[2]) * force).imag
+            return [M / rigidity(name, s), math.cos(y[0]), math.sin(y[0])]
+
+        if start > end:
+            y = solve_ivp(change, (start, end), y, method="DOP853", rtol=1e-10, atol=1e-14).y[:, -1]
+        M = moment - (complex(y[1], -y[2]) * force).imag
+        found[end] = (force.conjugate() * complex(math.cos(y[0]), math.sin(y[0]))).real, M
+    return np.array([found[s] for s in position]).T
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+@pytest.mark.parametrize("name", KINDS)
+def test_sections_of_a_profile_carry_the_loads_of_the_boundary_value_problem(name, backwards):
+    slope = math.radians(40.0)
+    moment = 0.5 * slope / weakness(name, lambda s: 1.0)
+    force = 0.6j * slope / weakness(name, lambda s: L - s)
+    force -= 0.3 * abs(force)
+    k = KINDS[name]
+    if backwards and k.profile == "taper":  # The start is the other end.
+        k = replace(k, thickness=k.end_thickness, end_thickness=k.thickness,
+                    width=k.end_width or k.width, end_width=k.width)  # fmt: skip
+    found = sections_of(cantilever(k, backwards=backwards), force, moment)
+    order = slice(None, None, -1) if backwards else slice(None)
+    position = (L - found.position if backwards else found.position)[order].clip(0.0, L)
+    tension, bending = exact_loads(name, force, moment, position)
+    bent = -found.bending if backwards else found.bending
+    # The direction at a waist between two nodes is interpolated.
+    waist = abs(abs(position - L / 2) - (k.waist_length or 0.0) / 2) < 1e-12
+    bounds = np.where(waist, 5e-3, 2e-4) * abs(force)
+    assert np.all(abs(found.tension[order] - tension) < bounds)
+    bent, exact = bent[order] / found.modulus[order], bending / found.modulus[order]
+    np.testing.assert_allclose(bent, exact, atol=1e-3 * abs(exact).max())
+    h, b = (np.array([f(name, s) for s in position]) for f in (thickness, width))
+    np.testing.assert_allclose(found.area[order], b * h, rtol=1e-6)
+    np.testing.assert_allclose(found.modulus[order], b * h**2 / 6, rtol=1e-6)
+
+
+@pytest.mark.parametrize("nodes", [8, 9])
+@pytest.mark.parametrize("name", [n for n in KINDS if KINDS[n].profile == "notch"])
+def test_a_notch_under_a_moment_has_the_largest_stress_at_its_waist(name, nodes):
+    k = replace(KINDS[name], nodes=nodes)
+    moment = 0.3 / weakness(name, lambda s: 1.0)
+    loads = sections_of(cantilever(k), 0j, moment)
+    found = stress(loads)
+    assert found.largest == pytest.approx(6 * moment / (WIDTH * 5e-4**2), rel=1e-9)
+    assert found.position == pytest.approx(0.5 * (L - (k.waist_length or 0.0)), abs=1e-12)
+    left, right = faces(loads)
+    np.testing.assert_allclose(left, -right, rtol=1e-9)
+    assert np.all(np.diff(loads.position) > 0.0)
+
+
+@pytest.mark.parametrize("name", CURVED)
+def test_sections_of_a_curved_beam_balance_the_loads_at_its_tip(name):
+    """The moment in a section is that of the tip's loads about it, in the deflected shape."""
+    stiffness = math.radians(40.0) * E * WIDTH * 5e-4**3 / 12 / L
+    force, moment = (0.8j - 0.6) * stiffness / L, 0.5 * stiffness
+    system = cantilever(curved(name, order=7, nodes=12))
+    loads = {"force.x": force.real, "force.y": force.imag, "force.moment": moment}
+    shape = equilibrium(system, loads=loads)
+    e = system.directions(shape.q)
+    found = static_section_loads(system, shape, {"force.x": force.real, "force.y": force.imag})[0]
+    frame = system.bodies["tip"]
+    end = complex(frame.A @ e) + frame.c
+    nodes = (system.A @ e + system.c)[system.connections[0].flexure.masses]
+    z = np.array([0.0, *nodes, end])
+    expected = moment + ((end - z).conj() * force).imag
+    np.testing.assert_allclose(found.bending, expected, atol=1e-4 * abs(expected).max())
+    curvature, rise = CURVED[name]
+    u = found.position / found.position[-1]  # along an arc
+    if rise:
+        assert found.position[-1] == pytest.approx(
+            quad(lambda t: drawn(0.0, rise, t)[1], 0.0, 1.0)[0], rel=1e-6
+        )
+    else:
+        turned = np.array([0.0, *np.angle(e[system.connections[0].flexure.arms]), shape.q[frame.j]])
+        angle = turned + drawn(curvature, rise, u)[0]
+        tension = (force.conjugate() * np.exp(1j * angle)).real
+        np.testing.assert_allclose(found.tension, tension, atol=1e-9 * abs(force))
