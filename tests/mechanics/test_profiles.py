@@ -477,6 +477,25 @@ def test_sections_of_a_profile_carry_the_loads_of_the_boundary_value_problem(nam
     np.testing.assert_allclose(found.modulus[order], b * h**2 / 6, rtol=1e-6)
 
 
+@pytest.mark.parametrize("backwards", [False, True])
+@pytest.mark.parametrize("name", KINDS)
+def test_sections_of_a_hanging_profile_carry_the_weight_beyond_them(name, backwards):
+    hanging = replace(cantilever(KINDS[name], backwards=backwards).mechanism, gravity=(9.81, 0.0))
+    system = assemble(hanging, hanging.values())
+    found = static_section_loads(system, equilibrium(system))[0]
+    weight = 9.81 * (system.m.sum() - 1e-3)
+
+    def density(s):
+        return 9.81 * RHO * width(name, s) * thickness(name, s)
+
+    # Seen from the start; the tip is the start of a flexure that runs backwards.
+    beyond = [quad(density, 0.0, s, points=panels(name), limit=200)[0] for s in found.position]
+    expected = 9.81e-3 + (np.array(beyond) if backwards else weight - np.array(beyond))
+    np.testing.assert_allclose(found.tension, expected, atol=0.05 * weight)
+    assert abs(found.bending).max() < 1e-9 * weight * L
+    assert found.tension[-1 if backwards else 0] == pytest.approx(9.81e-3 + weight, rel=1e-9)
+
+
 @pytest.mark.parametrize("nodes", [8, 9])
 @pytest.mark.parametrize("name", [n for n in KINDS if KINDS[n].profile == "notch"])
 def test_a_notch_under_a_moment_has_the_largest_stress_at_its_waist(name, nodes):
