@@ -187,11 +187,12 @@ SIZED void map_beam(int size, const BlockMap *map, const double *ALONE x, double
             sum[i] += each * aligned_lanes(change + c * even + i);
         }
     }
+    const int pairs = size - size % PAIR;
     UNROLLED
-    for (int i = 0; i < size - size % PAIR; i += LANES) {
+    for (int i = 0; i < pairs; i += LANES) {
         set_lanes(out + map->start + i, sum[i]);
     }
-    if (size % PAIR != 0) {
+    if (pairs < size) {
         out[map->start + size - 1] = LANE(sum[size - 1], 0);
     }
 }
