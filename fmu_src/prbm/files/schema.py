@@ -69,8 +69,13 @@ IDENTIFIER = "^[A-Za-z_][A-Za-z0-9_]*$"
 # --- tables -----------------------------------------------------------------------------------
 
 
-MIRROR: Any = Field((), description='Line of symmetry, "x = ..." or "y = ...", or a list of both')
-REPEAT: Any = Field(None, description="Equal parts in a row or on a circle")
+# Each field has an object of its own: releases of pydantic before 2.12 change it with its class.
+def _mirror() -> Any:
+    return Field((), description='Line of symmetry, "x = ..." or "y = ...", or a list of both')
+
+
+def _repeat() -> Any:
+    return Field(None, description="Equal parts in a row or on a circle")
 
 
 class Section(Named):
@@ -158,8 +163,8 @@ class FlexureTable(Section):
         description="Type of both ends, or a pair for start and end; the other end of a free one "
         "must be a clamp",
     )
-    mirror: LineOrLines = MIRROR
-    repeat: RepeatTable | None = REPEAT
+    mirror: LineOrLines = _mirror()
+    repeat: RepeatTable | None = _repeat()
 
 
 _GIVEN: Any = {"required": [*GIVEN]}
@@ -200,8 +205,8 @@ class BodyTable(Named):
         None, description="Name of the material of the plate, in place of density"
     )
     density: Annotated[Quantity, measured(parts.FlexureType, "density")] | None = None
-    mirror: LineOrLines = MIRROR
-    repeat: RepeatTable | None = REPEAT
+    mirror: LineOrLines = _mirror()
+    repeat: RepeatTable | None = _repeat()
 
 
 class JointTable(Named):
@@ -209,8 +214,8 @@ class JointTable(Named):
 
     start: Reference = Field(description="First point, body.point or ground.point")
     end: Reference = Field(description="Second point, body.point or ground.point")
-    mirror: LineOrLines = MIRROR
-    repeat: RepeatTable | None = REPEAT
+    mirror: LineOrLines = _mirror()
+    repeat: RepeatTable | None = _repeat()
 
 
 class StopTable(Named):
