@@ -208,6 +208,8 @@ def test_fmi_2_has_no_terminals_but_an_icon(fmu):
         names = archive.namelist()
     assert any(name.startswith("terminalsAndIcons") for name in names) == (fmu.fmi == 3)
     assert ("model.png" in names) == (fmu.fmi == 2)
+    folder = "documentation" if fmu.fmi == 2 else "terminalsAndIcons"
+    assert etree.fromstring(member(fmu.path, f"{folder}/icon.svg")).tag.endswith("}svg")
 
 
 def test_terminals_name_variables_that_exist(fmu):

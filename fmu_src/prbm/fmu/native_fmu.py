@@ -28,6 +28,11 @@ from .slave.resolved import resolved
 from .start import interface, magnitudes, start_sample
 
 NAMESPACE = uuid.UUID("f0b6b5a1-6d5c-5b0e-8c55-1a52a0e6f1d3")
+# Paths of the PNG and the SVG.  FMI 2.0 has no place for an SVG but the documentation.
+ICONS = {
+    2: ("model.png", "documentation/icon.svg"),
+    3: ("terminalsAndIcons/icon.png", "terminalsAndIcons/icon.svg"),
+}
 LICENSES = ("prbm-impact.txt", "zig.txt")
 WINDOWS_LICENSE, LIVE_LICENSE = "mingw-w64.txt", "wasi-libc.txt"
 
@@ -68,7 +73,7 @@ def build(
         If the mechanism cannot start with these values, one of them is invalid, or there is no
         compiler for a platform.
     """
-    from ..drawing.icon import icon  # Imported here: Matplotlib takes half a second.
+    from ..drawing.icon import icon, vector_icon  # Imported here: Matplotlib takes half a second.
 
     changes = dict(changes or {})
     progress("checking the start")
@@ -96,8 +101,9 @@ def build(
     results = reference(mechanism, changes, native.variables, default, progress)
     contents |= results
     progress("drawing the icon and writing the documentation")
-    png = icon(mechanism, start_sample(mechanism, changes))
-    contents["model.png" if fmi == 2 else "terminalsAndIcons/icon.png"] = png
+    sample = start_sample(mechanism, changes)
+    png, svg = ICONS[fmi]
+    contents |= {png: icon(mechanism, sample), svg: vector_icon(mechanism, sample)}
     names = sorted(platform.name for platform in compiled)
     part = live(mechanism, native, default, table, progress)
     contents["documentation/index.html"] = documentation.native_page(

@@ -94,7 +94,7 @@ def build(
     PrbmError
         If the mechanism cannot start with these values, or one of them is out of bounds.
     """
-    from ..drawing.icon import icon  # Imported here: Matplotlib takes half a second.
+    from ..drawing.icon import icon, vector_icon  # Imported here: Matplotlib takes half a second.
 
     changes = dict(changes or {})
     progress("checking the start")
@@ -112,7 +112,9 @@ def build(
     heading = replace(heading, guid=f"{{{uuid.uuid5(NAMESPACE, anonymous)}}}")
     contents["modelDescription.xml"] = model_description(heading, listed)
     contents["documentation/index.html"] = documentation.page(mechanism, listed, default).encode()
-    contents["model.png"] = icon(mechanism, start_sample(mechanism, changes))
+    sample = start_sample(mechanism, changes)
+    contents["model.png"] = icon(mechanism, sample)
+    contents["documentation/icon.svg"] = vector_icon(mechanism, sample)
     progress("packing")
     return zipped(contents)
 
