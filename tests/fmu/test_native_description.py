@@ -212,18 +212,6 @@ def test_fmi_2_has_no_terminals_but_an_icon(fmu):
     assert etree.fromstring(member(fmu.path, f"{folder}/icon.svg")).tag.endswith("}svg")
 
 
-def test_terminals_name_variables_that_exist(fmu):
-    if fmu.fmi == 2:
-        pytest.skip("FMI 2.0 has no terminals")
-    known = {v.name for v in read_model_description(str(fmu.path)).modelVariables}
-    root = etree.fromstring(member(fmu.path, "terminalsAndIcons/terminalsAndIcons.xml"))
-    named = [m.get("variableName") for m in root.iter("TerminalMemberVariable")]
-    stop, force = case(fmu.name).stop, case(fmu.name).force
-    wanted = {f"{stop}.gap", f"{stop}.displacement", f"{force}.x", "base.force.x"}
-    assert wanted <= {*named} <= known
-    assert member(fmu.path, "terminalsAndIcons/icon.png").startswith(b"\x89PNG")
-
-
 @each_shipped
 def test_dependencies_cover_every_output_and_derivative(model, mechanisms):
     native = described(mechanisms[model], {}, 3, clock=True)

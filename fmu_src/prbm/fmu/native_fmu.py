@@ -21,11 +21,12 @@ from .archive import zipped
 from .description import Heading
 from .live.content import content
 from .live.page import LivePart, live_part
-from .native_description import LOG_CATEGORIES, build_description, description, terminals
+from .native_description import LOG_CATEGORIES, build_description, description
 from .reference_results import reference
 from .slave.resolved import FILE as MODEL
 from .slave.resolved import resolved
 from .start import interface, magnitudes, start_sample
+from .terminals import terminals
 
 NAMESPACE = uuid.UUID("f0b6b5a1-6d5c-5b0e-8c55-1a52a0e6f1d3")
 # Paths of the PNG and the SVG.  FMI 2.0 has no place for an SVG but the documentation.
@@ -95,7 +96,7 @@ def build(
     }
     if fmi == 3:
         contents["sources/buildDescription.xml"] = build_description(name, source)
-        contents["terminalsAndIcons/terminalsAndIcons.xml"] = terminals(mechanism)
+        contents["terminalsAndIcons/terminalsAndIcons.xml"] = terminals(mechanism, native.variables)
     contents |= dict(_binaries(name, fmi, compiled))
     progress("computing the reference results")
     results = reference(mechanism, changes, native.variables, default, progress)
