@@ -18,6 +18,8 @@ from ..runs.experiment import experiment
 from . import documentation
 from .archive import zipped
 from .description import Heading, model_description
+from .parameter_sets import default_set
+from .related import related_files
 from .slave.resolved import FILE, resolved
 from .slave.slave import MechanismSlave
 from .start import interface, start_sample
@@ -115,6 +117,7 @@ def build(
     sample = start_sample(mechanism, changes)
     contents["model.png"] = icon(mechanism, sample)
     contents["documentation/icon.svg"] = vector_icon(mechanism, sample)
+    contents |= related_files([default_set(mechanism, listed)])
     progress("packing")
     return zipped(contents)
 
