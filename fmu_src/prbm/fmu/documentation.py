@@ -508,11 +508,14 @@ def _native_use(
     experiment: Experiment,
     with_reference: bool,
 ) -> str:
-    reference = (
-        " The folder <code>extra</code> holds reference results: the outputs of the default "
-        "experiment, computed by the Python engine."
+    folder = "<code>extra/org.fmi-standard.fmi-ls-ref</code>"
+    reference = f" The folder {folder} has the start values as a parameter set (SSV)"
+    reference += (
+        ", and reference results, computed by the Python engine: the default experiment, a smoke "
+        "test, and a validation with the values before and after each impact. Its "
+        "<code>README.txt</code> explains the comparison."
         if with_reference
-        else ""
+        else "."
     )
     event_mode = "    use_event_mode=True,\n    early_return_allowed=True,\n"
     options = event_mode if interface.clocks else ""

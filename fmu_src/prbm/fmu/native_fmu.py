@@ -22,7 +22,9 @@ from .description import Heading
 from .live.content import content
 from .live.page import LivePart, live_part
 from .native_description import LOG_CATEGORIES, build_description, description
+from .parameter_sets import default_set
 from .reference_results import reference
+from .related import related_files
 from .slave.resolved import FILE as MODEL
 from .slave.resolved import resolved
 from .start import interface, magnitudes, start_sample
@@ -100,7 +102,7 @@ def build(
     contents |= dict(_binaries(name, fmi, compiled))
     progress("computing the reference results")
     results = reference(mechanism, changes, native.variables, default, progress)
-    contents |= results
+    contents |= related_files([default_set(mechanism, native.variables), *results])
     progress("drawing the icon and writing the documentation")
     sample = start_sample(mechanism, changes)
     png, svg = ICONS[fmi]
