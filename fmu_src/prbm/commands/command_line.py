@@ -87,6 +87,7 @@ def parser() -> argparse.ArgumentParser:
     _picture(commands)
     _animate(commands)
     _explore(commands)
+    _modelica(commands)
     _validate(commands)
     _completion(commands)
     return p
@@ -395,6 +396,30 @@ def _explore(commands: Commands) -> None:
         "--no-open", action="store_false", dest="open", help="do not open the page in the browser"
     )
     set_argument(parser, "value of a parameter or input")
+    parameters_argument(parser)
+
+
+def _modelica(commands: Commands) -> None:
+    parser = add_command(
+        commands, "modelica", "modelica:write_wrapper",
+        "write a Modelica package around the FMU of a mechanism: signals, and forces as flanges",
+        examples("prbm modelica PRBDM", "prbm modelica PRBDM --names underscore --out Guide.mo"),
+        details="Import the FMU in the Modelica tool first: the package contains that block.",
+    )  # fmt: skip
+    mechanism_argument(parser)
+    add = parser.add_argument
+    add(
+        "--names", default="structured", choices=("structured", "underscore"),
+        help="names of variables in the imported block: force.x, or force_x as in OpenModelica "
+        "(default: %(default)s)",
+    )  # fmt: skip
+    add(
+        "--fmu", metavar="CLASS",
+        help="name of the imported block (default: MECHANISM_fmu, with --names underscore "
+        "MECHANISM_me_FMU)",
+    )  # fmt: skip
+    add("--out", type=Path, metavar="FILE.mo", help="file to write (default: MECHANISMWrapper.mo)")
+    set_argument(parser, "start value of a parameter or input")
     parameters_argument(parser)
 
 

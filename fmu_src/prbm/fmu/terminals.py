@@ -92,7 +92,7 @@ def _force(ports: Element, mechanism: Mechanism, force: Force, known: set[str]) 
     members |= {member: f"{force.body}.{member}" for member in MOTION_MEMBERS}
     text = f"Force on {pushed(force)}, and the motion of the {force.body}"
     group = _group(ports, force.name, FORCE_KIND, text, members, known)
-    point = _point(mechanism, force)
+    point = displaced(mechanism, force)
     for axis in "xy" if point else "":
         flange = {"s": (f"{point}.{axis}", SIGNAL), "f": (f"{force.name}.{axis}", INFLOW)}
         text = f"Displacement of {pushed(force)} along {axis}, and the force on it"
@@ -102,7 +102,7 @@ def _force(ports: Element, mechanism: Mechanism, force: Force, known: set[str]) 
     _port(group, "flange_moment", ROTATION, text, turned, known)
 
 
-def _point(mechanism: Mechanism, force: Force) -> str | None:
+def displaced(mechanism: Mechanism, force: Force) -> str | None:
     """Return the prefix of the displacements of the point of a force, None if it has none.
 
     It is that of the body if the force acts on the centre of mass, otherwise that of a probe at the
