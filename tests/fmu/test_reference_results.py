@@ -22,8 +22,6 @@ from prbm.runs.experiment import Experiment
 from support import COSTLY_MODELS, GUIDES, each_shipped, mechanism
 
 SCHEMAS = Path(fmpy.__file__).parent / "schema"
-SAME = 1e-9  # Times of equal rows [s].
-AWAY = 1e-6  # Rows nearer to an impact are not compared [s].
 EQUAL_RTOL = 1e-5  # Of the largest magnitude in a column, as README.txt states.
 EXCHANGE_RTOL = 1e-3
 
@@ -54,13 +52,14 @@ def compared(fmu: Path, expected: np.ndarray, found: np.ndarray, rtol: float = E
     listed = {v.name: v for v in read_model_description(str(fmu)).modelVariables}
     time = expected["time"]
     impacts = time[1:][np.diff(time) == 0.0]
+    near_impact, same = reference.NEAR_IMPACT * time[1], reference.SAME_TIME * time[1]
     pairs = []
     for k, t in enumerate(time):
-        near = np.flatnonzero(np.abs(found["time"] - t) < SAME)
+        near = np.flatnonzero(np.abs(found["time"] - t) < same)
         if t in impacts:
             if len(near) > 1:
                 pairs.append((k, near[0] if k + 1 < len(time) and time[k + 1] == t else near[-1]))
-        elif not len(impacts) or np.abs(impacts - t).min() > AWAY:
+        elif not len(impacts) or np.abs(impacts - t).min() > near_impact:
             pairs.append((k, near[-1]))
     at, other = np.array(pairs).T
     for name in expected.dtype.names[1:]:
@@ -155,6 +154,18 @@ def test_the_manifest_lists_the_files_of_the_layered_standard(native, fmus, kind
     root.tag, root.text = f"{{{NAMESPACE}}}fmiLayeredStandardManifest", None
     checker = etree.XMLSchema(file=str(SCHEMAS / "fmi3" / "fmi3LayeredStandardManifest.xsd"))
     assert checker.validate(root), checker.error_log
+
+
+def test_the_set_of_the_validation_contains_all_changed_inputs(tmp_path):
+    """Changed inputs are start values of the validation, too."""
+    small, changes = mechanism("PRBDM"), {"force.x": 0.02, "stop.restitution": 0.5}
+    found = reference.reference(small, changes, interface(small, changes), Experiment(0.1))
+    path = tmp_path / "x.ssv"
+    path.write_bytes(next(x.content for x in found if x.file == "PRBDM_validation.ssv"))
+    values = read_parameter_set(path, units_of(small))
+    assert values["force.x"] == 0.02
+    assert values["stop.restitution"] == 0.45
+    assert values["base.acceleration.x"] > 0.0
 
 
 def test_a_validation_that_fails_is_left_out(monkeypatch):
