@@ -138,17 +138,14 @@ def parts(mechanism: Mechanism, sample: Mapping[str, float]) -> list[IconPart]:
 
 def _faint_parts(shapes: Shapes) -> Iterator[IconPart]:
     """Yield flexures and bodies in the straight shape."""
-    for z in _flexure_lines(shapes, shapes.straight):
-        yield Line(z, GHOST, 1.0, 0.0)
+    yield from _flexures(shapes, shapes.straight, faint=True)
     for name in shapes.bodies:
         yield Area(shapes.areas(name, shapes.straight), None, GHOST, 0.0)
 
 
 def _parts(shapes: Shapes, E: Complex) -> Iterator[IconPart]:
     """Yield flexures, bodies and pins in a shape."""
-    thin = len(shapes.flexures) >= THIN_LINES_MIN
-    for z in _flexure_lines(shapes, E):
-        yield Line(z, STEEL, 1.5 if thin else 2.2, 3.0)
+    yield from _flexures(shapes, E)
     for name in shapes.bodies:
         yield Area(shapes.areas(name, E), BODY, STEEL, 2.0)
         yield Dots(np.array([shapes.centre(name, E)]), STEEL, 3.5, 4.0)
@@ -164,10 +161,14 @@ def _fixed_parts(shapes: Shapes, E: Complex) -> Iterator[IconPart]:
         yield Line(wall, WALL, 1.5, 3.5)
 
 
-def _flexure_lines(shapes: Shapes, E: Complex) -> Iterator[Complex]:
+def _flexures(shapes: Shapes, E: Complex, *, faint: bool = False) -> Iterator[IconPart]:
+    """Yield the flexures in a shape."""
+    thin = len(shapes.flexures) >= THIN_LINES_MIN
     for line in shapes.flexures:
         z = corners(line.outline, E)
-        yield z if len(z) - 2 > CURVED_PIVOTS_MAX else curve(z, line.guided)
+        z = z if len(z) - 2 > CURVED_PIVOTS_MAX else curve(z, line.guided)
+        width = 1.0 if faint else 1.5 if thin else 2.2
+        yield Line(z, GHOST if faint else STEEL, width, 0.0 if faint else 3.0)
 
 
 # --- PNG ----------------------------------------------------------------------------------------
