@@ -8,6 +8,7 @@ from pathlib import Path
 import fmpy
 import pytest
 from fmpy import simulate_fmu
+from fmpy.ssp.ssd import read_ssv
 from lxml import etree
 
 from prbm.base.errors import ParameterError
@@ -53,8 +54,11 @@ def test_sets_are_valid_and_read_back_exactly(model, tmp_path):
     assert content == parameter_set(chosen, variables)
     checker = etree.XMLSchema(file=str(SCHEMA))
     assert checker.validate(etree.fromstring(content)), checker.error_log
-    found = read_parameter_set(written(tmp_path, content), units_of(chosen))
-    assert found == chosen.values()
+    path = written(tmp_path, content)
+    assert read_parameter_set(path, units_of(chosen)) == chosen.values()
+    by_fmpy = {p.name: (float(p.value), p.unit) for p in read_ssv(str(path)).parameters}
+    expected = {p.name: (p.value, p.unit or None) for p in chosen.parameters}
+    assert by_fmpy == expected
 
 
 @pytest.mark.parametrize(
