@@ -31,7 +31,7 @@ def completed(line: str) -> list[str]:
     ("line", "words"),
     [
         ("prbm simu", ["simulate"]),
-        ("prbm m", ["modes", "measure"]),
+        ("prbm mo", ["modes", "modelica"]),
         ("prbm measure yo", ["youngs-modulus"]),
         ("prbm measure youngs-modulus --le", ["--length"]),
         ("prbm simulate --sto", ["--stop-time"]),

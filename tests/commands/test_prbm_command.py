@@ -29,9 +29,9 @@ from support import ROOT, SUPPORT
 
 PAGE = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")
 COMMANDS = (
-    "list", "modes", "equilibrium", "simulate", "stress", "shock", "fit", "impact-map", "sweep",
-    "study", "picture", "animate", "explore", "validate", "measure youngs-modulus",
-    "measure calibration",
+    "list", "parameters", "modes", "equilibrium", "simulate", "stress", "shock", "fit",
+    "impact-map", "sweep", "study", "picture", "animate", "explore", "modelica", "validate",
+    "measure youngs-modulus", "measure calibration",
     "measure frequency", "measure restitution", "completion",
 )  # fmt: skip
 

@@ -275,6 +275,7 @@ def test_an_fmu_contains_documentation_icon_and_licences_but_no_bytecode(fmus, m
         )
         bundled = archive.read("documentation/licenses/pythonfmu.txt").decode()
         assert archive.read("model.png").startswith(b"\x89PNG")
+        assert archive.read("documentation/icon.svg").endswith(b"</svg>\n")
     installed = importlib.metadata.distribution("pythonfmu")
     license_file = next(f for f in installed.files if f.name == "LICENSE")
     assert bundled.split() == license_file.read_text().split()

@@ -1,7 +1,10 @@
 """Pictures of mechanisms: positions, names, modes, icons, and the command that draws them."""
 
+import re
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -10,7 +13,7 @@ from PIL import Image
 
 from prbm.base.errors import ParameterError
 from prbm.commands.command_line import main
-from prbm.drawing.icon import icon, shape
+from prbm.drawing.icon import BODY, POINTS, SVG, icon, shape, vector_icon
 from prbm.drawing.shapes import Shapes, box, corners, hull
 from prbm.drawing.style import png
 from prbm.files.mechanism_file import load, read_mechanism, shipped
@@ -291,6 +294,49 @@ def test_the_icon_shows_the_shape_at_release(name: str) -> None:
     first, again = icon(chosen, sample), icon(chosen, sample)
     assert first == again
     assert first.startswith(b"\x89PNG")
+
+
+def bodies_of(drawing: bytes) -> list[np.ndarray]:
+    """Return the corners of areas with the colour of bodies, the largest first, without holes.
+
+    They are shares of the size of the SVG icon.
+    """
+    paths = ElementTree.fromstring(drawing).findall(f"{{{SVG}}}path")
+    outlines = (path.get("d", "").split("Z")[0] for path in paths if path.get("fill") == BODY)
+    numbers = (re.findall(r"-?\d+\.\d+", outline) for outline in outlines)
+    areas = [np.array(x, float).reshape(-1, 2) / POINTS for x in numbers]
+    return sorted(areas, key=lambda xy: -np.prod(np.ptp(xy, axis=0)))
+
+
+@pytest.mark.parametrize("name", list(shipped()))
+def test_the_svg_icon_has_the_parts_of_the_png_at_the_same_places(name: str) -> None:
+    """Halfway from the middle of each body to its corners, the PNG has the colour of bodies."""
+    chosen = mechanism(name)
+    sample = start_sample(chosen, {})
+    drawing = vector_icon(chosen, sample)
+    assert drawing == vector_icon(chosen, sample)
+    found = bodies_of(drawing)[: len(chosen.bodies)]
+    assert len(found) == len(chosen.bodies)
+    with Image.open(BytesIO(icon(chosen, sample))) as image:
+        pixels = np.array(image.convert("RGB"))
+    color = [int(BODY[k : k + 2], 16) for k in (1, 3, 5)]
+    for corners_of_body in found:
+        assert corners_of_body.min() > 0.0
+        assert corners_of_body.max() < 1.0
+        inside = corners_of_body.mean(axis=0) * 0.5 + corners_of_body * 0.5
+        x, y = (inside * len(pixels)).astype(int).T
+        matches = (np.abs(pixels[y, x].astype(int) - color).max(axis=1) < 8).mean()
+        assert matches >= 0.5, (name, matches)
+
+
+def test_the_title_of_an_icon_is_text() -> None:
+    """Quotes, markup and control characters of a title do not change the structure of the SVG."""
+    title = "</title><script>alert('a & \"b\"')</script>\x07"
+    chosen = replace(mechanism("PRBDM"), title=title)
+    plain = ElementTree.fromstring(vector_icon(mechanism("PRBDM"), start_sample(chosen, {})))
+    named = ElementTree.fromstring(vector_icon(chosen, start_sample(chosen, {})))
+    assert [element.tag for element in named.iter()] == [element.tag for element in plain.iter()]
+    assert named.findtext(f"{{{SVG}}}title") == title.replace("\x07", " ")
 
 
 # --- command ----------------------------------------------------------------------------------

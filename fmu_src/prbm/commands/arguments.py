@@ -253,6 +253,14 @@ def set_argument(parser: ArgumentParser, meaning: str = "value of a parameter") 
     )  # fmt: skip
 
 
+def parameters_argument(parser: ArgumentParser) -> None:
+    """Add --parameters."""
+    parser.add_argument(
+        "--parameters", metavar="FILE.ssv",
+        help="parameter set (SSV), as prbm parameters --out writes; --set has priority",
+    )  # fmt: skip
+
+
 def stress_arguments(parser: ArgumentParser) -> None:
     """Add the arguments of ``prbm stress``."""
     parser.add_argument(
