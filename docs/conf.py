@@ -48,5 +48,3 @@ html_theme_options = {
         "color-brand-content": "#7fbcf5",
     },
 }
-pygments_style = "friendly"
-pygments_dark_style = "github-dark"

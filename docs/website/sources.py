@@ -119,7 +119,8 @@ class Sources:
         language = LANGUAGES.get(path.suffix, "text")
         text = (self.root / path).read_text(encoding="utf-8")
         fence = "`" * 4
-        return f"---\norphan: true\n---\n\n# {path}\n\n{fence}{language}\n{text}{fence}\n"
+        head = f"---\norphan: true\nhide-toc: true\n---\n\n# {path}\n\n"
+        return f"{head}::::::{{container}} listing\n{fence}{language}\n{text}{fence}\n::::::\n"
 
     def _linked_files(self) -> None:
         """Add listings of the files and folders that pages link, if they have no page yet."""

@@ -1,5 +1,6 @@
 """The built documentation site: addresses, gallery, front page, search, all without a network."""
 
+import os
 import re
 import subprocess
 import sys
@@ -17,7 +18,7 @@ from support import ROOT
 
 pytestmark = pytest.mark.slow
 
-SECONDS_MAX = 60.0
+SECONDS_MAX = 300.0
 
 
 def command(folder: Path) -> "subprocess.CompletedProcess[str]":
@@ -135,3 +136,23 @@ def test_a_folder_of_other_files_is_not_replaced(tmp_path):
     assert done.returncode == 2
     assert "name another folder" in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+@pytest.mark.parametrize(("size", "scheme"), [(WIDE, "light"), (NARROW, "dark")])
+@pytest.mark.parametrize(
+    "page",
+    ["index", "gallery/index", "docs/embedding", "api/index", "examples/notebooks/designer"],
+)
+def test_accessibility_rules_find_nothing_serious(browser, folder, page, size, scheme):
+    """The rules are those of axe-core, whose script the environment variable AXE names."""
+    script = os.environ.get("AXE")
+    if script is None:
+        pytest.skip("the environment variable AXE does not name the file axe.min.js")
+    browser.view(folder / f"{page}.html", size=size, prefers_color_scheme=scheme)
+    browser.driver.set_script_timeout(SECONDS_MAX)
+    browser.run(Path(script).read_text(encoding="utf-8"))
+    found = browser.driver.execute_async_script("axe.run().then(arguments[0])")
+    serious = [v for v in found["violations"] if v["impact"] in ("serious", "critical")]
+    assert [(v["id"], [n["target"] for n in v["nodes"]]) for v in serious] == []
+    width = browser.run("return document.documentElement.scrollWidth - window.innerWidth")
+    assert width <= 0

@@ -16,3 +16,22 @@ new MutationObserver(() => {
 if (location.protocol === "file:") {
   DOCUMENTATION_OPTIONS.SHOW_SEARCH_SUMMARY = false;
 }
+
+// Let the keyboard scroll code and tables that are wider than the page.
+function markScrollable() {
+  for (const box of document.querySelectorAll("article pre, article .table-wrapper")) {
+    if (box.scrollWidth > box.clientWidth) {
+      box.tabIndex = 0;
+    } else {
+      box.removeAttribute("tabindex");
+    }
+  }
+}
+
+window.addEventListener("DOMContentLoaded", () => {
+  for (const heading of document.querySelectorAll(".caption[role=heading]")) {
+    heading.setAttribute("aria-level", "2");
+  }
+  markScrollable();
+});
+window.addEventListener("resize", markScrollable);
