@@ -22,6 +22,7 @@ myst_fence_as_directive = ["math"]
 myst_heading_anchors = 4
 
 autodoc_typehints = "none"
+autodoc_preserve_defaults = True
 autodoc_member_order = "bysource"
 napoleon_google_docstring = False
 napoleon_use_rtype = False
