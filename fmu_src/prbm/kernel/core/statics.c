@@ -241,8 +241,8 @@ static bool unreachable(const System *system, bool held, double displacement, do
                 heavy ? ", or reduce gravity across the motion" : "");
 }
 
-/* Return whether a shape is held at an amount, and not half a turn or more away: the sine that holds
- * a rotation vanishes there, too. */
+/* Return whether a shape is held at an amount, and not half a turn or more away.  The sine that
+ * holds a rotation vanishes there, too. */
 static bool holds(const System *system, bool held, double amount, const double *state) {
     int j = system->released.j;
     return !held || !turns(system) ||
