@@ -313,12 +313,14 @@ def test_panels_and_lines_are_the_same():
     shapes = [(1e-3, 8e-3, (4e-3, 2e-3), H, w) for H in (5e-3, 3e-3, 9e-3) for w in (None, 6e-3)]
     for shape in shapes:
         notch = profile.Notch(*shape)
+        # As long as the flexure, apart from round-off, or shorter.
+        L = math.nextafter(notch.length, 0.0) if shape[3] == 3e-3 else 0.02
         ours = structures()["Notch"](
             *shape[:2], *shape[2], shape[3], shape[4] or 0.0, bool(shape[4])
         )
-        expected = profile.notch_panels("neck", notch, 0.02, 7)
+        expected = profile.notch_panels("neck", notch, L, 7)
         panels = (structures()["Panel"] * len(expected))()
-        kernel().notch_panels(b"neck", ours, 0.02, 7, ctypes.addressof(panels))
+        kernel().notch_panels(b"neck", ours, L, 7, ctypes.addressof(panels))
         for panel, other in zip(panels, expected, strict=True):
             assert panel.nodes == other.nodes
             for x in (-1.0, -0.4, 0.0, 1.0):

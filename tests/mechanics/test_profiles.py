@@ -18,6 +18,7 @@ from prbm.mechanics.statics import equilibrium
 from prbm.mechanics.stress import faces, stress
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.parts import Body, Flexure, FlexureType, Force, Release
+from prbm.references.notches import paros_weisbord
 
 L, WIDTH, E, RHO = 0.03, 0.01, 70e9, 2700.0
 
@@ -323,6 +324,25 @@ def test_mistakes_in_profiles_are_rejected_with_a_remedy(mistake):
     with pytest.raises((MechanismError, ParameterError)) as error:
         cantilever(replace(kind(), **changes))
     assert words in str(error.value)
+
+
+@pytest.mark.parametrize("x", [0.0, 0.013, 0.1])
+def test_a_notch_between_its_edges_has_the_stiffness_of_its_sections_wherever_it_is_drawn(x):
+    """The distance of the ends is that of the edges, apart from round-off."""
+    hinge = kind(profile="notch", notch_radius=4e-3)
+    description = Mechanism(
+        name="Hinge",
+        title="A hinge",
+        ground={"clamp": (x, 0.0)},
+        bodies=(Body("tip", 1e-3, 1e-7, (x + 0.008, 0.0), {"end": (x + 0.008, 0.0)}),),
+        flexure_types=(hinge,),
+        flexures=(Flexure("beam", hinge.name, "ground.clamp", "tip.end"),),
+        forces=(Force("force", "tip"),),
+        release=Release("tip", direction=90.0),
+    )
+    _, slope = tip(assemble(description, description.values()), moment=1e-3)
+    exact = paros_weisbord(4e-3, hinge.thickness, hinge.width, hinge.youngs_modulus)
+    assert slope == pytest.approx(1e-3 / exact, rel=1e-6)
 
 
 def test_a_low_order_between_two_clamps_is_rejected_except_for_hinges():

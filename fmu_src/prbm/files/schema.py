@@ -24,6 +24,7 @@ from ..mechanism.flexure import (
     NOTCH_NODES,
     ORDER_DEFAULT,
     ORDER_MAX,
+    TAPER,
 )
 from ..mechanism.parts import FIELDS, GROUND, LENGTH_MAX, LENGTH_MIN
 from .copies import (
@@ -616,12 +617,13 @@ def _check_slender(
             f"flexure {flexure.name} from {flexure.start} to {flexure.end} has zero length: move "
             "its ends apart"
         )
-    thickness = parts.value(kind, "thickness", values)
-    if thickness >= length:
-        raise MechanismError(
-            f"{kind.name}.thickness = {thickness:g} m is not less than the length of the flexure "
-            f"{flexure.name}, {length:g} m: check the units of both"
-        )
+    for name in ("thickness", "end_thickness") if kind.profile == TAPER else ("thickness",):
+        thickness = parts.value(kind, name, values)
+        if thickness >= length:
+            raise MechanismError(
+                f"{kind.name}.{name} = {thickness:g} m is not less than the length of the flexure "
+                f"{flexure.name}, {length:g} m: check the units of both"
+            )
 
 
 def _places(mechanism: Mechanism) -> Iterator[tuple[str, parts.Point]]:
