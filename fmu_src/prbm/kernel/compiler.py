@@ -264,7 +264,7 @@ def _host_compilers() -> Iterator[Compiler]:
     except NoCompilerError:
         if not found:
             raise NoCompilerError(
-                f"native FMUs need a C compiler, and none was found: {INSTALL}"
+                f"the kernel needs a C compiler, and none was found: {INSTALL}"
             ) from None
 
 
