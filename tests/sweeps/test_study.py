@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
 
 import numpy as np
 import pytest
@@ -251,6 +252,21 @@ def test_a_study_has_a_short_text():
     assert repr(found) == (
         "<Study of 5000 simulations over a: 2500 failed, <Optimum of f: 2 at a = 0.25>>"
     )
+
+
+def test_an_interruption_ends_simulations_that_still_run(mechanisms):
+    options = {"stop_time": 2000.0, "step": 0.1}  # Much computing time.
+    setup = module.Setup(mechanisms["PRBDM2R"], (), {}, {}, options)
+    futures = []
+
+    def interrupted():
+        with module._pool(setup, 2, 2) as run:
+            futures.append(run({}))
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert isinstance(futures[0].exception(), BrokenProcessPool)
 
 
 def test_the_number_of_processes_has_a_limit(mechanisms, monkeypatch):

@@ -400,7 +400,7 @@ class _Serial(Executor):
 
 @contextmanager
 def _pool(setup: Setup, workers: int | None, count: int) -> Iterator[Run]:
-    """Yield a function that submits a simulation."""
+    """Yield a function that submits a simulation.  An error ends the simulations that still run."""
     if workers is not None and workers < 1:
         raise ParameterError(f"workers = {workers} must be 1 or more")
     processes = int(min(workers or os.cpu_count() or 1, count, PROCESSES_MAX))
@@ -413,9 +413,14 @@ def _pool(setup: Setup, workers: int | None, count: int) -> Iterator[Run]:
     if processes == 1:
         yield lambda values: _Serial().submit(setup.run, values)
         return
+    others = {*multiprocessing.active_children()}
     pool = ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), _prepare, (setup,))
     try:
         yield lambda values: pool.submit(_run, values)
+    except BaseException:  # Ctrl-C, too.
+        for process in {*multiprocessing.active_children()} - others:
+            process.terminate()
+        raise
     finally:
         pool.shutdown(cancel_futures=True)
 
