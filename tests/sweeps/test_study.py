@@ -269,6 +269,23 @@ def test_an_interruption_ends_simulations_that_still_run(mechanisms):
     assert isinstance(futures[0].exception(), BrokenProcessPool)
 
 
+def test_without_a_kernel_the_processes_are_given_the_python_engine(mechanisms, monkeypatch):
+    """The reason is then logged once, and not by each process."""
+    monkeypatch.setattr(module, "kernel_available", lambda: False)
+    setups = []
+
+    def pool(processes, context, prepare, arguments):
+        setups.extend(arguments)
+        raise InterruptedError
+
+    monkeypatch.setattr(module, "ProcessPoolExecutor", pool)
+    varied = {"stop.position": [0.0, 1e-3]}
+    for given, used in ((None, "python"), ("kernel", "kernel")):
+        with pytest.raises(InterruptedError):
+            study(mechanisms["PRBDM"], varied, ["impacts"], engine=given, stop_time=0.1, workers=2)
+        assert setups[-1].options["engine"] == used
+
+
 def test_the_number_of_processes_has_a_limit(mechanisms, monkeypatch):
     started = []
 

@@ -31,7 +31,7 @@ from ..hybrid.simulation import Simulation
 from ..interface.variables import variables
 from ..mechanics.arrays import Real
 from ..mechanism.description import Mechanism
-from ..runs.engine import check_engine
+from ..runs.engine import PYTHON, check_engine, kernel_available
 from ..runs.experiment import experiment
 from ..runs.inputs import Source, filled, placeholders, signals
 from ..runs.quantities import QUANTITIES
@@ -280,6 +280,8 @@ def _options(
         If one of the values or arguments is invalid, so that every simulation would fail.
     """
     check_engine(engine)
+    if engine is None and not kernel_available():  # Compiled and reported here, not by workers.
+        engine = PYTHON
     start_values(mechanism, values, 0.0)
     if stop_time is None:
         end = experiment(mechanism, values, engine).stop_time
