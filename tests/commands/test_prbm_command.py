@@ -820,6 +820,15 @@ def test_the_message_after_ctrl_c_names_the_command(monkeypatch, capsys):
     assert capsys.readouterr().err == "prbm simulate: interrupted\n"
 
 
+def test_a_lack_of_memory_is_reported_in_one_sentence(monkeypatch, capsys):
+    def allocates(_: object) -> None:
+        np.empty(2**59)
+
+    monkeypatch.setattr(cli, "_function", lambda _: allocates)
+    assert run("simulate PRBDM") == cli.FAILED
+    assert capsys.readouterr().err.startswith("prbm simulate: there is not enough memory; choose ")
+
+
 @pytest.mark.parametrize(("command", "status"), [("--help", cli.OK), ("list", cli.FAILED)])
 def test_a_closed_pipe_is_not_reported(command, status):
     words = [sys.executable, "-m", "prbm", command]

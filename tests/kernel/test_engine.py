@@ -436,6 +436,8 @@ def test_the_order_of_names_in_a_saved_state_has_no_effect():
     assert kernel.given["force.x"] == 0.5
     with pytest.raises(ParameterError, match="damaged"):
         kernel.restore({**kernel.snapshot(), "given": {}})
+    with pytest.raises(ParameterError, match="damaged: 'numbers'"):
+        kernel.restore({"engine": "kernel"})
     with pytest.raises(ParameterError, match="another mechanism"):
         kernel.restore({**kernel.snapshot(), "numbers": [[]] * len(kernel.snapshot()["numbers"])})
 

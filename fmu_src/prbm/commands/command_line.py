@@ -498,6 +498,9 @@ def _run(words: Sequence[str]) -> int:
         return _reported(str(error), MISTAKE)
     except KeyboardInterrupt as stop:
         return _reported(f"{name}: {str(stop) or 'interrupted'}", INTERRUPTED)
+    except MemoryError:
+        sentence = "there is not enough memory; choose fewer rows or samples, or a shorter time"
+        return _reported(f"{name}: {sentence}", FAILED)
     except Exception as error:
         status = _status(error)
         if status is None:

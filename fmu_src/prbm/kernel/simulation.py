@@ -370,7 +370,8 @@ class KernelSimulation:
         """
         if saved.get("engine") != self.engine:
             raise ParameterError("the saved state belongs to the Python engine: restore it there")
-        if saved["values"].keys() != self.values.keys():
+        known = saved.get("values")
+        if isinstance(known, Mapping) and known.keys() != self.values.keys():
             raise ParameterError("the saved state belongs to another mechanism")
         try:
             numbers = np.array(saved["numbers"], float)
