@@ -1,6 +1,6 @@
 """The icon of a mechanism."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -61,6 +61,9 @@ def draw(axes: Axes, shapes: Shapes, E: Complex, *, faint: bool = False) -> None
     """Draw flexures, bodies, pins, ground and walls in a shape."""
     thin = len(shapes.flexures) >= THIN_LINES_MIN
     for line in shapes.flexures:
+        if line.shaped:
+            _area(axes, [line.edge(E)], 1.0, faint)
+            continue
         z = corners(line.outline, E)
         z = z if len(z) - 2 > CURVED_PIVOTS_MAX else curve(z, line.guided)
         width = 1.0 if faint else 1.5 if thin else 2.2
@@ -83,17 +86,21 @@ def _line(axes: Axes, z: Complex, color: str, width: float, zorder: float) -> No
     axes.plot(z.real, z.imag, color=color, linewidth=width, solid_capstyle="butt", zorder=zorder)
 
 
-def _body(axes: Axes, shapes: Shapes, name: str, E: Complex, faint: bool) -> None:
+def _area(axes: Axes, rings: Sequence[Complex], zorder: float, faint: bool) -> None:
     axes.add_patch(
         PathPatch(
-            area(shapes.areas(name, E)),
+            area(rings),
             facecolor="none" if faint else BODY,
             edgecolor=GHOST if faint else STEEL,
             linewidth=1.0,
             joinstyle="round",
-            zorder=0 if faint else 2,
+            zorder=0.0 if faint else zorder,
         )
     )
+
+
+def _body(axes: Axes, shapes: Shapes, name: str, E: Complex, faint: bool) -> None:
+    _area(axes, shapes.areas(name, E), 2.0, faint)
     if not faint:
         centre = shapes.centre(name, E)
         axes.plot(centre.real, centre.imag, "o", color=STEEL, markersize=3.5, zorder=4)
