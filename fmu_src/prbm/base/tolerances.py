@@ -138,6 +138,7 @@ DEPENDENT_PIVOT_RTOL = 1e-7  # Of the largest pivot: smaller pivots make the sta
 # --- beams ---
 
 NOTCH_PEAK_FACTOR = 0.7  # Of the distance of the poles: width of the peak where nodes are dense.
+NOTCH_LENGTH_RTOL = 1e-9  # Of the length of a flexure: a notch that is longer by less fits.
 FINE_POINTS = 8  # Gauss points between two nodes, for the integrals of the flexibility.
 GAUSS_ITERATIONS_MAX = 8  # The nodes of Gauss' quadrature need four iterations of Newton's method.
 

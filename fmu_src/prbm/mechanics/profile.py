@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.errors import ParameterError
-from ..base.tolerances import NOTCH_PEAK_FACTOR
+from ..base.tolerances import NOTCH_LENGTH_RTOL, NOTCH_PEAK_FACTOR
 from ..mechanism.flexure import FILLET_NODES, THICK_NODES
 from .arrays import Complex, Real
 
@@ -206,12 +206,12 @@ def notch_panels(name: str, notch: Notch, L: float, nodes: int) -> Sequence[Pane
             f"flexure {name}: the thickness outside its notch, {H:g} m, must be above the "
             f"thickness of its waist, {h:g} m: increase end_thickness"
         )
-    if not notch.length <= L:
+    if not notch.length <= L * (1.0 + NOTCH_LENGTH_RTOL):
         raise ParameterError(
             f"flexure {name}: its notch of the length {notch.length:g} m is longer than the "
             f"flexure, {L:g} m: reduce notch_radius or waist_length, or move the ends apart"
         )
-    rest, angle = 0.5 * (L - notch.length), notch.angle
+    rest, angle = max(0.5 * (L - notch.length), 0.0), notch.angle
     first = Straight(THICK_NODES, 0.0, rest, (H, H), width)
     last = Straight(THICK_NODES, L - rest, rest, (H, H), width)
     if notch.waist_length is None:

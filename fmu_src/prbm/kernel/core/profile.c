@@ -116,13 +116,13 @@ PRBM bool notch_panels(const char *name, const Notch *notch, double L, int nodes
                     name, H, h);
     }
     double length = notch_length(notch), angle = notch_angle(notch);
-    if (!(length <= L)) {
+    if (!(length <= L * (1.0 + NOTCH_LENGTH_RTOL))) {
         return fail(problem,
                     "flexure %s: its notch of the length %g m is longer than the flexure, %g m: "
                     "reduce notch_radius or waist_length, or move the ends apart",
                     name, length, L);
     }
-    double rest = 0.5 * (L - length), waist = notch->waist_length;
+    double rest = greater(0.5 * (L - length), 0.0), waist = notch->waist_length;
     Panel *next = panels;
     *next++ = straight_panel(THICK_NODES, 0.0, rest, H, width);
     if (notch->waisted) {
