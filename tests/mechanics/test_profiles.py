@@ -11,6 +11,8 @@ from scipy.linalg import eigh
 from scipy.optimize import newton
 
 from prbm.base.errors import MechanismError, ParameterError
+from prbm.hybrid.simulation import Simulation
+from prbm.kernel.simulation import KernelSimulation
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.modal import modes
 from prbm.mechanics.sections import static_section_loads
@@ -19,6 +21,7 @@ from prbm.mechanics.stress import faces, stress
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.parts import Body, Flexure, FlexureType, Force, Release
 from prbm.references.notches import paros_weisbord
+from support import mechanism
 
 L, WIDTH, E, RHO = 0.03, 0.01, 70e9, 2700.0
 
@@ -343,6 +346,19 @@ def test_a_notch_between_its_edges_has_the_stiffness_of_its_sections_wherever_it
     _, slope = tip(assemble(description, description.values()), moment=1e-3)
     exact = paros_weisbord(4e-3, hinge.thickness, hinge.width, hinge.youngs_modulus)
     assert slope == pytest.approx(1e-3 / exact, rel=1e-6)
+
+
+@pytest.mark.parametrize("engine", [Simulation, KernelSimulation])
+def test_a_notch_may_be_as_long_as_its_flexure_apart_from_round_off(engine):
+    """Ends at 47 and 53 mm are nearer than 6 mm by round-off."""
+    guide = mechanism("NotchGuide")
+    found = [
+        engine(guide, {"notch.length": 8e-3 * (1.0 + change)}).outputs()["energy.elastic"]
+        for change in (-1e-12, 1e-12)
+    ]
+    assert found[0] == pytest.approx(found[1], rel=1e-9)
+    with pytest.raises(ParameterError, match="is longer than the flexure"):
+        engine(guide, {"notch.length": 8e-3 * (1.0 - 1e-6)})
 
 
 def test_a_low_order_between_two_clamps_is_rejected_except_for_hinges():

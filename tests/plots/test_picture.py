@@ -1,5 +1,6 @@
 """Pictures of mechanisms: positions, names, modes, icons, and the command that draws them."""
 
+import math
 import re
 from dataclasses import replace
 from io import BytesIO
@@ -129,6 +130,47 @@ def test_a_body_is_the_hull_of_its_points_around_the_centre_of_mass() -> None:
     area = 0.5 * abs(np.sum(triangle.real * np.roll(triangle.imag, -1)
                             - triangle.imag * np.roll(triangle.real, -1)))  # fmt: skip
     assert area == pytest.approx(0.5)
+
+
+def test_the_edge_of_a_notch_is_to_scale() -> None:
+    """Its area is that of the notch, and its width at the waist the thickness, in any shape."""
+    shapes, _ = shapes_of(mechanism("NotchGuide"))
+    length, radius, thickness = 0.01, 4e-3, 1e-3
+    exact = length * (thickness + 2 * radius) - math.pi * radius**2
+    for E in (shapes.straight, shapes_of(mechanism("NotchGuide"), 4e-3)[1]):
+        for line in shapes.flexures:
+            z = line.edge(E)
+            area = 0.5 * (z.conj() * np.roll(z, -1)).imag.sum()
+            assert area == pytest.approx(exact, rel=5e-3)
+            across = np.abs(z - z[::-1])[: len(z) // 2]
+            assert across.min() == pytest.approx(thickness, rel=1e-9)
+            assert across[[0, -1]] == pytest.approx(thickness + 2 * radius, rel=1e-9)
+
+
+def test_the_ground_is_normal_to_the_end_of_a_curved_flexure() -> None:
+    """The ends of the beams of the bistable are horizontal, their chords are not."""
+    shapes, _ = shapes_of(mechanism("CurvedBistable"))
+    places = [z[:2].mean() for z in shapes.ground()]
+    expected = [x + 1j * y for x in (-0.05, 0.05) for y in (-0.01, 0.01)]
+    np.testing.assert_allclose(sorted(places, key=np.angle), sorted(expected, key=np.angle))
+    for z in shapes.ground():
+        assert abs((z[1] - z[0]).real) < 0.02 * abs(z[1] - z[0])
+
+
+@pytest.mark.parametrize("name", ["PRBDM2R", "GuideBeam"])
+def test_the_ground_and_the_pins_of_flexures_that_end_on_the_ground(name: str) -> None:
+    """They do not depend on which end of a flexure is its start."""
+    found = []
+    for backwards in (False, True):
+        chosen = mechanism(name)
+        flexures = [replace(f, ends=("pin", "clamp")) for f in chosen.flexures]
+        if backwards:
+            flexures = [replace(f, start=f.end, end=f.start, ends=f.ends[::-1]) for f in flexures]
+        shapes, E = shapes_of(replace(chosen, flexures=tuple(flexures)))
+        found.append((np.array(shapes.ground()), shapes.pins(E)))
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-12)
+    assert abs(found[0][0][:, :2].mean(axis=1) - found[0][1]).max() < 1e-12
 
 
 def test_stretches_follow_from_recorded_outputs() -> None:

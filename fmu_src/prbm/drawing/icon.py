@@ -165,6 +165,10 @@ def _flexures(shapes: Shapes, E: Complex, *, faint: bool = False) -> Iterator[Ic
     """Yield the flexures in a shape."""
     thin = len(shapes.flexures) >= THIN_LINES_MIN
     for line in shapes.flexures:
+        if line.shaped:
+            fill, edge = (None, GHOST) if faint else (BODY, STEEL)
+            yield Area([line.edge(E)], fill, edge, 0.0 if faint else 1.0)
+            continue
         z = corners(line.outline, E)
         z = z if len(z) - 2 > CURVED_PIVOTS_MAX else curve(z, line.guided)
         width = 1.0 if faint else 1.5 if thin else 2.2

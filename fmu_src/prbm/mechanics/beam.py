@@ -334,6 +334,11 @@ class Beam:
             first = last
         return np.concatenate(rows)
 
+    def thickness(self, points: Sequence[Real]) -> Real:
+        """Return the thickness at points x of each panel [m]."""
+        at = zip(self.panels, points, strict=True)
+        return np.concatenate([panel.at(x).thickness for panel, x in at])
+
     @property
     def node_positions(self) -> Complex:
         """The lengths A for the nodes, (N, N) [m]."""

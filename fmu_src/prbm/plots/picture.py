@@ -246,6 +246,15 @@ class _Drawing:
             ha=ha, va=va, zorder=9, path_effects=[withStroke(linewidth=2.2, foreground="white")],
         )  # fmt: skip
 
+    def patch(self, rings: Sequence[Complex], color: str, zorder: float) -> None:
+        """Draw an area, see :func:`prbm.drawing.style.area`."""
+        self.axes.add_patch(
+            PathPatch(
+                area(rings, self.factor), facecolor=color, edgecolor=LINK, linewidth=1.0,
+                alpha=0.9, joinstyle="round", zorder=zorder,
+            )
+        )  # fmt: skip
+
     # -- shapes --
 
     def ghost(self, E: Complex) -> None:
@@ -253,7 +262,7 @@ class _Drawing:
         for ground in self.shapes.ground():
             self.line(ground, WALL, 0.9, 1.0)
         for line in self.shapes.flexures:
-            self.line(corners(line.outline, E), STRAIGHT, 0.9, 0.5, "--")
+            self.line(line.drawn(E), STRAIGHT, 0.9, 0.5, "--")
         for name in self.shapes.bodies:
             z = self.shapes.body(name, E)
             self.line(np.append(z, z[0]), STRAIGHT, 0.9, 0.5, "--")
@@ -263,17 +272,15 @@ class _Drawing:
         for line in self.shapes.flexures:
             z = corners(line.outline, E)
             many = len(z) - 2 > CURVED_PIVOTS_MAX
+            if line.shaped:
+                self.patch([line.edge(E)], FLEXURE, 2.0)
+                continue
             self.line(z if many else curve(z, line.guided), FLEXURE, 3.6, 2.0)
             self.line(z, LINK, 0.9, 2.5)
             if pivots and line.jointed:
                 self.pivots(z[1:-1], 1.5 if many else 3.4, 4.0)
         for name in self.shapes.bodies:
-            self.axes.add_patch(
-                PathPatch(
-                    area(self.shapes.areas(name, E), self.factor), facecolor=BODY, edgecolor=LINK,
-                    linewidth=1.0, alpha=0.9, joinstyle="round", zorder=3.0,
-                )
-            )  # fmt: skip
+            self.patch(self.shapes.areas(name, E), BODY, 3.0)
         self.pivots(self.shapes.pins(E), 6.0, 5.0, 1.5)
         self.axes.autoscale_view()
 
@@ -309,7 +316,8 @@ class _Drawing:
             z = corners(line.outline, E)
             many = len(z) - 2 > CURVED_PIVOTS_MAX
             if self.apart(z, corners(line.outline, shapes.straight)):
-                self.line(z if many else curve(z, line.guided), START, 1.0, 3.6, "--")
+                smooth = line.drawn(E) if many else curve(z, line.guided)
+                self.line(smooth, START, 1.0, 3.6, "--")
         for name in shapes.bodies:
             z = shapes.body(name, E)
             if self.apart(z, shapes.body(name, shapes.straight)):
@@ -368,11 +376,12 @@ class _Drawing:
                 )  # fmt: skip
             self.text(complex(x + length, y) / self.factor, f" {force.name}", IMPACT, ha="left")
 
-    def along(self, start: complex, end: complex, words: str) -> None:
-        """Write words parallel to a line and above it, never upside down."""
-        place = (start + NAME_AT * (end - start)) * self.factor
+    def along(self, start: complex, end: complex, words: str, thickness: float) -> None:
+        """Write words parallel to a line of a thickness [m] and above it, never upside down."""
         degrees = math.degrees(cmath.phase(end - start))
         turned = (degrees + 89.0) % 180.0 - 89.0
+        beside = cmath.rect(0.5 * thickness, math.radians(turned + 90.0))
+        place = (start + NAME_AT * (end - start) + beside) * self.factor
         away = cmath.rect(NAME_OFFSET, math.radians(turned + 90.0))
         self.axes.annotate(
             words, (place.real, place.imag), (away.real, away.imag), textcoords="offset points",
@@ -392,7 +401,8 @@ class _Drawing:
                 self.text(complex(x, 0.75 * low + 0.25 * high), name, LINK)
         for line in shapes.flexures:
             z = corners(line.outline, E)
-            self.along(complex(z[0]), complex(z[-1]), line.flexure.name)
+            thickness = float(line.outline.thickness.max()) if line.shaped else 0.0
+            self.along(complex(z[0]), complex(z[-1]), line.flexure.name, thickness)
         for joint in shapes.joints:
             self.text(complex(corners(joint, E)[0]), f"  {joint.name}", ha="left", va="bottom")
         for probe, z in zip(shapes.system.mechanism.probes, shapes.probes(E), strict=True):

@@ -85,8 +85,9 @@ class Scene:
 
     Attributes
     ----------
-    links, curves, bodies, hits, walls : dict of str to artist
+    links, curves, edges, bodies, hits, walls : dict of str to artist
         Moving artists by the names of flexures, bodies and stops, in the unit of the axes.
+        Flexures with a profile are in ``edges``, all others in ``links``.
     """
 
     @own_style()
@@ -128,7 +129,7 @@ class Scene:
         for line in self.shapes.ground():
             self._line(line, WALL, 1.2, zorder=3.2)
         for flexure in self.shapes.flexures:
-            z = corners(flexure.outline, self.shapes.straight)
+            z = flexure.drawn(self.shapes.straight)
             self._line(z, STRAIGHT, 1.0, zorder=0.5).set_linestyle("--")
         self._set_flexures()
         self._set_bodies()
@@ -138,8 +139,12 @@ class Scene:
 
     def _set_flexures(self) -> None:
         self.curves, self.links = {}, {}
+        self.edges: dict[str, PathPatch] = {}
         for line in self.shapes.flexures:
             pivots, name = len(line.outline.c) - 2, line.flexure.name
+            if line.shaped:
+                self.edges[name] = self._moving_area(line.edge(self.shapes.straight), FLEXURE, 2.0)
+                continue
             if pivots <= CURVED_PIVOTS_MAX or not line.jointed:
                 self.curves[name] = self._moving_line(FLEXURE, 5.0, zorder=2.0)
             self.links[name] = self._moving_line(
@@ -152,13 +157,7 @@ class Scene:
         self.bodies: dict[str, PathPatch] = {}
         self.centres: dict[str, Line2D] = {}
         for name in self.system.bodies:
-            patch = PathPatch(
-                area([self.shapes.bodies[name]]), facecolor=BODY, edgecolor=LINK, linewidth=1.2,
-                alpha=0.9, joinstyle="round", zorder=3.0,
-            )  # fmt: skip
-            self.stage.add_patch(patch)
-            self.moving.append(patch)
-            self.bodies[name] = patch
+            self.bodies[name] = self._moving_area(self.shapes.bodies[name], BODY, 3.0)
             self.centres[name] = self._moving_line(
                 LINK, 0.0, zorder=4.0, marker="P", markersize=6.0, markeredgecolor="white"
             )
@@ -200,6 +199,15 @@ class Scene:
         self.moving.append(line)
         return line
 
+    def _moving_area(self, ring: Complex, color: str, zorder: float) -> PathPatch:
+        patch = PathPatch(
+            area([ring]), facecolor=color, edgecolor=LINK, linewidth=1.2, alpha=0.9,
+            joinstyle="round", zorder=zorder,
+        )  # fmt: skip
+        self.stage.add_patch(patch)
+        self.moving.append(patch)
+        return patch
+
     def _set_limits(self) -> None:
         """Set limits of the axes that contain the whole film."""
         rows = np.unique(np.linspace(0, len(self.film.times) - 1, 60).astype(int))
@@ -207,7 +215,7 @@ class Scene:
         for t in (self.film.times[0], self.film.times[-1], *self.film.times[rows]):
             q, walls = self.motion.shape(float(t))
             E = self.shapes.arms(q)
-            places += [corners(line.outline, E) for line in self.shapes.flexures]
+            places += [line.drawn(E) for line in self.shapes.flexures]
             places += [self.shapes.body(name, E) for name in self.system.bodies]
             places += [self.shapes.wall(i, float(wall), E) for i, wall in enumerate(walls)]
         places += [
@@ -280,6 +288,9 @@ class Scene:
         E = self.shapes.arms(q)
         for line in self.shapes.flexures:
             z, name = corners(line.outline, E), line.flexure.name
+            if line.shaped:
+                self.edges[name].set_path(area([line.edge(E)], self.factor))
+                continue
             self._move(self.links[name], z)
             if name in self.curves:
                 self._move(self.curves[name], curve(z, line.guided) if line.jointed else z)

@@ -24,7 +24,7 @@ typedef struct {
     bool moves;
 } Place;
 
-/* A spring between two coordinates; n is the ground. */
+/* A spring between two coordinates. */
 typedef struct {
     double rate; /* N m/rad, N m */
     int a, b;
@@ -121,7 +121,9 @@ typedef struct {
     int corner_count;
     Complex *corners, *corners_c; /* (corners, d), (corners,): flexures, for drawings */
     int spring_count;
-    Spring *spring;           /* the springs whose rates make up K */
+    Spring *spring;           /* the springs between two coordinates */
+    double *grounded;         /* (even,) rates of the springs between a coordinate and the ground;
+                               * K is the sum of both */
     int block_count;
     Block *blocks;            /* of the mass matrix of the directions */
     BlockMap *maps;           /* of the blocks, if mapped */
