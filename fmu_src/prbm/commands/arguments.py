@@ -280,6 +280,10 @@ def shock_arguments(parser: ArgumentParser) -> None:
         "--peaks", nargs="+", metavar="A",
         help="several peaks, for the level at which a flexure yields",
     )  # fmt: skip
+    add(
+        "--sweep", choices=("peak",),
+        help="search for the level at which a flexure yields, from --peak on (default: 100 g)",
+    )  # fmt: skip
     add("--record", metavar="FILE.csv", help="acceleration over time, in place of a pulse")
     stop_time_argument(parser)
     set_argument(parser, "value of a parameter or input")
