@@ -1,7 +1,8 @@
 r"""Safety factors and fatigue of flexures, from the stress in a result.
 
-Cycles of the signed stress at both ends are counted by the rainflow method [1].  Goodman's line
-converts the amplitude of a cycle with a tensile mean to that of a fully reversed one,
+Cycles of the signed stress at both ends, and in the section of the largest stress, are counted by
+the rainflow method [1].  Goodman's line converts the amplitude of a cycle with a tensile mean to
+that of a fully reversed one,
 
     reversed = amplitude / (1 - mean / tensile_strength),
 
@@ -9,9 +10,6 @@ and Basquin's law gives the number of such cycles to failure.  It passes 0.9 of 
 strength at 1,000 cycles and the fatigue strength at its number of cycles [2], and continues on both
 sides: there is no endurance limit.  By Miner's rule, the damage is the sum of all cycles over their
 numbers to failure.  This is an estimate: surface, size, notches and scatter are not known.
-
-The right face is the mirror of the left one: its normal stress, which is small in flexures that
-bend, is taken with the opposite sign.
 
 Sources
 -------
@@ -30,6 +28,7 @@ from ..mechanics.stress import stressed
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import FlexureType
 from ..runs.result import Columns, column
+from .stress_field import StressField
 
 KNEE_SHARE = 0.9  # Of the tensile strength: the amplitude that is survived for KNEE_CYCLES.
 KNEE_CYCLES = 1e3
@@ -65,7 +64,7 @@ class Loading:
     safety : float or None
         Yield strength over the peak; None without a yield strength.
     damage : float or None
-        Damage of the run at the worse end and face; None without a fatigue strength.
+        Damage of the run in the worst section and face; None without a fatigue strength.
     """
 
     flexure: str
@@ -155,7 +154,13 @@ def damage(series: Sequence[float] | Real, kind: FlexureType) -> float | None:
     return total
 
 
-def loadings(columns: Columns, mechanism: Mechanism, *, fatigue: bool = True) -> list[Loading]:
+def loadings(
+    columns: Columns,
+    mechanism: Mechanism,
+    *,
+    fatigue: bool = True,
+    stress: StressField | None = None,
+) -> list[Loading]:
     """Return the largest stress and the fatigue of all flexures whose stress is an output.
 
     Parameters
@@ -166,6 +171,9 @@ def loadings(columns: Columns, mechanism: Mechanism, *, fatigue: bool = True) ->
         The mechanism that was simulated.
     fatigue : bool
         Whether to count cycles.
+    stress : StressField or None
+        The stress in all sections.  With it, the cycles are also those of the section with the
+        largest stress, for example of the waist of a notch; None: those of the ends only.
     """
     kinds = {kind.name: kind for kind in mechanism.flexure_types}
     result = []
@@ -177,10 +185,19 @@ def loadings(columns: Columns, mechanism: Mechanism, *, fatigue: bool = True) ->
             for output in ("peak_stress", "peak_stress_time", "peak_stress_position")
         )
         safety = kind.yield_strength / peak if kind.yield_strength and peak > 0.0 else None
-        histories = [column(columns, f"{name}.stress_{end}") for end in ("start", "end")]
         worst = None
         if fatigue and kind.fatigue_strength is not None:
-            both = [face for one in histories for face in (one, -np.asarray(one))]
-            worst = max(damage(face, kind) or 0.0 for face in both)
+            worst = max(damage(face, kind) or 0.0 for face in _histories(columns, name, stress))
         result.append(Loading(name, peak, time, position, safety, worst))
     return result
+
+
+def _histories(columns: Columns, flexure: str, stress: StressField | None) -> list[Real]:
+    """Return the stress of both faces over time, at the ends and where it is largest [Pa]."""
+    if stress is None:
+        ends = [np.asarray(column(columns, f"{flexure}.stress_{e}")) for e in ("start", "end")]
+        return [face for one in ends for face in (one, -one)]
+    faces = stress.faces[flexure]
+    largest = int(np.abs(faces).max(axis=(0, 1)).argmax())
+    places = sorted({0, largest, faces.shape[2] - 1})
+    return [faces[:, face, place] for place in places for face in (0, 1)]

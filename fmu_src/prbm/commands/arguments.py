@@ -148,6 +148,7 @@ def animation_arguments(parser: ArgumentParser) -> None:
         help="factor of slow motion (default: a round factor for a film of about ten seconds)",
     )  # fmt: skip
     engine_argument(parser)
+    add("--stress", action="store_true", help="draw the stress of the flexures as their colour")
     add("--fps", type=float, metavar="N", help="frames per second (default: 25)")
     add("--from", dest="start", metavar="T", help="first time shown [s] (default: the release)")
     add(
