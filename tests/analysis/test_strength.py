@@ -54,6 +54,7 @@ def test_life_passes_both_points_of_the_material():
     assert cycles_to_failure(0.9 * 1.2e9, 1.2e9, 4e8, 1e7) == pytest.approx(1e3)
     assert cycles_to_failure(4e8, 1.2e9, 4e8, 1e7) == pytest.approx(1e7)
     assert cycles_to_failure(0.0, 1.2e9, 4e8, 1e7) == math.inf
+    assert cycles_to_failure(1e-30, 1.2e9, 4e8, 1e7) == math.inf
 
 
 def test_tensile_mean_shortens_the_life_and_compressive_mean_does_not():

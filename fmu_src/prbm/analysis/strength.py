@@ -18,6 +18,7 @@ Sources
 """
 
 import math
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -32,6 +33,7 @@ from .stress_field import StressField
 
 KNEE_SHARE = 0.9  # Of the tensile strength: the amplitude that is survived for KNEE_CYCLES.
 KNEE_CYCLES = 1e3
+LOG_MAX = math.log(sys.float_info.max)
 
 
 @dataclass(frozen=True)
@@ -135,7 +137,8 @@ def cycles_to_failure(
     if not math.isfinite(amplitude):
         return 0.0
     exponent = math.log(fatigue / (knee * tensile)) / math.log(fatigue_cycles / KNEE_CYCLES)
-    return math.exp(math.log(KNEE_CYCLES) + math.log(amplitude / (knee * tensile)) / exponent)
+    size = math.log(KNEE_CYCLES) + math.log(amplitude / (knee * tensile)) / exponent
+    return math.exp(size) if size < LOG_MAX else math.inf
 
 
 def damage(series: Sequence[float] | Real, kind: FlexureType) -> float | None:
