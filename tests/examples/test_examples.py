@@ -221,3 +221,22 @@ def test_stroke_controller_pushes_in_the_direction_of_the_velocity(tmp_path: Pat
     controller.velocity = -0.1
     controller.do_step(0.0, 1e-3)
     assert controller.force == pytest.approx(-25.0 * 5e-3)
+
+
+def test_haptic_button_clicks_with_the_force_of_the_boundary_value_problem(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    example("haptic_button/run.py").main([])
+    printed = capsys.readouterr().out
+    lines = printed.splitlines()
+    peak, valley = map(float, re.findall(r"([\d.]+) N", lines[0]))
+    assert [peak, valley] == pytest.approx(
+        list(map(float, re.findall(r"([\d.]+) N", lines[1]))), rel=5e-3
+    )
+    assert valley < 0.5 * peak
+    static = float(re.findall(r"([\d.]+) MPa", lines[2])[0])
+    for line in lines[4:]:
+        stress, safety = map(float, re.findall(r"([\d.]+) MPa, safety factor ([\d.]+)", line)[0])
+        assert static < stress < 1.2 * static
+        assert safety == pytest.approx(830.0 / stress, rel=3e-3)
+    assert is_picture("haptic_button.png")

@@ -308,6 +308,15 @@ def test_beams_are_the_same():
         assert_same(P, beam.orthogonal(order, x, peak / peak.sum()), 1e-9)
 
 
+@twin(concentration=profile.concentration)
+def test_factors_of_the_stress_at_waists_agree() -> None:
+    pulled, bent = np.zeros(1), np.zeros(1)
+    for ratio in (1e-9, 9e-4, 0.1, 1.0, 30.0):
+        kernel().concentration(ratio, 1.0, pulled, bent)
+        expected = profile.concentration(ratio, 1.0)
+        assert (pulled[0], bent[0]) == pytest.approx(expected, rel=1e-9)  # Differences at 9e-4.
+
+
 @twin(notch_panels=profile.notch_panels, tangent=profile.Line.tangent)
 def test_panels_and_lines_are_the_same():
     shapes = [(1e-3, 8e-3, (4e-3, 2e-3), H, w) for H in (5e-3, 3e-3, 9e-3) for w in (None, 6e-3)]

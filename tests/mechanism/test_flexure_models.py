@@ -358,6 +358,7 @@ def unit_of_last_digit(number):
 
 TABLES = (
     "beams", "end force", "end moment", "frequencies", "guide", "restitution", "heavy flexures",
+    "stress",
 )  # fmt: skip
 
 

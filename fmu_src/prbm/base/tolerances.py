@@ -144,4 +144,6 @@ GAUSS_ITERATIONS_MAX = 8  # The nodes of Gauss' quadrature need four iterations 
 
 # --- stress ---
 
+WAIST_ATOL = 1e-12  # Of half a panel: a point that is nearer to a waist is at the waist.
+CONCENTRATION_SERIES_MAX = 1e-6  # Of half the waist over the radius: the series has one term.
 STRESS_TIE_RTOL = 1e-9  # Stresses of two sections that differ less are equal apart from round-off.

@@ -116,6 +116,8 @@ enum { EFFORT_MAX = 1000000 };
 #define NOTCH_PEAK_FACTOR 0.7
 enum { FINE_POINTS = 8 };
 enum { GAUSS_ITERATIONS_MAX = 8 };
+#define WAIST_ATOL 1e-12
+#define CONCENTRATION_SERIES_MAX 1e-06
 #define STRESS_TIE_RTOL 1e-09
 
 /* --- prbm.mechanics.contact_state --------------------------------------------------------------- */

@@ -106,7 +106,7 @@ def picture(
     figure = Figure((WIDTH, height + rows * row), dpi=120, layout="constrained")
     grid = figure.add_gridspec(1 + rows, COLUMNS, height_ratios=[height, *[row] * rows])
     axes = figure.add_subplot(grid[0, :])
-    drawing = _Drawing(axes, shapes)
+    drawing = Drawing(axes, shapes)
     drawing.parts()
     if start is not None:
         drawing.released(start)
@@ -143,7 +143,7 @@ def _draw_modes(
 ) -> None:
     for k, place in enumerate(places):
         axes = figure.add_subplot(place)  # type: ignore[call-overload]
-        drawing = _Drawing(axes, shapes)
+        drawing = Drawing(axes, shapes)
         drawing.ghost(E)
         drawing.shape(moved(shapes, E, found, k))
         axes.set_title(_frequency(float(found.frequency[k])), fontsize=9)
@@ -209,7 +209,7 @@ def _aligned(across: float) -> Literal["left", "center", "right"]:
     return "center" if abs(across) < 0.5 else "left" if across > 0.0 else "right"
 
 
-class _Drawing:
+class Drawing:
     """Draws shapes on axes, in a unit suited to their size."""
 
     def __init__(self, axes: Axes, shapes: Shapes) -> None:
@@ -218,6 +218,7 @@ class _Drawing:
         axes.set_aspect("equal")
 
     def line(self, z: Complex, color: str, width: float, zorder: float, style: str = "-") -> None:
+        """Draw a line through points [m]."""
         z = z * self.factor
         self.axes.plot(
             z.real, z.imag, style, color=color, linewidth=width, zorder=zorder,
@@ -225,6 +226,7 @@ class _Drawing:
         )  # fmt: skip
 
     def mark(self, z: Complex, marker: str, color: str, size: float, zorder: float) -> None:
+        """Draw markers at points [m]."""
         z = np.atleast_1d(z) * self.factor
         self.axes.plot(
             z.real, z.imag, linestyle="none", marker=marker, markersize=size, color=color,
@@ -232,6 +234,7 @@ class _Drawing:
         )  # fmt: skip
 
     def pivots(self, z: Complex, size: float, zorder: float, width: float = 1.0) -> None:
+        """Draw open circles at points [m]."""
         z = z * self.factor
         self.axes.plot(
             z.real, z.imag, "o", color=LINK, markersize=size, markerfacecolor="white",
@@ -241,6 +244,7 @@ class _Drawing:
     def text(
         self, z: complex, words: str, color: str = NAME, ha: str = "center", va: str = "center"
     ) -> None:
+        """Write words at a point [m]."""
         self.axes.annotate(
             words, (z.real * self.factor, z.imag * self.factor), color=color, fontsize=8,
             ha=ha, va=va, zorder=9, path_effects=[withStroke(linewidth=2.2, foreground="white")],
@@ -302,6 +306,7 @@ class _Drawing:
         self.axes.margins(0.08)
 
     def stops(self, E: Complex) -> None:
+        """Draw walls, hit points and names of the stops."""
         stops = self.shapes.system.mechanism.stops
         for i, (stop, wall) in enumerate(zip(stops, _walls(self.shapes), strict=True)):
             self.line(wall, WALL, 1.6, 3.5)
@@ -365,6 +370,7 @@ class _Drawing:
         )  # fmt: skip
 
     def forces(self, E: Complex) -> None:
+        """Draw arrows of the forces that are inputs."""
         length = ARROW_LENGTH * self.shapes.size * self.factor
         forces = self.shapes.system.mechanism.forces
         for force, z in zip(forces, self.shapes.forces(E), strict=True):

@@ -44,6 +44,7 @@ def simulate(
     progress: Progress | None = None,
     steps_max: float | None = None,
     engine: str | None = None,
+    observer: Callable[[Engine], None] | None = None,
 ) -> Result:
     """Simulate a mechanism from its release.
 
@@ -74,6 +75,8 @@ def simulate(
     engine : str or None
         ``"kernel"``, the C kernel, or ``"python"``, the specification, which is slower.  None: the
         kernel if it can be compiled.
+    observer : callable or None
+        Called with the simulation at each communication point.
 
     Returns
     -------
@@ -135,11 +138,13 @@ def simulate(
     driver.sample(motion.frequency, motion.tolerance, times[-1])
     start = {**motion.values, **motion.given}
     columns: Columns = np.empty(0)
+    observe = observer or _ignore
     for k, t in enumerate(times):
         driver.advance(motion, t)
         if steps_max is not None:
             _check_steps(motion, steps_max, k / (len(times) - 1))
         outputs = motion.outputs()
+        observe(motion)
         if source is not None:
             motion.set(source(t))
         row = {"time": t, **motion.given, **driver.values(t), **outputs}
@@ -159,6 +164,10 @@ def _check_walls(motion: Engine, driver: Driver, source: Source | None) -> None:
         velocity = f"{stop.name}.velocity"
         if motion.given[velocity] != 0.0:
             check_wall(velocity, motion.given, driver.signals)
+
+
+def _ignore(motion: Engine) -> None:
+    """Observe nothing."""
 
 
 def _check_effort(motion: Engine, spacing: float) -> None:

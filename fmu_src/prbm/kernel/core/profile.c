@@ -35,14 +35,36 @@ static double round_range(const Panel *panel, double *first, double *last) {
     return scale;
 }
 
-PRBM bool waist_at(const Panel *panel, double *x) {
+static double waist_of(const Panel *panel) {
     double first, last;
+    round_range(panel, &first, &last);
+    return -(first + last) / (last - first);
+}
+
+PRBM bool waist_at(const Panel *panel, double *x) {
     if (!panel->round) {
         return false;
     }
-    round_range(panel, &first, &last);
-    *x = -(first + last) / (last - first);
+    *x = waist_of(panel);
     return *x != 0.0 || panel->nodes % 2 == 0;
+}
+
+PRBM void concentration(double thickness, double radius, double *pulled, double *bent) {
+    double x = 0.5 * thickness / radius, root = sqrt(x), angle = phase(complex_of(1.0, root));
+    *pulled = 2.0 * (x + 1.0) * root / ((x + 1.0) * angle + root);
+    if (x < CONCENTRATION_SERIES_MAX) {
+        *bent = 1.0 + 2.0 * x / 5;
+    } else {
+        *bent = 4.0 * x * root / (3.0 * (root + (x - 1.0) * angle));
+    }
+}
+
+PRBM void factors_at(const Panel *panel, double x, double *pulled, double *bent) {
+    *pulled = *bent = 1.0;
+    if (panel->round && fabs(x - waist_of(panel)) < WAIST_ATOL) {
+        concentration(panel->thickness[0], panel->axes[0] * panel->axes[0] / panel->axes[1], pulled,
+                      bent);
+    }
 }
 
 static Section round_section(const Panel *panel, double x) {
