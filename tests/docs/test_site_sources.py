@@ -77,6 +77,12 @@ def test_every_page_has_one_place_in_the_contents():
     }  # fmt: skip
 
 
+def named(name: str) -> object:
+    """Return the object of a full name; several names may lead to one object."""
+    module, _, attribute = name.rpartition(".")
+    return getattr(import_module(module), attribute)
+
+
 def test_the_reference_has_the_public_names_and_those_that_pages_and_examples_import():
     documented = {
         name
@@ -91,7 +97,8 @@ def test_the_reference_has_the_public_names_and_those_that_pages_and_examples_im
         for module, names in re.findall(imports, path.read_text("utf-8")):
             parts = [name.split(" as ")[0].strip() for name in names.split(",")]
             found |= {f"{module}.{name}" for name in parts}
-    assert found - documented == set()
+    described = [named(name) for name in documented]
+    assert [name for name in found if not any(named(name) is x for x in described)] == []
 
 
 @pytest.mark.parametrize("module", ["links", "sources", "front", "gallery"])
