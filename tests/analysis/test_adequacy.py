@@ -65,6 +65,7 @@ def test_frequencies_of_the_finger_agree_with_finite_elements_only_if_it_stretch
     assert not found(stretching(FINGER), shapes=[Vibration()])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axial", [False, True])
 def test_restitution_of_the_finger_agrees_with_finite_elements_only_with_more_pivots(axial):
     pytest.importorskip("exudyn", reason="finite elements need exudyn: pip install exudyn")
@@ -148,6 +149,7 @@ def test_position_and_offset_of_an_impact_replace_those_of_the_stop():
     assert "displaced by 1 mm" in str(by_shape)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("choice", [{"model": "nR", "n": FINE_LINKS},
                                     {"model": "beam", "order": FINE_ORDER}], ids=str)  # fmt: skip
 def test_chains_of_many_links_and_beams_of_a_high_order_are_their_own_reference(choice):
@@ -214,6 +216,7 @@ def test_frequencies_that_are_round_off_are_not_compared():
     assert not differ({key: 1.0}, second, key)
 
 
+@pytest.mark.slow
 def test_of_several_places_the_largest_difference_is_kept():
     shapes = [Impact(0, wall) for wall in (1e-3, 3e-3, 2e-3)]
     result = [one for one in check(FINGER, {}, shapes) if one.quantity is Quantity.RESTITUTION]

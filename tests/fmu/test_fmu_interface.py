@@ -309,6 +309,7 @@ for name, module in sys.modules.items():
 """
 
 
+@pytest.mark.slow
 def test_an_fmu_contains_exactly_the_modules_that_it_imports(fmus, tmp_path):
     with zipfile.ZipFile(fmus["PRBDM2R"]) as archive:
         archive.extractall(tmp_path)

@@ -59,6 +59,7 @@ def assert_close(rows: np.ndarray, expected: list[dict], model: str, tolerance: 
         assert np.abs(rows[name] - wanted).max() <= (tolerance * scale).max(), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("fmi", "kind"), INTERFACES[:3])
 @pytest.mark.parametrize("model", [*SHIPPED, TWO_STOPS])
 def test_a_c_importer_reads_the_values_of_the_python_engine(model, fmi, kind):

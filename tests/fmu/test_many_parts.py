@@ -43,6 +43,7 @@ def expected():
     return rows
 
 
+@pytest.mark.slow
 def test_the_fmu_is_valid_and_equals_the_engine(fmu, expected):
     assert validate_fmu(str(fmu)) == []
     result = simulate_fmu(
@@ -126,6 +127,7 @@ def test_a_first_step_that_is_too_long_is_shortened():
     assert kernel.get("tip.x") == pytest.approx(simulation.outputs()["tip.x"])
 
 
+@pytest.mark.slow
 def test_a_contact_whose_force_touches_zero_does_not_chatter():
     """The contact force of a hammer dragged over its anvil reaches zero and grows again."""
     simulation = Simulation(anvil(), {"face.friction": 0.05, "rub.coefficient": 0.0})

@@ -251,6 +251,7 @@ def test_the_compiled_source_needs_no_resources(native, tmp_path, fmi):
     assert all(name.startswith(f"PRBDM_fmi{fmi}") for name in shown)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_two_builds_of_one_source_are_identical(native, mechanisms, fmi):
     again = native_fmu.build(read_mechanism(shipped()["PRBDM2R"]), fmi=fmi)

@@ -177,6 +177,7 @@ def test_event_mode_computes_the_same_trajectory(native, model, kind):
             assert_equal(instance, row, run.listed)
 
 
+@pytest.mark.slow
 @each_shipped
 def test_a_native_fmu_equals_the_python_fmu(fmus, native, model):
     """Positions agree within 1e-7 m and the times of all impacts within 1e-7 s in FMPy.
@@ -878,6 +879,7 @@ def test_instances_in_threads_do_not_disturb_each_other(native, fmi, kind):
     assert all(rows == expected for rows in found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_hundreds_of_consecutive_and_simultaneous_instances_run(native, fmi):
     """A hundred instances load and unload the library; then two hundred exist together."""

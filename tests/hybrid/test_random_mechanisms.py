@@ -255,6 +255,7 @@ def potential(sim, q):
     return V
 
 
+@pytest.mark.slow
 @given(mechanisms(starting=True, damping=False, friction=False), SEEDS, st.booleans())
 @laws(30)
 def test_accelerations_satisfy_lagrange_equations(mechanism, seed, held):
@@ -288,6 +289,7 @@ def test_accelerations_satisfy_lagrange_equations(mechanism, seed, held):
         )
 
 
+@pytest.mark.slow
 @given(mechanisms(starting=True), SEEDS)
 @laws(30)
 def test_the_potential_energy_is_stationary_at_an_equilibrium(mechanism, seed):
@@ -356,6 +358,7 @@ def momentum(sim):
     return p.sum(), float((z.conj() * p).imag.sum() + rotary(system).sum(axis=0) @ v)
 
 
+@pytest.mark.slow
 @given(mechanisms(starting=True), SEEDS)
 @laws(15, shrink=False)
 def test_base_reactions_equal_loads_minus_the_rate_of_momentum(mechanism, seed):
@@ -453,6 +456,7 @@ def test_the_laws_hold_for_300_random_mechanisms(seed):
     check_impacts(seeded(seed), seed)
 
 
+@pytest.mark.slow
 def test_the_random_mechanisms_have_all_features():
     """Loops, stretch, rest, friction, and impacts at walls on the ground and on bodies."""
     seen_kinds = set()

@@ -198,6 +198,7 @@ def vice():
     return replace(guide, name="Vice", stops=(replace(stop, name="left"), other))
 
 
+@pytest.mark.slow
 def test_a_failed_step_has_the_same_message_and_leaves_the_simulation_unchanged():
     closing = {"left.velocity": -0.5, "right.velocity": -0.5}
     python, kernel = both(vice())
@@ -280,6 +281,7 @@ def test_samples_end_at_the_time_of_an_error(engine):
     assert sim.time == 0.02
 
 
+@pytest.mark.slow
 def test_memory_is_freed_with_the_simulation_and_with_the_mechanism(monkeypatch):
     closed = []
     for name in ("prbm_close", "prbm_mechanism_close"):

@@ -126,6 +126,7 @@ HAMMERED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", HAMMERED)
 def test_impacts_and_rest_between_bodies_in_the_kernel_equal_those_in_the_engine(name):
     """A hammer hits a moving stage, rests and slides on it; the flexures stretch."""
@@ -134,6 +135,7 @@ def test_impacts_and_rest_between_bodies_in_the_kernel_equal_those_in_the_engine
     assert found["face.impact_count"] + found["face.contact"] > 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "guide", [elastic(), beams(), profiles()], ids=["links", "beams", "profiles"]
 )

@@ -897,6 +897,7 @@ def test_impacts_with_friction_are_the_same():
         assert_same([P_n[0], P_t[0]], expected)
 
 
+@pytest.mark.slow
 @twin(several=contact.several)
 @pytest.mark.parametrize("k", [2, 3])
 def test_simultaneous_impacts_with_friction_are_the_same(k):

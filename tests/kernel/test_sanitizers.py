@@ -49,6 +49,7 @@ def sanitized(job: Job, *words: object) -> bytes:
     return done.output
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("fmi", "kind"), INTERFACES)
 @pytest.mark.parametrize("model", QUICK_MODELS)
 def test_sanitizers_find_nothing_in_a_run_with_changes(model, fmi, kind):
@@ -65,6 +66,7 @@ def test_sanitizers_find_nothing_when_states_are_saved_and_restored(fmi, kind):
         sanitized(job, "interrupt", 50, how)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_sanitizers_find_nothing_in_hundreds_of_instances(fmi):
     job = Job(native("PRBDM2R", fmi), "cs", POINTS, library=sanitized_library())
@@ -101,6 +103,7 @@ def test_valgrind_finds_nothing_in_ten_thousand_instances(fmi, kind):
     assert not run(job, "cycles", 2500, 1, before=VALGRIND).errors
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize("model", MODELS)
 def test_arbitrary_calls_neither_crash_nor_leak(tmp_path, model, fmi):

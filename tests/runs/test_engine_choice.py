@@ -115,6 +115,7 @@ def test_the_default_experiment_does_not_depend_on_the_engine(name):
     assert experiment(mechanism(name)) == experiment(mechanism(name), engine="python")
 
 
+@pytest.mark.slow
 def test_responses_maps_and_spectra_are_equal_in_both_engines():
     guide, times = mechanism("PRBDM2R"), np.linspace(0.0, 0.1, 40)
     series = Series(times, np.zeros(40))
