@@ -126,7 +126,7 @@ def test_without_a_compiler_only_the_python_fmus_are_built(tmp_path, monkeypatch
     assert cli.main(["--model", "PRBDM"]) == cli.FAILED
     printed = capsys.readouterr()
     assert [p.name for p in (tmp_path / "dist").rglob("*.fmu")] == ["PRBDM.fmu"]
-    assert printed.err.startswith("build_fmu.py: only the Python FMUs were built: native FMUs need")
+    assert printed.err.startswith("build_fmu.py: only the Python FMUs were built: the kernel needs")
     assert "pip install ziglang" in printed.err
     assert printed.err.count("\n") == 1
 

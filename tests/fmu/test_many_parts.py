@@ -55,6 +55,7 @@ def test_the_fmu_is_valid_and_equals_the_engine(fmu, expected):
     assert result["face.impact_count"][-1] > 2
 
 
+@pytest.mark.slow
 def test_strains_are_locals_and_states_and_probes_are_outputs(fmu):
     description = read_model_description(str(fmu))
     listed = {v.name: v for v in description.modelVariables}
@@ -72,6 +73,7 @@ def test_strains_are_locals_and_states_and_probes_are_outputs(fmu):
         assert listed["der(link[3].strain_rate)"].unit == "1/s2"
 
 
+@pytest.mark.slow
 def test_descriptions_name_the_body_of_a_wall_and_the_point_of_a_force(fmu):
     listed = {v.name: v.description for v in read_model_description(str(fmu)).modelVariables}
     assert "the wall on the stage" in listed["face.displacement"]
@@ -82,6 +84,7 @@ def test_descriptions_name_the_body_of_a_wall_and_the_point_of_a_force(fmu):
     assert "do not stretch" not in page
 
 
+@pytest.mark.slow
 def test_model_exchange_equals_co_simulation(fmu, expected):
     description = read_model_description(str(fmu))
     if description.modelExchange is None:

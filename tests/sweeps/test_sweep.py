@@ -280,6 +280,7 @@ def on_disk() -> int:
     return len(pd.read_parquet("results.parquet"))
 
 
+@pytest.mark.slow
 def test_a_killed_sweep_continues_with_the_remaining_rows(mishap, log):
     """No run that is on disk is repeated, and the files have all rows in order."""
     LONG.to_csv("table.csv", index=False)
