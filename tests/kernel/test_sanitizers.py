@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from c_importer import ANVIL, TWO_STOPS, Job, described, kernel_library, native, needs, run
+from c_importer import Job, described, kernel_library, native, needs, run
 from fuzzing import (
     ENVIRONMENT,
     MODELS,
@@ -20,8 +20,6 @@ pytestmark = [pytest.mark.native, pytest.mark.slow]
 
 INTERFACES = ((2, "cs"), (3, "cs"), (3, "events"), (2, "me"), (3, "me"))
 POINTS = 1e-3 * np.arange(301)  # s; the default experiment bounces until 0.243 s, then rests.
-QUICK_MODELS = [model if model in (TWO_STOPS, ANVIL) else model for model in MODELS]
-"""The models of the tests have all features of the guides; the guides are marked as slow."""
 VALGRIND = ("valgrind", "--quiet", "--error-exitcode=9", "--leak-check=full")
 
 
@@ -47,7 +45,7 @@ def sanitized(job: Job, *words: object) -> bytes:
 
 
 @pytest.mark.parametrize(("fmi", "kind"), INTERFACES)
-@pytest.mark.parametrize("model", QUICK_MODELS)
+@pytest.mark.parametrize("model", MODELS)
 def test_sanitizers_find_nothing_in_a_run_with_changes(model, fmi, kind):
     """The results with sanitizers equal those without bit by bit."""
     job = Job(native(model, fmi), kind, POINTS, changes=changes(model))
