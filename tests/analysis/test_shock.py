@@ -157,6 +157,7 @@ def test_mistakes_are_rejected(options, words, capsys):
     assert words in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_command_prints_hits_stress_and_level_and_writes_files(tmp_path, capsys):
     line = f"shock {ACCELEROMETER} --duration 0.5ms --out {tmp_path} --stop-time 1ms"
     assert run(f'{line} --peak "500 g"') == cli.OK

@@ -230,6 +230,7 @@ def test_stroke_controller_pushes_in_the_direction_of_the_velocity(tmp_path: Pat
     assert controller.force == pytest.approx(-25.0 * 5e-3)
 
 
+@pytest.mark.slow
 def test_haptic_button_clicks_with_the_force_of_the_boundary_value_problem(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

@@ -54,6 +54,7 @@ def test_fmus_of_beams_are_valid_and_simulate_like_the_engine(fmu, expected):
         np.testing.assert_allclose(values, expected[:, k], rtol=0.0, atol=1e-6 * size)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("version", [2, 3])
 def test_model_exchange_of_beams_equals_the_engine(version, expected, native):
     found = simulate_fmu(

@@ -80,6 +80,7 @@ def on_grids() -> list:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("model", "grid"), on_grids())
 def test_the_fmu_equals_the_engine_for_every_communication_step(fmus, model, grid):
     it, (listed, rows) = case(model), engine_run(model)

@@ -120,6 +120,7 @@ def test_energy_is_conserved_with_impacts_friction_and_stretching_links(expected
     assert np.ptp(kept) <= 1e-5 * moved
 
 
+@pytest.mark.slow
 def test_a_first_step_that_is_too_long_is_shortened():
     """With strong damping, even a first step far below the period gives infinite values."""
     simulation = Simulation(elastic(), {"damping.beta": 1e-4})

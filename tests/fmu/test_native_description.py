@@ -56,6 +56,7 @@ def member(fmu: Path, name: str) -> bytes:
         return archive.read(name)
 
 
+@pytest.mark.slow
 def test_fmpy_validation_reports_no_problem(fmu):
     assert validate_fmu(str(fmu.path)) == []
 

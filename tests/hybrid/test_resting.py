@@ -29,6 +29,7 @@ def events(test):
     return pytest.mark.fmu(pytest.mark.native(test))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("twin", TWINS)
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
 def test_a_body_at_rest_follows_a_wall_that_starts_slowly(model, twin):

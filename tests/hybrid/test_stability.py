@@ -39,6 +39,7 @@ def test_stability_limits_the_step_by_the_damping_of_an_overdamped_mode():
     assert longest * np.abs(roots).max() == pytest.approx(4.0, rel=1e-9)
 
 
+@pytest.mark.slow
 @each_stiff
 @each_engine
 def test_round_off_does_not_grow_in_steps_that_stability_limits(name, engine):

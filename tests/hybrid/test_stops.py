@@ -124,6 +124,7 @@ def test_a_closed_stop_takes_part_in_an_impact_at_another_stop(friction, lever):
     assert energy_balance(sim.outputs()) == pytest.approx(start, abs=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rest_speed", [0.0, 1e-5])
 @pytest.mark.parametrize(("position", "offset"), [(0.0, 0.0), (-0.004, 0.003), (0.005, -0.002)])
 def test_converging_bounces_of_the_2r_guide_end_in_rest(rest_speed, position, offset):

@@ -39,6 +39,7 @@ def test_walls_that_close_in_are_rejected(k):
         kernel().newton(k, W, u, eps, 0.0, np.zeros(k))
 
 
+@pytest.mark.slow
 def test_a_wall_that_pushes_where_friction_locks_is_rejected():
     """The push of the wall and its friction together accelerate the point towards the wall."""
     W, u = np.array([[1.0, 2.0], [2.0, 4.0]]), np.array([-1.0, 1.0])
@@ -232,6 +233,7 @@ LIMITS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["package", "kernel"])
 @pytest.mark.parametrize(("limit", "module", "values", "message"), LIMITS)
 def test_a_search_that_ends_at_its_limit_is_an_error(

@@ -33,6 +33,7 @@ def test_oracles_report_penetration_energy_and_cost():
     assert set(found.violations()) == {"penetrated", "energy_lost", "over_budget"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["cs", "me"])
 def test_damaged_states_are_rejected_or_give_finite_values(kind):
     drawn = drive(ANVIL, 3, kind, "states", count=2, size=states.TRIALS)

@@ -322,6 +322,7 @@ def test_a_stopped_sweep_reports_the_number_of_stored_runs(mishap, log):
     assert runs(log) == Counter(set(LONG["x"]) - set(done["x"]))
 
 
+@pytest.mark.slow
 def test_a_second_sweep_into_the_same_folder_is_rejected(mishap, log):
     """The second sweep repeats no run, keeps drafts of the first, and names the first's process."""
     LONG.to_csv("table.csv", index=False)
@@ -406,6 +407,7 @@ def test_a_damaged_part_is_reported(mishap, log):
 # --- scheduler by address -----------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_scheduler_by_address_gives_the_same_results(native, mishap, log):
     """The scheduler has a worker with two threads; the plugin is removed afterwards."""
     options = {"outputs": OUTPUTS, "stop_time": 0.05}
@@ -441,6 +443,7 @@ def cluster(**options) -> LocalCluster:
     )
 
 
+@pytest.mark.slow
 def test_a_missing_scheduler_or_worker_is_reported(mishap, log, monkeypatch):
     monkeypatch.setattr(sweeps, "CONNECTION_TIMEOUT", 0.5)
     table = pd.DataFrame({"x": [1.0]})
