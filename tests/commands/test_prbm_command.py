@@ -6,6 +6,7 @@ import math
 import os
 import re
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -87,8 +88,9 @@ def test_a_study_writes_its_samples_and_prints_its_optimum(capsys):
 
 @pytest.mark.slow
 def test_commands_of_the_page_run_in_an_empty_folder(tmp_path, capsys):
-    """The printed text is that of the page."""
+    """The printed text is that of the page; the files are records and examples of the clone."""
     records(tmp_path)
+    shutil.copytree(ROOT / "examples" / "shock", tmp_path / "examples" / "shock")
     for block in re.findall(r"```sh\n(.*?)```", PAGE, re.DOTALL):
         for line in block.splitlines():
             program, _, words = line.partition(" ")

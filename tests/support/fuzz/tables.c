@@ -24,6 +24,7 @@ enum {
     SIZE_AT = 8,
     CHECKSUM_AT = 12,
     SIMULATED_COORDINATES_MAX = 24, /* larger mechanisms are not simulated: it takes too long */
+    STEPS_OF_ADVANCE = 200,
     ROOM_FOR_TABLES = 1 << 18,
     VALID_MAX = 16
 };
@@ -71,12 +72,25 @@ static double short_time(Simulation *simulation) {
     return known && frequency > 1.0 ? 1e-3 / frequency : 1e-3;
 }
 
+/* Advance to a time, and abandon a step of a stiff mechanism that takes too many steps. */
+static bool advance_or_abandon(Simulation *simulation, double time, Problem *problem) {
+    int effort = 0;
+    bool reached = false;
+    if (!simulation_advance_part(simulation, time, STEPS_OF_ADVANCE, &effort, &reached, problem)) {
+        return false;
+    }
+    if (!reached) {
+        simulation_abandon(simulation);
+    }
+    return reached;
+}
+
 static void advance(Simulation *simulation) {
     Problem problem;
     double time = short_time(simulation);
     bool event;
     read_all(simulation);
-    if (simulation_advance(simulation, time, &problem) &&
+    if (advance_or_abandon(simulation, time, &problem) &&
         simulation_advance_some(simulation, 2 * time, false, &event, &problem) && event) {
         (void)simulation_handle_event(simulation, &problem);
     }
