@@ -172,6 +172,7 @@ def test_the_command_prints_hits_stress_and_level_and_writes_files(tmp_path, cap
     assert (tmp_path / "Accelerometer-fragility.png").stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_a_record_replaces_the_pulse(tmp_path, capsys):
     record = tmp_path / "record.csv"
     t = np.linspace(0.0, 0.5e-3, 201)

@@ -67,6 +67,7 @@ def test_too_few_or_unequal_samples_are_rejected():
         spectrum(np.arange(20.0) ** 2, np.zeros(20))
 
 
+@pytest.mark.slow
 def test_the_figure_is_drawn(small_motion):
     assert png(spectrum_figure(small_motion, highest=400.0)).startswith(b"\x89PNG")
     assert len(spectrum_figure(small_motion, ("along",)).axes) == 1

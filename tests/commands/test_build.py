@@ -355,6 +355,7 @@ def test_the_icon_does_not_depend_on_matplotlibrc(mechanisms):
         assert icon(mechanism, sample) == plain
 
 
+@pytest.mark.slow
 def test_the_module_name_depends_on_the_script(mechanisms, monkeypatch):
     """FMUs in one process share all modules, and pythonfmu loads the script by its name."""
 

@@ -46,6 +46,7 @@ def guide(tmp_path, monkeypatch):
     return "guide.toml"
 
 
+@pytest.mark.slow
 def test_held_shapes_have_the_static_stress(guide, capsys):
     assert run(f"stress {guide} --held 10 18 mm --set gravity.x=0 --out out") == cli.OK
     rows = table()

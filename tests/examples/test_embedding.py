@@ -57,6 +57,7 @@ def test_each_page_has_a_lesson_a_figure_and_a_command(name):
     assert is_picture(EXAMPLES / name / f"{name}.png")
 
 
+@pytest.mark.slow
 def test_voice_coil_impacts_and_rest_agree_with_one_solver(capsys):
     """Times of impacts agree to a tenth of a step, the time of coming to rest to two steps."""
     run = example("voice_coil")
@@ -145,6 +146,7 @@ def test_harvester_prints_and_plots(capsys, monkeypatch):
     assert is_picture("energy_harvester.png")
 
 
+@pytest.mark.slow
 def test_drop_test_speeds_agree_with_the_scalar_equation_and_beam_theory():
     """Errors of the speed: 2e-4 by the piecewise constant acceleration, 3 % by the stiff 1R."""
     run = example("drop_test")

@@ -46,6 +46,7 @@ def duration(path: Path, content: str, valid: bool) -> float:
     return time.process_time() - begin
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("valid", [True, False])
 @pytest.mark.parametrize("parts", PARTS)
 def test_four_times_as_many_parts_take_about_four_times_as_long(parts, valid, tmp_path):

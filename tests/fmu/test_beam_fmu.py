@@ -67,6 +67,7 @@ def test_model_exchange_of_beams_equals_the_engine(version, expected, native):
         assert at_end == pytest.approx(expected[-1, k], abs=1e-5 * np.abs(expected[:, k]).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("version", [2, 3])
 def test_an_fmu_linearised_at_rest_has_the_frequencies_of_the_page(version, native):
     """The directional derivatives of the state derivatives have the eigenvalues +-i omega."""

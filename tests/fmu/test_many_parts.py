@@ -113,6 +113,7 @@ def test_velocities_are_the_rates_of_displacements_with_stretching_links():
             assert now[f"{name}.v{axis}"] == pytest.approx(slope, rel=1e-4, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_energy_is_conserved_with_impacts_friction_and_stretching_links(expected):
     """The energy balance is constant within 1e-5 of the work of the blow."""
     kept = [energy_balance(row) for row in expected]

@@ -222,6 +222,7 @@ def test_the_source_is_one_file_with_the_functions_of_one_version_of_fmi(mechani
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="calls cc and nm as they are on Linux")
 @pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3])
 def test_the_compiled_source_needs_no_resources(native, tmp_path, fmi):

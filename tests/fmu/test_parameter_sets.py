@@ -146,6 +146,7 @@ def test_commands_write_and_read_sets(tmp_path, capsys):
     assert main(["simulate", "Bistable", "--parameters", str(path)]) == MISTAKE
 
 
+@pytest.mark.slow
 @pytest.mark.fmu
 def test_fmus_contain_the_set_of_their_start_values(tmp_path):
     """A set applied with FMPy to an FMU gives the motion of an FMU that is built with it."""

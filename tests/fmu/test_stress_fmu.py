@@ -45,6 +45,7 @@ def expected():
     return simulation.outputs()
 
 
+@pytest.mark.slow
 def test_stress_in_co_simulation_is_that_of_the_engine(fmu, expected):
     assert validate_fmu(str(fmu)) == []
     result = simulate_fmu(

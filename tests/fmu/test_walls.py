@@ -89,6 +89,7 @@ def place(found):
     return found["stop.gap"] + found["stop.point.displacement"]
 
 
+@pytest.mark.slow
 @every_co_simulation
 @pytest.mark.parametrize("longest", [1e-3, 1e-2])
 def test_a_wall_is_within_twice_the_acceleration_times_the_step_squared(opened, fmi, kind, longest):

@@ -141,6 +141,7 @@ def test_a_stop_carries_the_load_of_a_body_at_rest_with_friction(model):
 # --- friction at the stop ---------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
 @pytest.mark.parametrize("restitution", [0.0, 0.6, 1.0])
 def test_friction_at_the_stop_does_not_gain_energy(model, restitution):

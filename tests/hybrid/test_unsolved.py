@@ -49,6 +49,7 @@ def test_a_wall_that_pushes_where_friction_locks_is_rejected():
         kernel().stronge(W, u, 1.0, 0.5, 0.0, np.zeros(1), np.zeros(1))
 
 
+@pytest.mark.slow
 def test_several_walls_that_push_where_friction_locks_are_rejected():
     """Without friction, impulses open both gaps: friction is the cause."""
     row = np.array([1.0, 1.0, 2.0, 2.0])

@@ -119,6 +119,7 @@ def test_position_error_of_a_wall_is_bounded_by_acceleration_and_step(twin, kind
     assert errors(sim, kind, velocities=velocities) < bound
 
 
+@pytest.mark.slow
 @both
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
 @pytest.mark.parametrize("kind", ["1 ms", "alternating", "random"])

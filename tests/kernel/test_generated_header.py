@@ -181,6 +181,7 @@ def test_tolerances_of_c_equal_those_of_python_bit_by_bit(exported):
             assert c_double.in_dll(library, f"value_{name}").value == value
 
 
+@pytest.mark.slow
 def test_the_runge_kutta_tableau_of_c_equals_that_of_python_bit_by_bit(exported):
     library, _, arrays = exported
     for name, expected in arrays.items():

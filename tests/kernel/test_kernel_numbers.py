@@ -106,6 +106,7 @@ COMPILERS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "how", ["cc -O0", *(pytest.param(x, marks=pytest.mark.slow) for x in ("cc -O3", "zig cc"))]
 )

@@ -80,6 +80,7 @@ def compared(guide, values, schedule, end=END, step=STEP):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENARIOS)
 @pytest.mark.parametrize("model", GUIDES)
 def test_the_motion_of_the_guides_in_the_kernel_equals_that_in_the_engine(model, name):

@@ -103,6 +103,7 @@ def test_stronge_impact_does_not_gain_energy_where_newton_with_coulomb_does():
     assert worst_newton > 0.5, "the search must include cases of the paradox"
 
 
+@pytest.mark.slow
 def test_work_of_restitution_is_restitution_squared_times_work_of_compression():
     """The works are integrated over small increments of the normal impulse (Stronge's law)."""
     for _ in range(8):

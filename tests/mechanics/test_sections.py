@@ -194,6 +194,7 @@ PROFILES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PROFILES)
 def test_forces_and_moments_on_flexures_with_profiles_balance(name):
     mechanism = replace(PROFILES[name](), gravity=(9.81, -3.0))

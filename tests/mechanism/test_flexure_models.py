@@ -136,6 +136,7 @@ def test_frequencies_with_a_body_at_the_tip_are_those_of_the_beam(model):
             assert error is None or abs(error) < bound
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tip", [(0.0, 0.0), (1.0, 0.0), (1.0, 0.1), (0.2, 0.03)])
 @pytest.mark.parametrize("mode", [1, 2, 3])
 def test_frequencies_of_a_chain_converge_to_those_of_the_beam_at_second_order(tip, mode):
@@ -248,6 +249,7 @@ def test_a_chain_guide_converges_at_second_order(axial, ns):
         assert models.order(ns[-2:], errors[-2:, i]) == pytest.approx(2.0, abs=0.1)
 
 
+@pytest.mark.slow
 def test_the_limit_of_axially_compliant_chains_is_that_of_finite_elements():
     """The limit agrees to the last digit of the finite elements; bounce and pitch to 1.5e-4.
 

@@ -433,6 +433,7 @@ def test_the_command_simulates_a_mechanism_and_writes_the_film(
         assert image.n_frames == 7
 
 
+@pytest.mark.slow
 def test_the_command_identifies_the_mechanism_of_a_result(tmp_path: Path, short: Result) -> None:
     """FMPy writes all digits, so that the films are identical."""
     fmpy.util.write_csv(tmp_path / "result.csv", short.columns)
@@ -451,6 +452,7 @@ def test_the_command_shows_a_time_span(tmp_path: Path) -> None:
         assert image.n_frames == 0.02 * 20 * 10 + 1
 
 
+@pytest.mark.slow
 @pytest.mark.fmu
 def test_for_a_result_without_links_a_command_that_records_them_is_printed(
     tmp_path: Path,

@@ -191,6 +191,7 @@ def test_stretches_follow_from_recorded_outputs() -> None:
 # --- pictures ---------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*shipped(), "Crank"])
 def test_the_picture_contains_all_parts_and_their_names(name: str) -> None:
     chosen = CRANK if name == "Crank" else mechanism(name)

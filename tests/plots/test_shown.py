@@ -59,6 +59,7 @@ def test_a_notebook_shows_the_summary_and_a_small_figure(result):
     assert picture(base64.b64decode(content)).size[0] <= 500
 
 
+@pytest.mark.slow
 def test_a_figure_is_shown_changed_and_saved(result, tmp_path):
     shown = result.plot()
     shown.figure.axes[0].set_title("changed")
@@ -66,6 +67,7 @@ def test_a_figure_is_shown_changed_and_saved(result, tmp_path):
     assert shown.save(tmp_path / "motion.png").read_bytes() == shown._repr_png_()
 
 
+@pytest.mark.slow
 def test_a_film_is_shown_and_saved(result, tmp_path):
     film = result.animate(slow=20.0, fps=5.0)
     assert repr(film) == f"<Film of {len(film.content)} bytes>"

@@ -110,6 +110,7 @@ def test_2R_with_the_convective_term_gains_no_energy(stiffness_factor, wall):
     assert (gained[-1] < -0.5) if np.isfinite(wall) else (gained.min() > -1e-3)
 
 
+@pytest.mark.slow
 def test_the_energy_gain_as_printed_does_not_depend_on_the_step():
     """A released guide conserves energy; the gain of 17 % is the same with half the step."""
     coarse, fine = (
@@ -120,6 +121,7 @@ def test_the_energy_gain_as_printed_does_not_depend_on_the_step():
     assert coarse == pytest.approx(fine, rel=0.02)
 
 
+@pytest.mark.slow
 def test_the_energy_error_with_the_convective_term_vanishes_with_the_step():
     """With half the step a method of order 4 has a sixteenth of the error (at most an eighth)."""
     coarse, fine = (
@@ -230,6 +232,7 @@ def test_the_energy_of_the_engine_does_not_grow(wall):
     assert most < 1e-7 * start
 
 
+@pytest.mark.slow
 def test_the_engine_follows_the_corrected_algorithm_of_the_thesis():
     """The thesis has a chain of links and an unweighted projection.
 

@@ -22,6 +22,7 @@ def vibration(end: float, decay: float = DECAY, step: float = 1e-4) -> dict[str,
     return {"time": t, "energy.kinetic": v**2 / 2, "mode.frequency": frequency}
 
 
+@pytest.mark.slow
 def test_settling_of_a_damped_vibration_is_the_last_crossing_of_the_threshold():
     columns = vibration(3.0)
 

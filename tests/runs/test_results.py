@@ -210,6 +210,7 @@ def test_progress_is_reported_after_a_second(
         ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_figures_do_not_depend_on_matplotlibrc(result: Result) -> None:
     plain = png(response(result))
     settings = {"lines.linewidth": 5.0, "savefig.transparent": True, "xtick.direction": "in"}

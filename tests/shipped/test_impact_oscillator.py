@@ -109,6 +109,7 @@ def driven(gap: float) -> tuple[np.ndarray, Simulation]:
     return np.array(x), simulation
 
 
+@pytest.mark.slow
 def test_the_hammer_drives_the_oscillator_only_by_impacts() -> None:
     x, simulation = driven(2e-3)
     assert simulation.outputs()["impact.impact_count"] > 5

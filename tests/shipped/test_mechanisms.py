@@ -57,6 +57,7 @@ def test_default_experiment_is_balanced_and_ends_at_rest_on_its_stop(name: str) 
         assert last["energy.kinetic"] < 5e-3 * energy_at_release(result)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LONG)
 def test_long_experiments_are_balanced_through_the_first_impact(name: str) -> None:
     """The simulation ends shortly after the first impact."""

@@ -83,6 +83,7 @@ def assert_rows_are(results: pd.DataFrame, each) -> None:
 # --- equality with single runs ------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_a_row_equals_a_run_by_fmpy_to_the_last_bit(native, fmi):
     """The step does not divide the stop time; the result contains the parameters."""
@@ -189,6 +190,7 @@ def test_a_mapping_of_outputs_names_the_columns(native):
 # --- failed runs --------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_one_failure_in_a_hundred_costs_one_row(native, fmi):
     table = samples({"stop.restitution": (0.2, 0.8)}, 100)
@@ -220,6 +222,7 @@ def test_a_crash_an_exit_a_hang_and_an_error_cost_one_row_each(mishap, log):
     assert runs(log) == Counter(table["x"])
 
 
+@pytest.mark.slow
 def test_a_crash_that_is_not_reproduced_costs_no_row(mishap, log):
     table = pd.DataFrame({"x": [1.0, 2.0, 3.0], "trouble": [FINE, CRASHES_ONCE, CRASHES]})
     out = sweep(mishap, table, step=0.5, workers=1)
@@ -358,6 +361,7 @@ def test_the_lock_of_a_sweep_that_never_began_does_not_block_the_folder(mishap, 
     assert len(sweep(mishap, pd.DataFrame({"x": [1.0]}), step=0.5, workers=1)) == 1
 
 
+@pytest.mark.slow
 def test_only_added_rows_are_computed(mishap, log):
     table = pd.DataFrame({"x": [1.0, 2.0, 3.0]})
     sweep(mishap, table[:2], step=0.5, workers=1)
@@ -365,6 +369,7 @@ def test_only_added_rows_are_computed(mishap, log):
     assert runs(log) == {1.0: 1, 2.0: 1, 3.0: 1}
 
 
+@pytest.mark.slow
 def test_results_of_another_sweep_are_rejected_or_replaced(mishap, log, native):
     """The second sweep has another step, output, value, table or FMU; no result is changed."""
     table = pd.DataFrame({"x": [1.0, 2.0]})
@@ -578,6 +583,7 @@ def test_an_unreadable_fmu_is_reported(native, tmp_path, capsys):
         assert sentence in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_an_fmu_without_a_library_for_this_platform_ends_the_sweep(native, tmp_path):
     folder = Path(fmpy.extract(native["PRBDM", 2], tmp_path / "fmu"))
     shutil.rmtree(folder / "binaries")
@@ -592,6 +598,7 @@ def test_a_missing_package_is_reported(mishap, monkeypatch):
         sweep(mishap, GRID)
 
 
+@pytest.mark.slow
 def test_the_command_prints_a_summary(native, capsys):
     table = pd.DataFrame({"stop.restitution": [0.5, 2.0]})
     table.to_csv("t.csv", index=False)

@@ -29,6 +29,7 @@ def test_named_quantities_of_fmus_are_those_of_the_engine(native, mechanisms):
         assert found["max(abs(shuttle.vx))"][row] == pytest.approx(largest, rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_inputs_over_time_of_fmus_are_those_of_the_engine(native, mechanisms, fmi):
     """Heights of the shock are a column of the table; the shock lies between two steps."""

@@ -256,6 +256,7 @@ def test_error_messages_name_variable_and_remedy(changes, sentence):
         simulate(stop_time=0.01, step=1e-3, **system)
 
 
+@pytest.mark.slow
 def test_messages_do_not_depend_on_loggers_of_other_simulations():
     """FMPy wraps the logger of the last simulation in one native logger for all."""
     simulate_fmu(str(guide(2)), stop_time=0.01, logger=lambda *_: None)

@@ -186,6 +186,7 @@ def test_wrong_causalities_and_values_are_rejected(wires, values, sentence, tmp_
     assert not any(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [np.float32(1.0), np.int64(1), np.bool_(True), True])
 def test_every_number_may_be_a_start_value(number, tmp_path):
     """Packages and containers are equal to those with Python's float."""
