@@ -12,11 +12,12 @@ import pytest
 from fmpy import simulate_fmu
 
 from browser import NARROW, WIDE, chromium
-from prbm.analysis.strength import with_stress
 from prbm.files.mechanism_file import load, shipped
 from prbm.fmu.explorer import explorer
 from prbm.fmu.native_fmu import build
 from prbm.kernel.simulation import KernelSimulation
+from prbm.mechanics.stress import with_stress
+from prbm.runs.experiment import experiment
 from support import ROOT, SUPPORT, mechanism
 
 pytestmark = [pytest.mark.native, pytest.mark.slow]
@@ -182,6 +183,34 @@ def test_the_saved_table_has_the_stress_and_its_peaks(browser, tmp_path):
     expected = np.array(KernelSimulation(chosen).sample(found["time"][1:], names))
     assert np.array_equal(np.array([found[name][1:] for name in names]).T, expected)
     assert expected[:, 3].max() > 1e8
+    assert browser.errors() == []
+
+
+def headline(browser) -> dict[str, str]:
+    """Return the entries of the headline."""
+    script = "return [...document.querySelectorAll('#headline div')].map((d) => d.innerText)"
+    return dict(entry.split("\n") for entry in browser.run(script))
+
+
+def test_the_page_shows_stress_yield_strength_and_contact_force_of_any_mechanism(browser, tmp_path):
+    plain = mechanism("GuideBeam")
+    kinds = tuple(replace(kind, yield_strength=1e9) for kind in plain.flexure_types)
+    chosen = replace(plain, flexure_types=kinds)
+    assert browser.open(written(tmp_path, chosen))["state"] == "done"
+    titles = browser.run(
+        "return [...document.querySelectorAll('.plot h3')].map((h) => h.innerText)"
+    )
+    assert titles[-2:] == ["Contact force at rest", "Stress"]
+    keys = browser.find(".plot:last-of-type .keys").text.split("\n")
+    assert keys == ["left flexure", "right flexure", "yield strength 1000\u202fMPa"]
+    simulation = KernelSimulation(with_stress(chosen))
+    default = experiment(chosen)
+    for k in range(1, round(default.stop_time / default.step) + 1):
+        simulation.advance(k * default.step)
+    peak = max(simulation.outputs()[f"{side}_flexure.peak_stress"] for side in ("left", "right"))
+    shown, factor = headline(browser)["Peak stress"].split(", safety factor ")
+    assert float(shown.removesuffix("\u202fMPa")) == pytest.approx(1e-6 * peak, rel=5e-3)
+    assert float(factor) == pytest.approx(1e9 / peak, rel=5e-3)
     assert browser.errors() == []
 
 

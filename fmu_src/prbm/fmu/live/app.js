@@ -19,6 +19,8 @@ class Page {
       ),
     );
     const slot = new Map(description.outputs.map((output) => [output.name, output.slot]));
+    const peaks = description.flexures.map(({ name }) => `${name}.peak_stress`);
+    this.outputs.push(...peaks.filter((name) => slot.has(name)));
     this.slots = this.outputs.map((name) => slot.get(name));
     this.column = new Map(this.outputs.map((name, k) => [name, k]));
     this.run = null;

@@ -236,6 +236,7 @@ def _flexures(mechanism: Mechanism, system: System) -> list[dict[str, Json]]:
                 "guided": guided,
                 "ends": ends,
                 "profile": _profile(kind),
+                "yield": kind.yield_strength,
             }
         )
     return result

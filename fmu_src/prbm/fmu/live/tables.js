@@ -15,8 +15,9 @@ const ROWS_MAX = 200; // Rows of the table; the CSV file has all outputs.
 // Return what the headline says about a run, as pairs of a term and a text.
 function headline(description, run, column) {
   const { stops } = description;
+  const stress = peakStress(description, run, column);
   if (stops.length === 0) {
-    return [["Simulated", timeText(run.time, run.time)]];
+    return [["Simulated", timeText(run.time, run.time)], ...stress];
   }
   const { impacts, impactCount } = run;
   const [first, last] = [impacts[0], impacts.at(-1)];
@@ -37,7 +38,27 @@ function headline(description, run, column) {
     ["Last impact", last ? timeText(last.time, last.time) : "none"],
     ["Lost in impacts", quantityText(lost, prefixed(lost, "J"), 3)],
     ["At the end", state],
+    ...stress,
   ];
+}
+
+// Return the entry of the headline about the largest stress so far, and the safety factor that is
+// the least of the flexures with a yield strength; empty without outputs of the stress.
+function peakStress({ flexures }, run, column) {
+  const peaks = flexures
+    .map((flexure) => ({ ...flexure, output: column.get(`${flexure.name}.peak_stress`) }))
+    .filter(({ output }) => output !== undefined)
+    .map((flexure) => ({ ...flexure, peak: run.last(flexure.output) }));
+  if (peaks.length === 0) {
+    return [];
+  }
+  const largest = Math.max(...peaks.map(({ peak }) => peak));
+  if (largest < ROUND_OFF.Pa) {
+    return [["Peak stress", stressText(0)]];
+  }
+  const safety = Math.min(...peaks.map((flexure) => (flexure.yield ?? Infinity) / flexure.peak));
+  const factor = Number.isFinite(safety) ? `, safety factor ${digits(safety, 3)}` : "";
+  return [["Peak stress", `${stressText(largest)}${factor}`]];
 }
 
 function showHeadline(parent, pairs) {
