@@ -286,7 +286,9 @@ class Page {
     const key = `${this.runs} ${run.count} ${this.started}`;
     if (key !== this.listed) {
       this.listed = key;
-      showHeadline(byId("headline"), headline(description, run, this.column));
+      const pairs = headline(description, run, this.column);
+      showHeadline(byId("headline"), pairs);
+      byId("brief").textContent = brief(pairs);
       showImpacts(byId("impacts"), description, run, (time) => this.film.seek(time));
     }
   }
