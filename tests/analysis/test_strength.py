@@ -14,8 +14,8 @@ from prbm.analysis.strength import (
     damage,
     loadings,
     reversed_amplitude,
-    with_stress,
 )
+from prbm.mechanics.stress import with_stress
 from prbm.mechanism.parts import FlexureType
 from prbm.runs.run import simulate
 

@@ -12,11 +12,12 @@ import pytest
 from fmpy import simulate_fmu
 
 from browser import NARROW, WIDE, chromium
-from prbm.analysis.strength import with_stress
 from prbm.files.mechanism_file import load, shipped
 from prbm.fmu.explorer import explorer
 from prbm.fmu.native_fmu import build
 from prbm.kernel.simulation import KernelSimulation
+from prbm.mechanics.stress import with_stress
+from prbm.runs.experiment import experiment
 from support import ROOT, SUPPORT, mechanism
 
 pytestmark = [pytest.mark.native, pytest.mark.slow]
@@ -122,6 +123,35 @@ def test_the_keyboard_changes_walls_views_and_the_film(browser, guide):
     assert browser.find("#clock").text.startswith("0")
 
 
+def test_the_space_key_starts_the_film_only_if_it_has_the_focus(browser, guide):
+    actions = pytest.importorskip("selenium.webdriver").ActionChains
+    browser.open(guide, prefers_reduced_motion="reduce")
+    browser.find("body").send_keys(" ")
+    assert browser.find("#play").text == "Play"
+    browser.run("document.getElementById('stage').focus()")
+    actions(browser.driver).send_keys(" ").perform()
+    assert browser.find("#play").text == "Pause"
+
+
+def test_the_handle_of_a_wall_is_beside_the_body_that_touches_the_wall(browser, guide):
+    browser.open(guide, prefers_reduced_motion="reduce")
+    browser.run(
+        "const scrub = document.getElementById('scrub'); scrub.value = scrub.max;"
+        "scrub.dispatchEvent(new Event('input'))"
+    )
+    side = "return document.querySelector(arguments[0]).getBoundingClientRect()[arguments[1]]"
+    body = browser.run(side, "#stage .body", "right")
+    assert browser.run(side, ".wall-handle .grip", "left") > body
+
+
+def test_the_head_of_the_parameters_shows_impacts_beside_the_changed_field(browser, guide):
+    browser.open(guide, size=NARROW, prefers_reduced_motion="reduce")
+    data = browser.changed(lambda: enter(browser, "flexure.length", "35"))
+    assert browser.find("#brief").text.startswith(f"Impacts: {data['impacts']} ")
+    place = "const box = document.getElementById('brief').getBoundingClientRect();"
+    assert browser.run(f"{place} return box.top >= 0 && box.bottom < innerHeight")
+
+
 @pytest.mark.parametrize(
     ("name", "text", "words"),
     [
@@ -182,6 +212,44 @@ def test_the_saved_table_has_the_stress_and_its_peaks(browser, tmp_path):
     expected = np.array(KernelSimulation(chosen).sample(found["time"][1:], names))
     assert np.array_equal(np.array([found[name][1:] for name in names]).T, expected)
     assert expected[:, 3].max() > 1e8
+    assert browser.errors() == []
+
+
+def peak_before_impact(chosen, changes: dict[str, float]) -> float:
+    """Return the largest stress at the last communication point before the first impact [Pa]."""
+    names = [f"{flexure.name}.peak_stress" for flexure in chosen.flexures]
+    simulation, step, k = KernelSimulation(with_stress(chosen), changes), experiment(chosen).step, 0
+    simulation.record = []
+    while not simulation.record:
+        outputs, k = simulation.outputs(), k + 1
+        simulation.advance(k * step)
+    return max(outputs[name] for name in names)
+
+
+def headline(browser) -> dict[str, str]:
+    """Return the entries of the headline."""
+    script = "return [...document.querySelectorAll('#headline div')].map((d) => d.innerText)"
+    return dict(entry.split("\n") for entry in browser.run(script))
+
+
+def test_the_page_shows_stress_yield_strength_and_contact_force_of_any_mechanism(browser, tmp_path):
+    """The wall is near the release: the stress of the 2R is much larger after the first impact."""
+    plain, changes = mechanism("PRBDM2R"), {"stop.position": -0.0117}
+    kinds = tuple(replace(kind, yield_strength=1e9) for kind in plain.flexure_types)
+    chosen = replace(plain, flexure_types=kinds)
+    path = tmp_path / "page.html"
+    path.write_text(explorer(chosen, changes), encoding="utf-8")
+    assert browser.open(path)["state"] == "done"
+    titles = browser.run(
+        "return [...document.querySelectorAll('.plot h3')].map((h) => h.innerText)"
+    )
+    assert titles[-2:] == ["Contact force at rest", "Stress"]
+    keys = browser.find(".plot:last-of-type .keys").text.split("\n")
+    assert keys == ["left flexure", "right flexure", "yield strength 1000\u202fMPa"]
+    peak = peak_before_impact(chosen, changes)
+    shown, factor = headline(browser)["Peak stress before impact"].split(", safety factor ")
+    assert float(shown.removesuffix("\u202fMPa")) == pytest.approx(1e-6 * peak, rel=5e-3)
+    assert float(factor) == pytest.approx(1e9 / peak, rel=5e-3)
     assert browser.errors() == []
 
 

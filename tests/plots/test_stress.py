@@ -7,13 +7,12 @@ import pytest
 from matplotlib.collections import LineCollection
 
 import prbm
-from prbm.analysis.strength import with_stress
 from prbm.analysis.stress_field import StressField, StressRecorder
 from prbm.commands import command_line as cli
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.sections import static_section_loads
 from prbm.mechanics.statics import equilibrium
-from prbm.mechanics.stress import faces
+from prbm.mechanics.stress import faces, with_stress
 from prbm.plots.motion import film, motion
 from prbm.plots.scene import Scene, pictures
 from prbm.plots.stress import stress_figure

@@ -15,6 +15,7 @@ from ..base.progress import Progress
 from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble
 from ..mechanics.statics import free_displacement
+from ..mechanics.stress import with_stress
 from ..mechanics.system import unit
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import Release
@@ -23,7 +24,7 @@ from ..runs.quantities import settling
 from ..runs.result import Result
 from ..runs.run import simulate
 from ..runs.signals import RAMP_SHARE, Signal, Wave, sawtooth, trapezoid
-from .strength import Loading, loadings, with_stress
+from .strength import Loading, loadings
 
 HALF_SINE, SAWTOOTH, TRAPEZOID = "half-sine", "sawtooth", "trapezoid"
 PULSES = (HALF_SINE, SAWTOOTH, TRAPEZOID)

@@ -20,7 +20,7 @@ Sources
 import math
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -75,12 +75,6 @@ class Loading:
     position: float
     safety: float | None
     damage: float | None
-
-
-def with_stress(mechanism: Mechanism) -> Mechanism:
-    """Return a mechanism whose flexures all have their stress as outputs."""
-    kinds = tuple(replace(kind, stress=True) for kind in mechanism.flexure_types)
-    return replace(mechanism, flexure_types=kinds)
 
 
 def cycles(series: Sequence[float] | Real) -> list[Cycle]:

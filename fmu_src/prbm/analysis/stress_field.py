@@ -53,7 +53,7 @@ class StressRecorder:
     Examples
     --------
     >>> import prbm
-    >>> from prbm.analysis.strength import with_stress
+    >>> from prbm.mechanics.stress import with_stress
     >>> from prbm.runs.run import simulate
     >>> recorder = StressRecorder()
     >>> guide = with_stress(prbm.load("GuideBeam"))

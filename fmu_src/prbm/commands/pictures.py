@@ -5,7 +5,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from ..analysis.adequacy import Vibration, notes
-from ..analysis.strength import with_stress
 from ..analysis.stress_field import StressRecorder
 from ..base.atomic import FileError, check_file
 from ..base.errors import ParameterError
@@ -16,6 +15,7 @@ from ..files.mechanism_file import load, read_mechanism, shipped
 from ..files.settings import UserMistake, quantity, settings
 from ..interface.variables import extent
 from ..mechanics.assembly import assemble
+from ..mechanics.stress import with_stress
 from ..mechanism.description import Mechanism
 from ..mechanism.expressions import affine
 from ..plots.animation import AnimationError, check_encoder, write_film

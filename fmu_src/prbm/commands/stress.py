@@ -2,14 +2,14 @@
 
 import argparse
 
-from ..analysis.strength import Loading, loadings, with_stress
+from ..analysis.strength import Loading, loadings
 from ..analysis.stress_field import StressRecorder
 from ..base.progress import reporter
 from ..files.mechanism_file import load
 from ..files.settings import UserMistake, quantities, settings
 from ..mechanics.assembly import assemble
 from ..mechanics.statics import equilibrium
-from ..mechanics.stress import Stress, static_stresses
+from ..mechanics.stress import Stress, static_stresses, with_stress
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import FlexureType
 from ..runs.headline import instant, length

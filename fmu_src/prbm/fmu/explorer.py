@@ -2,14 +2,11 @@
 
 from collections.abc import Mapping
 
-from ..interface.tables import tables
 from ..kernel.compiler import browser_module
 from ..mechanism.description import Mechanism
 from ..runs.experiment import experiment
 from .documentation import explorer_page
-from .live.content import content
-from .live.page import live_part
-from .native_fmu import described
+from .native_fmu import described, simulated_part
 
 
 def explorer(mechanism: Mechanism, changes: Mapping[str, float] | None = None) -> str:
@@ -31,8 +28,5 @@ def explorer(mechanism: Mechanism, changes: Mapping[str, float] | None = None) -
     changes = dict(changes or {})
     native = described(mechanism, changes, 3)
     default = experiment(mechanism, changes)
-    table = tables(mechanism, native.variables, "", native.independent, default.step)
-    described_by = content(mechanism, native.variables, native.independent, default)
-    return explorer_page(
-        mechanism, native.variables, live_part(described_by, table, browser_module())
-    )
+    part = simulated_part(mechanism, changes, default, browser_module())
+    return explorer_page(mechanism, native.variables, part)

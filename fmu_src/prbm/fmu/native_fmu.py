@@ -13,6 +13,7 @@ from ..interface.variables import CLOCK
 from ..kernel.compiler import HOST, NoCompilerError, Platform, browser_module, libraries
 from ..kernel.sources import TABLES, amalgamation, files_digest, kernel, tables_header
 from ..mechanics.independent import independent
+from ..mechanics.stress import with_stress
 from ..mechanism.description import Mechanism
 from ..runs.engine import PYTHON
 from ..runs.experiment import Experiment, experiment
@@ -108,7 +109,7 @@ def build(
     png, svg = ICONS[fmi]
     contents |= {png: icon(mechanism, sample), svg: vector_icon(mechanism, sample)}
     names = sorted(platform.name for platform in compiled)
-    part = live(mechanism, native, default, table, progress)
+    part = live(mechanism, changes, default, progress)
     contents["documentation/index.html"] = documentation.native_page(
         mechanism, native, fmi, names, default, bool(results), part
     ).encode()
@@ -120,9 +121,8 @@ def build(
 
 def live(
     mechanism: Mechanism,
-    native: NativeInterface,
+    changes: Mapping[str, float],
     default: Experiment,
-    table: bytes,
     progress: Callable[[str], None] = lambda step: None,
 ) -> LivePart | None:
     """Return the part of a page that simulates a mechanism.
@@ -131,12 +131,10 @@ def live(
     ----------
     mechanism : Mechanism
         The mechanism.
-    native : NativeInterface
-        Its variables, with the start values of the page.
+    changes : mapping
+        Start values of the page that replace those of the mechanism.
     default : Experiment
         The default experiment.
-    table : bytes
-        The tables of the mechanism.
     progress : callable
         Called with a description of the stage, and with the reason if there is no such part.
 
@@ -150,9 +148,22 @@ def live(
     except NoCompilerError as error:
         progress(f"the documentation has no simulation: {error}")
         return None
-    return live_part(
-        content(mechanism, native.variables, native.independent, default), table, module
-    )
+    return simulated_part(mechanism, changes, default, module)
+
+
+def simulated_part(
+    mechanism: Mechanism, changes: Mapping[str, float], default: Experiment, module: bytes
+) -> LivePart:
+    """Return the part of a page that simulates a mechanism, see :func:`live`.
+
+    The page shows the stress of all flexures, whether or not it is an output of the FMU.  The
+    motion does not depend on this.
+    """
+    mechanism = with_stress(mechanism)
+    native = described(mechanism, changes, 3)
+    table = tables(mechanism, native.variables, "", native.independent, default.step)
+    described_by = content(mechanism, native.variables, native.independent, default)
+    return live_part(described_by, table, module)
 
 
 def described(

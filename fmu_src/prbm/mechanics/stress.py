@@ -10,6 +10,7 @@ counter-clockwise from its start to its end), the area A and the section modulus
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -57,6 +58,12 @@ def stressed(mechanism: Mechanism) -> tuple[int, ...]:
     """
     asked = {kind.name for kind in mechanism.flexure_types if kind.stress}
     return tuple(i for i, flexure in enumerate(mechanism.flexures) if flexure.type in asked)
+
+
+def with_stress(mechanism: Mechanism) -> Mechanism:
+    """Return a mechanism whose flexures all have their stress as outputs."""
+    kinds = tuple(replace(kind, stress=True) for kind in mechanism.flexure_types)
+    return replace(mechanism, flexure_types=kinds)
 
 
 def faces(loads: SectionLoads) -> tuple[Real, Real]:

@@ -19,6 +19,8 @@ class Page {
       ),
     );
     const slot = new Map(description.outputs.map((output) => [output.name, output.slot]));
+    const peaks = description.flexures.map(({ name }) => `${name}.peak_stress`);
+    this.outputs.push(...peaks.filter((name) => slot.has(name)));
     this.slots = this.outputs.map((name) => slot.get(name));
     this.column = new Map(this.outputs.map((name, k) => [name, k]));
     this.run = null;
@@ -284,7 +286,9 @@ class Page {
     const key = `${this.runs} ${run.count} ${this.started}`;
     if (key !== this.listed) {
       this.listed = key;
-      showHeadline(byId("headline"), headline(description, run, this.column));
+      const pairs = headline(description, run, this.column);
+      showHeadline(byId("headline"), pairs);
+      byId("brief").textContent = brief(pairs);
       showImpacts(byId("impacts"), description, run, (time) => this.film.seek(time));
     }
   }

@@ -68,7 +68,7 @@ def content(
             if v.causality in ("parameter", "input")
         ],
         "outputs": [
-            {"name": v.name, "slot": slot[v.name], **_unit(v)}
+            {"name": v.name, "slot": slot[v.name]}
             for v in variables
             if v.causality == "output" and v.name in slot
         ],
@@ -236,6 +236,7 @@ def _flexures(mechanism: Mechanism, system: System) -> list[dict[str, Json]]:
                 "guided": guided,
                 "ends": ends,
                 "profile": _profile(kind),
+                "yield": kind.yield_strength,
             }
         )
     return result

@@ -52,9 +52,9 @@ class Film {
     speed.addEventListener("change", () => {
       this.slow = Number(speed.value);
     });
+    // The space key belongs to the page unless the drawing or the time has the focus.
     document.addEventListener("keydown", (event) => {
-      const free = event.target === document.body || event.target.closest("#stage");
-      if (event.key === " " && free) {
+      if (event.key === " " && event.target.closest("#stage, #scrub")) {
         event.preventDefault();
         this.toggle();
       }

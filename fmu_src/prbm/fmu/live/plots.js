@@ -3,12 +3,16 @@
 const PLOT_HEIGHT = 170;
 const INSET = { left: 58, right: 12, top: 10, bottom: 24 };
 const ZERO_RTOL = 1e-6; // Smaller values, as a share of the largest one, are shown as zero.
-const ROUND_OFF = { m: 1e-13, "m/s": 1e-12 }; // Motions below these limits are shown as zero.
+const ROUND_OFF = { m: 1e-13, "m/s": 1e-12, J: 1e-20, Pa: 1 }; // Values below them are shown as zero.
 const POINTS_MAX = 2000; // Corners of a drawn curve.
+const CURVES_MAX = 5; // Curves of a plot, each in its own colour.
+const LIMIT_FACTOR = 3; // Limits that are farther from the values, by this factor, are not drawn.
+const FIXED_UNITS = { Pa: { factor: 1e-6, shown: "MPa" } }; // Other units get a prefix of SI.
 
-// Return the plots of a mechanism: title, unit, and series with the columns of a run.
+// Return the plots of a mechanism: title, unit, and series with the columns of a run.  A plot may have
+// limits, which are lines with a label and a value, and a note below it.
 function plotList(description, column) {
-  const outputs = new Map(description.outputs.map((output) => [output.name, output]));
+  const known = new Set(description.outputs.map((output) => output.name));
   const { release } = description;
   const vertical = Math.abs(unitVector(release.direction)[1]) > 0.5;
   const axis = vertical ? "y" : "x";
@@ -29,21 +33,40 @@ function plotList(description, column) {
     ...(release.start === "angle" ? rotations : displacements),
     { title: "Energy", unit: "J", series: energies.map((name) => series(`energy.${name}`, name)) },
   ];
-  const forces = description.stops
-    .slice(0, 4)
-    .map((stop) => series(`${stop.name}.force`, words(stop.name)));
+  const curves = (parts, output, label) =>
+    parts
+      .filter(({ name }) => known.has(`${name}.${output}`))
+      .map(({ name }) => series(`${name}.${output}`, `${words(name)}${label}`));
+  const { stops, flexures } = description;
+  const peaks = curves(stops, "peak_force", " peak");
+  const forces = [...curves(stops, "force", ""), ...peaks].slice(0, CURVES_MAX);
   if (forces.length > 0) {
-    plots.push({ title: "Contact force at rest", unit: "N", series: forces, quiet: true });
+    const title = peaks.length > 0 ? "Contact force" : "Contact force at rest";
+    plots.push({ title, unit: "N", series: forces });
   }
-  const stresses = [...outputs.values()].filter(
-    (output) => output.unit === "Pa" && /\.stress$/.test(output.name),
-  );
+  const stresses = curves(flexures, "stress", "");
   if (stresses.length > 0) {
-    const shown = stresses.slice(0, 5).map((output) => series(output.name, words(output.name)));
-    plots.push({ title: "Stress", unit: "Pa", series: shown });
+    plots.push({
+      title: "Stress",
+      unit: "Pa",
+      series: stresses.slice(0, CURVES_MAX),
+      limits: yieldStrengths(flexures),
+      note:
+        "Largest stress of each flexure at each time." +
+        (stresses.length > CURVES_MAX ? ` First ${CURVES_MAX} of ${stresses.length}.` : "") +
+        (stops.length > 0 ? " After a rigid impact it depends on the flexure model: compare several." : ""),
+    });
   }
   return plots;
 }
+
+// Return the different yield strengths of flexures, as lines of a plot.
+function yieldStrengths(flexures) {
+  const found = new Set(flexures.map((flexure) => flexure.yield).filter(Boolean));
+  return [...found].map((value) => ({ label: `yield strength ${stressText(value)}`, value }));
+}
+
+const stressText = (stress) => quantityText(stress, FIXED_UNITS.Pa, 3);
 
 // The names of the outputs that the plots show.
 function plottedOutputs(description) {
@@ -74,15 +97,22 @@ class Plot {
     const keys = plot.series.map((series, k) =>
       element("span", { class: "key" }, element("i", { class: `swatch s${k}` }), series.label),
     );
+    this.limits = plot.limits ?? [];
+    const limits = this.limits.map(({ label }) =>
+      element("span", { class: "key" }, element("i", { class: "swatch limit" }), label),
+    );
     const head = element(
       "div",
       { class: "plot-head" },
       element("h3", {}, plot.title),
-      element("span", { class: "keys" }, ...keys),
+      element("span", { class: "keys" }, ...keys, ...limits),
       this.reading,
     );
     this.keys = keys;
     this.card = element("figure", { class: "card plot" }, head, this.canvas);
+    if (plot.note) {
+      this.card.append(element("figcaption", { class: "hint" }, plot.note));
+    }
     parent.append(this.card);
     this.seek = seek;
     this.listen();
@@ -107,6 +137,7 @@ class Plot {
   }
 
   // Draw the run up to the time of the film in full colours, and the rest of it in pale ones.
+  // walls: the values of lines that are always in sight.
   draw(run, now, walls, stopTime) {
     this.stopTime = stopTime;
     const width = this.canvas.clientWidth;
@@ -123,7 +154,7 @@ class Plot {
     this.setScales(run, walls, width);
     this.drawAxes(pen, width);
     this.drawImpacts(pen, run, now);
-    this.drawWalls(pen, walls, width);
+    this.drawLines(pen, [...walls, ...this.limits.map(({ value }) => value)], width);
     this.drawSeries(pen, run, now);
     this.drawCursor(pen, run, now);
   }
@@ -143,15 +174,14 @@ class Plot {
       );
     });
     this.tiny = high === low ? Infinity : ZERO_RTOL * largest;
-    if (this.plot.walls) {
-      low = Math.min(low, ...walls);
-      high = Math.max(high, ...walls);
-    }
+    const near = this.limits.map(({ value }) => value).filter((x) => x <= LIMIT_FACTOR * high);
+    low = Math.min(low, ...walls);
+    high = Math.max(high, ...walls, ...near);
     if (high === low) {
       high = low + 1;
     }
-    const unit = prefixed(Math.max(high, -low), this.plot.unit);
-    this.kind = unit;
+    const { unit } = this.plot;
+    this.kind = FIXED_UNITS[unit] ?? prefixed(Math.max(high, -low), unit);
     const room = 0.08 * (high - low);
     this.low = low < 0 ? low - room : low;
     this.high = high > 0 ? high + room : high;
@@ -208,16 +238,13 @@ class Plot {
     pen.globalAlpha = 1;
   }
 
-  drawWalls(pen, walls, width) {
-    if (!this.plot.walls) {
-      return;
-    }
+  drawLines(pen, lines, width) {
     pen.strokeStyle = this.colour("wall");
     pen.setLineDash([5, 4]);
-    for (const wall of walls) {
+    for (const line of lines.filter((value) => value <= this.high)) {
       pen.beginPath();
-      pen.moveTo(INSET.left, this.y(wall));
-      pen.lineTo(width - INSET.right, this.y(wall));
+      pen.moveTo(INSET.left, this.y(line));
+      pen.lineTo(width - INSET.right, this.y(line));
       pen.stroke();
     }
     pen.setLineDash([]);

@@ -5,6 +5,7 @@ const FOOT = 16; // Further pixels below it, for the scale.
 const FLASH_TIME = 0.35; // Seconds of the film in which the mark of an impact fades.
 const HATCH_PITCH = 11; // Pixels between two strokes of a hatching.
 const HATCHES_MIN = 4; // Strokes of a hatching.
+const HANDLE_OFFSET = [14, 15]; // Pixels of a handle behind its wall and beyond the end of the wall.
 const BOUND_SHAPES = 60; // Shapes of a run that determine the size of the drawing.
 const KEY_STEPS = 100; // Key strokes from one end of a slider to the other.
 
@@ -319,7 +320,8 @@ class Stage {
       const [wx, wy] = this.screen(point);
       const r = flash ? 6 + 22 * flash.strength * (0.4 + 0.6 * flash.age) : 0;
       filled(this.flashes[k], { cx: wx, cy: wy, r, opacity: flash ? 1 - flash.age : 0 }, []);
-      const beside = turned(into, [0, shapes.wallLength(k) / 2 + 15 / this.pixels]);
+      const [behind, beyond] = HANDLE_OFFSET.map((offset) => offset / this.pixels);
+      const beside = turned(into, [behind, shapes.wallLength(k) / 2 + beyond]);
       this.place(this.wallHandles[k], plus(point, beside), into, stop.quantity);
     });
     if (this.bodyHandle) {

@@ -15,8 +15,9 @@ const ROWS_MAX = 200; // Rows of the table; the CSV file has all outputs.
 // Return what the headline says about a run, as pairs of a term and a text.
 function headline(description, run, column) {
   const { stops } = description;
+  const stress = peakStress(description, run, column);
   if (stops.length === 0) {
-    return [["Simulated", timeText(run.time, run.time)]];
+    return [["Simulated", timeText(run.time, run.time)], ...stress];
   }
   const { impacts, impactCount } = run;
   const [first, last] = [impacts[0], impacts.at(-1)];
@@ -31,13 +32,47 @@ function headline(description, run, column) {
     [
       "First impact",
       first
-        ? `${timeText(first.time, first.time)} at ${quantityText(first.approach, speed, 4)}`
+        ? `${quantityText(first.approach, speed, 4)} at ${timeText(first.time, first.time)}`
         : "none",
     ],
     ["Last impact", last ? timeText(last.time, last.time) : "none"],
     ["Lost in impacts", quantityText(lost, prefixed(lost, "J"), 3)],
     ["At the end", state],
+    ...stress,
   ];
+}
+
+// Return the entry of the headline about the largest stress so far, and the safety factor that is
+// the least of the flexures with a yield strength; empty without outputs of the stress.  The stress
+// after a rigid impact depends on the flexure model, so that the entry ends before it.
+function peakStress({ flexures, stops }, run, column) {
+  const rigid = ({ stop }) => !column.has(`${stops[stop].name}.peak_force`);
+  const impact = run.impacts.find(rigid);
+  const row = impact ? Math.floor(impact.time / run.step) : run.count - 1;
+  const title = impact ? "Peak stress before impact" : "Peak stress";
+  const peaks = flexures
+    .map((flexure) => ({ ...flexure, output: column.get(`${flexure.name}.peak_stress`) }))
+    .filter(({ output }) => output !== undefined)
+    .map((flexure) => ({ ...flexure, peak: run.at(row, flexure.output) }));
+  if (peaks.length === 0) {
+    return [];
+  }
+  const largest = Math.max(...peaks.map(({ peak }) => peak));
+  if (largest < ROUND_OFF.Pa) {
+    return [[title, stressText(0)]];
+  }
+  const safety = Math.min(...peaks.map((flexure) => (flexure.yield ?? Infinity) / flexure.peak));
+  const factor = Number.isFinite(safety) ? `, safety factor ${digits(safety, 3)}` : "";
+  return [[title, `${stressText(largest)}${factor}`]];
+}
+
+// Return the main results of a headline as one line, for the head of the parameters.
+function brief(pairs) {
+  const shown = new Map(pairs);
+  return ["Impacts", "First impact", "At the end", "Simulated"]
+    .filter((term) => shown.has(term))
+    .map((term) => `${term}: ${shown.get(term)}`)
+    .join(" \u00b7 ");
 }
 
 function showHeadline(parent, pairs) {
