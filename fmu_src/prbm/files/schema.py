@@ -25,6 +25,7 @@ from pydantic import (
     StrictStr,
     Tag,
     ValidationInfo,
+    field_validator,
     model_validator,
 )
 from pydantic_core import CoreSchema, core_schema
@@ -132,6 +133,7 @@ Acceleration = Annotated[
     float, Measured("Acceleration of gravity", "m/s2", -1e6, 1e6, expression=False)
 ]
 End = Annotated[StrictStr, Field(json_schema_extra={"enum": list(ENDS)})]
+Law = Annotated[StrictStr, Field(json_schema_extra={"enum": list(parts.LAWS)})]
 Model = Annotated[StrictStr, Field(json_schema_extra={"enum": list(MODELS)})]
 
 
@@ -292,6 +294,19 @@ class StopTable(Named):
     restitution: Annotated[Quantity, measured(parts.Stop, "restitution")] = parts.Stop.restitution
     friction: Annotated[Quantity, measured(parts.Stop, "friction")] = parts.Stop.friction
     rest_speed: Annotated[Quantity, measured(parts.Stop, "rest_speed")] = parts.Stop.rest_speed
+    law: Law = Field(parts.RIGID, description="Law of impact")
+    exponent: Annotated[Quantity, measured(parts.Stop, "exponent")] | None = None
+    stiffness: Annotated[Quantity, measured(parts.Stop, "stiffness")] | None = None
+
+    @field_validator("stiffness", mode="before")
+    @classmethod
+    def _unit_of_stiffness(cls, written: object, info: ValidationInfo) -> object:
+        exponent = info.data.get("exponent")
+        if exponent not in (None, 1.0) and isinstance(written, str) and si_unit(written):
+            raise MechanismError(
+                f"its unit is N/m^{exponent}: write a number in this unit, without quotes"
+            )
+        return written
 
 
 class FrictionTable(Named):

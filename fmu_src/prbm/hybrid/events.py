@@ -6,18 +6,18 @@ from enum import IntEnum
 
 from ..base.errors import SimulationError
 from ..base.tolerances import EVENT_WINDOW_RTOL, EVENTS_MAX
-from . import contact_modes, guards, impacts
+from . import compliant, contact_modes, guards, impacts
 from .configuration import Configuration, Scales, contact_names
 from .front import Front
 from .guards import Guard, StepView
-from .impacts import Impact
+from .records import Impact
 
 
 class EventKind(IntEnum):
     """The kind of an event; in the C kernel, 0 is no event.
 
-    Events at one time are applied in this order.  Impacts come last, because their resolution needs
-    valid contact modes.
+    Events at one time are applied in the order of :data:`TRANSITIONS`.  Impacts come last, because
+    their resolution needs valid contact modes.
     """
 
     RELEASE = 1
@@ -27,7 +27,11 @@ class EventKind(IntEnum):
     REVERSAL = 3
     """The sliding velocity of a contact falls to zero: it sticks or slips the other way."""
     IMPACT = 4
-    """The gap of an open stop closes: an impact or a capture."""
+    """The gap of an open stop closes: an impact or a capture, or the first touch of a contact."""
+    SWITCH = 5
+    """The phase of a contact at a compliant stop changes, see :class:`.contact_state.Phase`."""
+    SEPARATION = 6
+    """The indentation of a compliant stop falls to zero: the contact ends."""
 
 
 @dataclass(frozen=True)
@@ -88,10 +92,18 @@ TRANSITIONS = (
         _settling(contact_modes.reverse),
     ),
     Transition(
+        EventKind.SWITCH, guards.switching, guards.pressed_stops, guards.switching_time,
+        _settling(compliant.switch),
+    ),
+    Transition(
+        EventKind.SEPARATION, guards.indentation, guards.pressed_stops, guards.closing_time,
+        compliant.separate,
+    ),
+    Transition(
         EventKind.IMPACT, guards.gap, guards.open_stops, guards.closing_time, impacts.impact,
     ),
 )  # fmt: skip
-"""Guards and resets of all events, in the order of their kinds."""
+"""Guards and resets of all events, in the order in which those of one time are applied."""
 
 _RESETS = {row.kind: row.reset for row in TRANSITIONS}
 

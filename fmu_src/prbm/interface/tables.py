@@ -104,9 +104,15 @@ def check_size(mechanism: Mechanism) -> None:
     Raises
     ------
     MechanismError
-        If a number is above its limit.
+        If a number is above its limit, or a stop is compliant.
     """
     m, system = mechanism, assemble(mechanism, mechanism.values())
+    for stop in m.stops:
+        if stop.compliant:
+            raise MechanismError(
+                f'{stop.name}.law = "{stop.law}" is not supported by native FMUs and the C kernel; '
+                "build a Python FMU, or choose the law rigid"
+            )
     for parts, count, limit in (
         ("coordinates", system.n, COORDINATES_MAX),
         ("directions of links, nodes and bodies", system.d, DIRECTIONS_MAX),

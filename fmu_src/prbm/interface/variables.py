@@ -271,7 +271,8 @@ def _variables(
     for probe in mechanism.probes:
         yield from _probe(probe.name, f"of {probe.point}", nominal)
     for stop in mechanism.stops:
-        yield from _stop(stop.name, nominal)
+        rigid = _stop(stop.name, nominal)
+        yield from _of_compliant_stop(rigid, stop.name, nominal) if stop.compliant else rigid
     yield from _base(nominal)
     yield from _energies(nominal)
     yield from _flexures(sample, nominal)
@@ -481,6 +482,43 @@ def _stop(stop: str, nominal: Scales) -> Iterator[Variable]:
     yield last("impulse_sum", "N.s", "Sum of all impulses of the wall, including captures", 0.0)
 
 
+COMPLIANT_DESCRIPTIONS = {
+    "force": "Force of the wall on the body",
+    "contact": "Whether the body touches the wall",
+    "impact_time": "Time of the first touch of the last impact",
+    "approach_speed": "Closing speed at the first touch of the last impact",
+    "rebound_speed": "Opening speed at the end of the last impact; 0 until then",
+    "impulse": "Impulse of the wall during the last impact; 0 until its end",
+    "energy_lost": "Energy lost during the last impact; 0 until its end",
+    "impulse_sum": "Integral of the force of the wall",
+}
+"""Descriptions of outputs that differ from those of a rigid stop."""
+
+
+def _of_compliant_stop(rigid: Iterator[Variable], stop: str, nominal: Scales) -> Iterator[Variable]:
+    """Yield the outputs of a compliant stop: those of a rigid stop, and further ones."""
+    for variable in rigid:
+        name = variable.name.removeprefix(f"{stop}.")
+        described = COMPLIANT_DESCRIPTIONS.get(name, variable.description)
+        changed = replace(variable, description=described)
+        if name == "force":
+            changed = replace(changed, minimum=-math.inf)  # Round-off at the end of a contact.
+        yield replace(changed, variability="continuous") if name == "impulse_sum" else changed
+    yield _output(
+        f"{stop}.peak_force", "N", "Largest force since the first touch of the last impact",
+        nominal, minimum=0.0,
+    )  # fmt: skip
+    yield _output(
+        f"{stop}.indentation", "m", "Largest indentation since the first touch of the last impact",
+        nominal, minimum=0.0,
+    )  # fmt: skip
+    duration = _output(
+        f"{stop}.contact_duration", "s", "Duration of the last impact until the body separates or "
+        "settles; 0 until then", nominal, minimum=0.0,
+    )  # fmt: skip
+    yield replace(duration, variability="discrete")
+
+
 def _base(nominal: Scales) -> Iterator[Variable]:
     for axis in "xy":
         yield _output(
@@ -497,7 +535,8 @@ def _base(nominal: Scales) -> Iterator[Variable]:
 def _energies(nominal: Scales) -> Iterator[Variable]:
     yield _output("energy.kinetic", "J", "Kinetic energy", nominal, minimum=0.0)
     yield _output(
-        "energy.elastic", "J", "Elastic energy of the flexures, 0 in the straight shape", nominal,
+        "energy.elastic", "J",
+        "Elastic energy of the flexures and of compliant stops, 0 in the straight shape", nominal,
         minimum=0.0,
     )  # fmt: skip
     yield _output(

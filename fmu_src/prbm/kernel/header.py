@@ -121,8 +121,12 @@ def _enumeration(name: str, prefix: str, values: Mapping[str, int | IntEnum]) ->
 
 
 def _kinds() -> dict[str, int]:
-    """Return the kinds of events, with NONE for no event and the number KINDS."""
-    return {"NONE": 0} | {kind.name: kind for kind in EventKind} | {"KINDS": len(EventKind) + 1}
+    """Return the kinds of events of the kernel, with NONE for no event and the number KINDS.
+
+    The kernel has no compliant stops, and therefore no events after IMPACT.
+    """
+    kinds = {kind.name: kind for kind in EventKind if kind <= EventKind.IMPACT}
+    return {"NONE": 0} | kinds | {"KINDS": len(kinds) + 1}
 
 
 def _numbers(names: Sequence[str]) -> dict[str, int]:

@@ -19,8 +19,8 @@ from ..base.tolerances import TOLERANCE_USED_MAX
 from ..hybrid.configuration import Configuration, Scales, checked_tolerance
 from ..hybrid.front import Latched
 from ..hybrid.given import changed_values, start_values
-from ..hybrid.impacts import Impact
 from ..hybrid.outputs import Outputs
+from ..hybrid.records import Impact
 from ..hybrid.simulation import Simulation
 from ..interface import tables
 from ..mechanics.arrays import Real
