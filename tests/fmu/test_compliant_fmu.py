@@ -10,7 +10,6 @@ from point_mass import point_mass
 from prbm.base.errors import MechanismError
 from prbm.fmu import native_fmu, python_fmu
 from prbm.hybrid.simulation import Simulation
-from prbm.runs.engine import simulation
 
 END, STEP = 2e-3, 5e-5
 OUTPUTS = (
@@ -80,12 +79,5 @@ def test_a_state_saved_in_contact_restores_in_a_python_fmu(path, tmp_path):
 
 @pytest.mark.parametrize("version", [2, 3])
 def test_a_native_fmu_of_a_compliant_stop_is_rejected(version):
-    with pytest.raises(MechanismError, match="is not supported by native FMUs"):
+    with pytest.raises(MechanismError, match="a native FMU has rigid impacts only"):
         native_fmu.build(mass(), {}, version)
-
-
-def test_the_python_engine_simulates_compliant_stops(caplog):
-    sim = simulation(mass())
-    assert sim.engine == "python"
-    with pytest.raises(MechanismError, match="not supported by native FMUs and the C kernel"):
-        simulation(mass(), engine="kernel")

@@ -38,6 +38,7 @@ from prbm.mechanics import (
     assembly,
     beam,
     complementarity,
+    compliance,
     constraints,
     contact,
     direction_map,
@@ -49,7 +50,7 @@ from prbm.mechanics import (
 )
 from prbm.mechanics import inputs as input_data
 from prbm.mechanics import system as system_arrays
-from prbm.mechanics.contact_state import ContactMode, ContactState
+from prbm.mechanics.contact_state import ContactMode, ContactState, Phase, Touching
 from prbm.mechanism import flexure
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.expressions import Affine
@@ -1035,7 +1036,14 @@ class KernelEquations:
         self.inputs = structures()["Inputs"](
             self.arrays[0].ctypes.data, base, *(part.ctypes.data for part in self.arrays[1:])
         )
-        state = structures()["ContactState"](self.modes.ctypes.data)
+        kind = structures()["Touching"]
+        self.touching = (kind * max(len(contacts.touching), 1))()
+        for to, one in zip(self.touching, contacts.touching, strict=False):
+            if one:
+                to.phase, to.reference_speed, to.depth = astuple(one)
+        state = structures()["ContactState"](
+            self.modes.ctypes.data, ctypes.addressof(self.touching)
+        )
         kernel().set_equations(self.structure, self.inputs, state, omega)
 
     def evaluate(self, t, q, v):
@@ -1254,6 +1262,39 @@ def test_contact_forces_are_the_same(name):
             assert kernel().stick_force(mine.structure, lam, c) == force
             found = kernel().friction_limit(mine.structure, e, lam, c)
             assert_same(found, limit, scale=abs(force))
+
+
+@twin(
+    damping_factor=compliance.damping_factor,
+    elastic_force=compliance.ComplianceLaw.elastic_force,
+    damping_ratio=compliance.ComplianceLaw.damping_ratio,
+    contact_force=compliance.ComplianceLaw.force,
+    contact_energy=compliance.ComplianceLaw.energy,
+    contact_tangent=compliance.ComplianceLaw.tangent,
+    is_pressed=ContactState.pressed.func,
+)
+def test_laws_of_compliant_stops_are_the_same():
+    rng = np.random.default_rng(7)
+    for e in (*rng.uniform(0.01, 1.0, 40), 0.01, 1.0):
+        n, phase = rng.choice([1.0, 1.5, 2.3]), Phase(int(rng.integers(1, 5)))
+        a = compliance.damping_factor(e)
+        assert kernel().damping_factor(e) == pytest.approx(a, rel=1e-9)
+        theirs = compliance.ComplianceLaw(10 ** rng.uniform(0, 9), n, a)
+        mine = structures()["ComplianceLaw"](*theirs)
+        one = Touching(phase, 10 ** rng.uniform(-4, 1), 1e-6)
+        touching = structures()["Touching"](*astuple(one))
+        d, rate = rng.normal() * 1e-4, rng.normal()
+        pairs = [
+            (kernel().elastic_force(mine, d), theirs.elastic_force(d)),
+            (kernel().damping_ratio(mine, touching, rate), theirs.damping_ratio(one, rate)),
+            (kernel().contact_force(mine, touching, d, rate), theirs.force(one, d, rate)),
+            (kernel().contact_energy(mine, d), theirs.energy(d)),
+            (kernel().contact_tangent(mine, abs(d)), theirs.tangent(abs(d))),
+        ]
+        for found, expected in pairs:
+            assert found == pytest.approx(expected, rel=1e-12)
+        state = ContactState((ContactMode.OPEN,), 1, (one,))
+        assert kernel().is_pressed(touching) == bool(state.pressed)
 
 
 @twin(rub_limit=dynamics.Equations.friction_limit)

@@ -8,7 +8,7 @@ from importlib.resources import files
 
 from ..base.errors import MechanismError
 from ..interface.native import NativeInterface, native_interface
-from ..interface.tables import FILE, check_size, tables
+from ..interface.tables import FILE, tables
 from ..interface.variables import CLOCK
 from ..kernel.compiler import HOST, Platform, libraries
 from ..kernel.sources import TABLES, amalgamation, files_digest, kernel, tables_header
@@ -69,7 +69,7 @@ def build(
     from ..drawing.icon import icon  # Imported here: Matplotlib takes half a second.
 
     changes = dict(changes or {})
-    check_size(mechanism)
+    mechanism.check_rigid("a native FMU")
     progress("checking the start")
     native = described(mechanism, changes, fmi, clock)
     compiled = libraries(platforms, progress)

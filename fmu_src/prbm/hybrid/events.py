@@ -16,8 +16,8 @@ from .records import Impact
 class EventKind(IntEnum):
     """The kind of an event; in the C kernel, 0 is no event.
 
-    Events at one time are applied in the order of :data:`TRANSITIONS`.  Impacts come last, because
-    their resolution needs valid contact modes.
+    Events at one time are applied in this order.  Impacts come last, because their resolution needs
+    valid contact modes.
     """
 
     RELEASE = 1
@@ -26,12 +26,12 @@ class EventKind(IntEnum):
     """A sticking contact reaches the limit of friction."""
     REVERSAL = 3
     """The sliding velocity of a contact falls to zero: it sticks or slips the other way."""
-    IMPACT = 4
-    """The gap of an open stop closes: an impact or a capture, or the first touch of a contact."""
-    SWITCH = 5
+    SWITCH = 4
     """The phase of a contact at a compliant stop changes, see :class:`.contact_state.Phase`."""
-    SEPARATION = 6
+    SEPARATION = 5
     """The indentation of a compliant stop falls to zero: the contact ends."""
+    IMPACT = 6
+    """The gap of an open stop closes: an impact or a capture, or the first touch of a contact."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ TRANSITIONS = (
         EventKind.IMPACT, guards.gap, guards.open_stops, guards.closing_time, impacts.impact,
     ),
 )  # fmt: skip
-"""Guards and resets of all events, in the order in which those of one time are applied."""
+"""Guards and resets of all events, in the order of their kinds."""
 
 _RESETS = {row.kind: row.reset for row in TRANSITIONS}
 

@@ -28,6 +28,7 @@ from ..mechanism.parts import (
     Part,
     Point,
     Release,
+    Stop,
     body_of,
     fields_of,
 )
@@ -36,6 +37,7 @@ from .variables import (
     BASE_OUTPUTS,
     BODY_OUTPUTS,
     CLOCK,
+    COMPLIANT_OUTPUTS,
     ENERGIES,
     INDICATORS,
     LATCHED,
@@ -45,7 +47,7 @@ from .variables import (
 )
 
 FILE = "mechanism.bin"
-MAGIC, VERSION = b"PRBM", 4
+MAGIC, VERSION = b"PRBM", 5
 HEAD = 16  # Bytes before those that the checksum covers.
 STARTS = ("displacement", "angle", "amplitude")  # The starts of a release.
 TYPES = {"Real": 0, "Integer": 1, "Boolean": 2, CLOCK: 3}
@@ -57,8 +59,8 @@ PLACES_MAX = 1024  # Largest number of forces, and of probes.
 GROUND_POINTS_MAX = 4096  # The kernel computes the distance of every pair of points.
 GROUND_NUMBER = 0  # Bodies are counted from 1.
 SLOT_GROUPS = (
-    "parameters", "inputs", "bodies", "stops", "base", "energies", "latched", "links", "stretches",
-    "probes", "frequency", "calculated", "derivatives", "indicators", "time",
+    "parameters", "inputs", "bodies", "stops", "base", "energies", "latched", "compliant", "links",
+    "stretches", "probes", "frequency", "calculated", "derivatives", "indicators", "time",
 )  # fmt: skip
 """The groups of values in the order of the vector of all values."""
 FIXED_NAMES = ("gravity.x", "gravity.y", "solver.tolerance", "damping.zeta", "damping.beta")
@@ -104,15 +106,9 @@ def check_size(mechanism: Mechanism) -> None:
     Raises
     ------
     MechanismError
-        If a number is above its limit, or a stop is compliant.
+        If a number is above its limit.
     """
     m, system = mechanism, assemble(mechanism, mechanism.values())
-    for stop in m.stops:
-        if stop.compliant:
-            raise MechanismError(
-                f'{stop.name}.law = "{stop.law}" is not supported by native FMUs and the C kernel; '
-                "build a Python FMU, or choose the law rigid"
-            )
     for parts, count, limit in (
         ("coordinates", system.n, COORDINATES_MAX),
         ("directions of links, nodes and bodies", system.d, DIRECTIONS_MAX),
@@ -162,6 +158,12 @@ def _groups(mechanism: Mechanism, independent: Sequence[int]) -> dict[str, Itera
         "base": BASE_OUTPUTS,
         "energies": ENERGIES,
         "latched": [f"{stop}.{output}" for stop in stops for output in LATCHED],
+        "compliant": [
+            f"{stop.name}.{output}"
+            for stop in mechanism.stops
+            if stop.compliant
+            for output in COMPLIANT_OUTPUTS
+        ],
         "links": links,
         "stretches": stretches,
         "probes": [f"{p.name}.{output}" for p in mechanism.probes for output in PROBE_OUTPUTS],
@@ -244,7 +246,7 @@ class _Writer:
         m = self.mechanism
         for stop in m.stops:
             yield _text(stop.name) + _u32(self.body[stop.body], self.body[stop.on])
-            yield self._point(stop.point) + _f64(stop.direction) + self._fields(stop)
+            yield self._point(stop.point) + _f64(stop.direction) + self._stop_fields(stop)
         for friction in m.frictions:
             yield self._placed(friction) + _f64(friction.direction) + self._fields(friction)
         for force in m.forces:
@@ -295,6 +297,16 @@ class _Writer:
     def _fields(self, part: Part) -> bytes:
         names = fields_of(part)
         return b"".join(self._field(f"{part.name}.{n}", getattr(part, n)) for n in names)
+
+    def _stop_fields(self, stop: Stop) -> bytes:
+        """Return the fields of a stop; before those of the compliant law, whether it has them."""
+        rigid = [name for name in fields_of(stop) if name not in ("stiffness", "exponent")]
+        soft = ("stiffness", "exponent") if stop.compliant else ()
+        before, after = (
+            b"".join(self._field(f"{stop.name}.{n}", getattr(stop, n)) for n in names)
+            for names in (rigid, soft)
+        )
+        return before + _u32(stop.compliant) + after
 
     def _point(self, point: Point) -> bytes:
         return b"".join(self._expression(affine(coordinate)) for coordinate in point)

@@ -39,6 +39,7 @@ LATCHED = (
     "contact", "impact_count", "impact_time", "approach_speed", "rebound_speed", "impulse",
     "energy_lost", "modal_restitution", "impulse_sum",
 )  # fmt: skip
+COMPLIANT_OUTPUTS = ("peak_force", "indentation", "contact_duration")  # Of compliant stops only.
 LINK_OUTPUTS = ("angle", "omega")
 STRETCH_OUTPUTS = ("strain", "strain_rate")
 FLEXURE_ANGLE = re.compile(r"^(link\[\d+\]|\w+\.(bend\[\d+\]|start|end))\.angle$")

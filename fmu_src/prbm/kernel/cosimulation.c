@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "hybrid/arc.h"
+#include "hybrid/compliant.h"
 #include "hybrid/configuration.h"
 #include "hybrid/contact_modes.h"
 #include "hybrid/events.h"
@@ -19,7 +20,10 @@
 static bool leave_arc(Simulation *sim, bool shown, Problem *problem) {
     State *state = &sim->state;
     bool within = state->arc.valid && state->time < state->front_time;
-    bool ok = true;
+    bool ok = latch_peaks(sim, state->time, problem);
+    if (!ok) {
+        return false;
+    }
     if (within && !shown) {
         ok = end_step(sim, state->time, problem);
     } else {
@@ -39,7 +43,7 @@ static void take_inputs(Simulation *sim) {
 /* Continue from the front with the inputs that have been set. */
 static bool restart(Simulation *sim, Problem *problem) {
     take_inputs(sim);
-    return receive_impulses(sim, problem) && settle_moved(sim, problem);
+    return reject_unsupported(sim, problem) && receive_impulses(sim, problem) && settle_moved(sim, problem);
 }
 
 static bool event_due(const State *state, double time) {
@@ -48,6 +52,9 @@ static bool event_due(const State *state, double time) {
 
 static bool apply_pending(Simulation *sim, Problem *problem) {
     Event event = sim->state.pending;
+    if (!latch_peaks(sim, event.time, problem)) {
+        return false;
+    }
     sim->state.arc.valid = false;
     sim->state.pending.kind = EVENT_NONE;
     return apply_event(sim, &event, problem);
@@ -123,7 +130,7 @@ static bool advance(Simulation *sim, double time, Stops stops, bool *event, Prob
     int effort = 0;
     for (bool stepped = false;; stepped = true) {
         if (event_due(state, time)) {
-            if (stops.events) {
+            if (stops.events && state->pending.kind != EVENT_SWITCH) {
                 *event = true;
                 state->time = state->pending.time;
                 state->interrupted = state->time < time;

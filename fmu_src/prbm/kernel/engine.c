@@ -96,6 +96,7 @@ static void record_impact(void *listener, const Impact *impact) {
         impact->index,         impact->count,   impact->time,
         impact->approach_speed, impact->rebound_speed, impact->impulse,
         impact->energy_lost,   impact->modal_restitution, impact->impulse_sum,
+        impact->peak_force,    impact->indentation, impact->contact_duration,
     };
     memcpy(to, numbers, sizeof numbers);
     copy(n, impact->q, to + ENGINE_IMPACT);

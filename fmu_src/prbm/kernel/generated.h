@@ -134,6 +134,13 @@ typedef enum {
     CONTACT_SLIP_POSITIVE = 3,
     CONTACT_SLIP_NEGATIVE = 4,
 } ContactMode;
+typedef enum {
+    PHASE_NONE = 0,
+    PHASE_PRESSED = 1,
+    PHASE_RISING = 2,
+    PHASE_FREE = 3,
+    PHASE_SETTLED = 4,
+} Phase;
 
 /* --- prbm.hybrid.events ------------------------------------------------------------------------- */
 
@@ -142,8 +149,10 @@ typedef enum {
     EVENT_RELEASE = 1,
     EVENT_SLIP = 2,
     EVENT_REVERSAL = 3,
-    EVENT_IMPACT = 4,
-    EVENT_KINDS = 5,
+    EVENT_SWITCH = 4,
+    EVENT_SEPARATION = 5,
+    EVENT_IMPACT = 6,
+    EVENT_KINDS = 7,
 } EventKind;
 
 /* --- prbm.mechanism.parts ----------------------------------------------------------------------- */
@@ -164,7 +173,7 @@ enum { NODES_MAX = 24 };
 
 /* --- prbm.interface.tables ---------------------------------------------------------------------- */
 
-enum { TABLES_VERSION = 4 };
+enum { TABLES_VERSION = 5 };
 enum { TABLES_HEAD = 16 };
 enum { COORDINATES_MAX = 512 };
 enum { DIRECTIONS_MAX = 1024 };
@@ -181,15 +190,16 @@ typedef enum {
     SLOTS_BASE = 4,
     SLOTS_ENERGIES = 5,
     SLOTS_LATCHED = 6,
-    SLOTS_LINKS = 7,
-    SLOTS_STRETCHES = 8,
-    SLOTS_PROBES = 9,
-    SLOTS_FREQUENCY = 10,
-    SLOTS_CALCULATED = 11,
-    SLOTS_DERIVATIVES = 12,
-    SLOTS_INDICATORS = 13,
-    SLOTS_TIME = 14,
-    SLOTS_GROUPS = 15,
+    SLOTS_COMPLIANT = 7,
+    SLOTS_LINKS = 8,
+    SLOTS_STRETCHES = 9,
+    SLOTS_PROBES = 10,
+    SLOTS_FREQUENCY = 11,
+    SLOTS_CALCULATED = 12,
+    SLOTS_DERIVATIVES = 13,
+    SLOTS_INDICATORS = 14,
+    SLOTS_TIME = 15,
+    SLOTS_GROUPS = 16,
 } SlotGroup;
 typedef enum {
     REAL = 0,
@@ -250,6 +260,12 @@ typedef enum {
     LATCHED_IMPULSE_SUM = 8,
 } LatchedOutput;
 enum { PER_LATCHED = 9 };
+typedef enum {
+    COMPLIANT_PEAK_FORCE = 0,
+    COMPLIANT_INDENTATION = 1,
+    COMPLIANT_CONTACT_DURATION = 2,
+} CompliantOutput;
+enum { PER_COMPLIANT = 3 };
 typedef enum {
     LINK_ANGLE = 0,
     LINK_OMEGA = 1,

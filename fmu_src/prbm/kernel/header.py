@@ -24,6 +24,7 @@ from ..interface import tables
 from ..interface.variables import (
     BASE_OUTPUTS,
     BODY_OUTPUTS,
+    COMPLIANT_OUTPUTS,
     ENERGIES,
     INDICATORS,
     LATCHED,
@@ -32,7 +33,7 @@ from ..interface.variables import (
     STOP_OUTPUTS,
     STRETCH_OUTPUTS,
 )
-from ..mechanics.contact_state import ContactMode
+from ..mechanics.contact_state import ContactMode, Phase
 from ..mechanics.inputs import BASE_AXES, INPUT_GROUPS, LOADS, WALL_INPUTS
 from ..mechanism.flexure import ENDS, LINKS_MAX, NODES_EXTRA_MIN, NODES_MAX, ORDER_MAX
 from ..mechanism.parts import LENGTH_MIN
@@ -57,7 +58,10 @@ def header() -> str:
         _section(tolerances, _tolerances()),
         _section(
             sys.modules[ContactMode.__module__],
-            [_enumeration("ContactMode", "CONTACT", {m.name: m for m in ContactMode})],
+            [
+                _enumeration("ContactMode", "CONTACT", {m.name: m for m in ContactMode}),
+                _enumeration("Phase", "PHASE", {"NONE": 0} | {p.name: p for p in Phase}),
+            ],
         ),
         _section(
             sys.modules[EventKind.__module__],
@@ -121,12 +125,8 @@ def _enumeration(name: str, prefix: str, values: Mapping[str, int | IntEnum]) ->
 
 
 def _kinds() -> dict[str, int]:
-    """Return the kinds of events of the kernel, with NONE for no event and the number KINDS.
-
-    The kernel has no compliant stops, and therefore no events after IMPACT.
-    """
-    kinds = {kind.name: kind for kind in EventKind if kind <= EventKind.IMPACT}
-    return {"NONE": 0} | kinds | {"KINDS": len(kinds) + 1}
+    """Return the kinds of events, with NONE for no event and the number KINDS."""
+    return {"NONE": 0} | {kind.name: kind for kind in EventKind} | {"KINDS": len(EventKind) + 1}
 
 
 def _numbers(names: Sequence[str]) -> dict[str, int]:
@@ -158,6 +158,7 @@ def _groups() -> Iterator[str]:
         ("BASE", tuple(output.partition(".")[2] for output in BASE_OUTPUTS)),
         ("ENERGY", tuple(energy.partition(".")[2] for energy in ENERGIES)),
         ("LATCHED", LATCHED),
+        ("COMPLIANT", COMPLIANT_OUTPUTS),
         ("LINK", LINK_OUTPUTS),
         ("STRETCH", STRETCH_OUTPUTS),
         ("PROBE", PROBE_OUTPUTS),

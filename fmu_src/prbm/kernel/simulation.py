@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.errors import ParameterError, SimulationError
+from ..base.errors import MechanismError, ParameterError, SimulationError
 from ..base.names import unknown
 from ..base.tolerances import TOLERANCE_USED_MAX
 from ..hybrid.configuration import Configuration, Scales, checked_tolerance
@@ -26,18 +26,43 @@ from ..interface import tables
 from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble, calculated
 from ..mechanics.independent import independent
+from ..mechanics.inputs import MOBILITY
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
+from ..mechanism.parts import value
 from .library import MESSAGE_LENGTH, library
 
 Slots = NDArray[np.intc]
-IMPACT = 9  # Numbers of a recorded impact before its states, ENGINE_IMPACT in C.
+IMPACT = 12  # Numbers of a recorded impact before its states, ENGINE_IMPACT in C.
+EXTRA_STATES = 2  # States of a compliant stop, EXTRA_STATES in C.
 MOTION_GROUPS = ("bodies", "probes")
 OUTPUT_GROUPS = (
-    *MOTION_GROUPS, "stops", "base", "energies", "latched", "links", "stretches", "frequency",
-    "calculated",
+    *MOTION_GROUPS, "stops", "base", "energies", "latched", "compliant", "links", "stretches",
+    "frequency", "calculated",
 )  # fmt: skip
 """The groups of values that are outputs, in the order of the Python engine."""
+
+
+def check_supported(
+    mechanism: Mechanism, values: Mapping[str, float], given: Mapping[str, float]
+) -> None:
+    """Reject values of compliant stops that only the Python engine supports.
+
+    Raises
+    ------
+    MechanismError
+        If a compliant stop has friction, or its wall has a mobility.
+    """
+    for stop in mechanism.stops:
+        for name, number in (
+            ("friction", value(stop, "friction", values)),
+            (MOBILITY, given[f"{stop.name}.{MOBILITY}"]),
+        ):
+            if stop.compliant and number:
+                raise MechanismError(
+                    f"{stop.name}.{name} = {number:g}: a compliant stop of the kernel has none; "
+                    "use the Python engine"
+                )
 
 
 class Tables:
@@ -105,6 +130,7 @@ class KernelSimulation:
         tolerance: float | None = None,
     ) -> None:
         self.values, self.given, start = start_values(mechanism, values, start_time)
+        check_supported(mechanism, self.values, self.given)
         if tolerance is not None:
             tolerance = checked_tolerance(tolerance)
         self.mechanism = mechanism
@@ -188,6 +214,10 @@ class KernelSimulation:
             value is then changed.
         """
         values, given = changed_values(self.mechanism, self.values, self.given, changes)
+        try:
+            check_supported(self.mechanism, values, given)
+        except MechanismError as error:
+            raise ParameterError(str(error)) from None
         with self._lock:
             self._set({**values, **given})
         if values != self.values:
@@ -249,10 +279,10 @@ class KernelSimulation:
         self._library.prbm_impacts(self._address, numbers.ctypes.data)
         for row in numbers:
             q, before, after = row[IMPACT:].reshape(3, n)
-            stop, hits, time, approach, rebound, impulse, lost, modal, total = row[:IMPACT].tolist()
-            latched = Latched(int(hits), time, approach, rebound, impulse, lost, modal, total)
+            stop, hits, *numbers = row[:IMPACT].tolist()
+            latched, time = Latched(int(hits), *numbers), numbers[0]
             name = self.mechanism.stops[int(stop)].name
-            self._record.append(Impact(name, time, q, before, after, impulse, latched))
+            self._record.append(Impact(name, time, q, before, after, latched.impulse, latched))
 
     # -- state and outputs --
 
@@ -262,8 +292,12 @@ class KernelSimulation:
         return int(self._library.prbm_coordinates(self._address))
 
     def state(self) -> Real:
-        """Return y = (q, v, dissipated energy, work) at the present time, on the constraints."""
-        y = np.empty(2 * self._size + 2)
+        """Return y = (q, v, dissipated energy, work) at the present time, on the constraints.
+
+        The integral of the force and the dissipated energy of each compliant stop follow.
+        """
+        compliant = sum(stop.compliant for stop in self.mechanism.stops)
+        y = np.empty(2 * self._size + 2 + EXTRA_STATES * compliant)
         with self._lock:
             if not self._library.prbm_state(self._address, y.ctypes.data, self._message):
                 raise self._error()

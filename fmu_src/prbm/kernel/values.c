@@ -16,6 +16,9 @@ PRBM bool simulation_start(Simulation *simulation, double start_time, double tol
     Simulation *sim = simulation;
     SimulationMode mode = {exchange, exchange ? LOWEST_BOUNCE_RTOL : 0.0};
     keep_backup(sim);
+    if (exchange && sim->configuration.mechanism->compliant_count > 0) {
+        return fail(problem, "compliant stops are simulated in co-simulation only");
+    }
     bool ok = start_motion(sim, start_time, tolerance, mode, problem);
     if (ok && exchange) {
         exchange_begin(sim);

@@ -9,6 +9,12 @@ PRBM ContactMode slipping_mode(double sign) {
     return sign > 0.0 ? CONTACT_SLIP_POSITIVE : CONTACT_SLIP_NEGATIVE;
 }
 
+/* Whether the contact is a force, not a constraint. */
+PRBM bool is_pressed(const Touching *touching) {
+    return touching->phase == PHASE_PRESSED || touching->phase == PHASE_RISING ||
+           touching->phase == PHASE_FREE;
+}
+
 PRBM bool is_stop(const System *system, int contact) {
     return contact < system->s;
 }

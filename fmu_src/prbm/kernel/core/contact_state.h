@@ -9,9 +9,18 @@
  * independently of other contacts. */
 PRBM int slip_sign(ContactMode mode); /* Sign of the sliding velocity: -1, 0 or +1. */
 
+/* A contact at a compliant stop.  Its phase is PHASE_NONE at other stops.  The mode of a stop that
+ * is pressed is CONTACT_OPEN, because it is no constraint. */
+typedef struct {
+    Phase phase;
+    double reference_speed, depth;
+} Touching;
+
 typedef struct {
     ContactMode *modes; /* (s + f,) */
+    Touching *touching; /* (s,) */
 } ContactState;
+PRBM bool is_pressed(const Touching *touching);
 PRBM ContactMode slipping_mode(double sign);
 PRBM bool is_stop(const System *system, int contact);
 PRBM Rows tangential_rows(const System *system, int contact, int *i);

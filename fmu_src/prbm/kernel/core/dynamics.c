@@ -38,6 +38,29 @@ static double input_power(const Equations *q, const Evaluation *at, const double
     return power;
 }
 
+/* Compute the rates of the states of compliant stops: impulse and dissipated energy.  Add the losses
+ * and the work of the walls to the rates of the energies. */
+RARE void compliant_rates(const Equations *q, const Evaluation *at, double *dy) {
+    const Mechanism *m = q->system->mechanism;
+    double *energies = dy + 2 * q->system->n, *extra = energies + 2;
+    for (int i = 0; i < m->stop_count; i++) {
+        const Touching *touching = &q->contacts.touching[i];
+        if (!m->stops[i].compliant) {
+            continue;
+        }
+        extra[EXTRA_IMPULSE] = extra[EXTRA_LOSS] = 0.0;
+        if (q->contacts.modes[i] != CONTACT_OPEN) {
+            extra[EXTRA_IMPULSE] = stop_force(q, at->lam, i);
+        } else if (is_pressed(touching)) {
+            extra[EXTRA_IMPULSE] = at->pressure[i];
+            extra[EXTRA_LOSS] = at->contact_loss[i];
+            energies[0] += at->contact_loss[i];
+            energies[1] -= at->pressure[i] * wall_motion(&q->inputs.walls[i], at->at.time).v;
+        }
+        extra += EXTRA_STATES;
+    }
+}
+
 SIZED bool rates_of_length(int even, const Equations *q, const double *y, const Reference *near,
                            Evaluation *result, double *dy) {
     int n = q->system->n;
@@ -79,6 +102,9 @@ PRBM bool rate_at_time(const Equations *equations, const double *y, const Refere
     }
     if (q->driven) {
         dy[2 * n + 1] = input_power(q, result, v);
+    }
+    if (q->system->mechanism->compliant_count > 0) {
+        compliant_rates(q, result, dy);
     }
     return true;
 }

@@ -11,6 +11,8 @@ PRBM bool rate(const Equations *equations, double t, const double *y, const Refe
  * if the walls of held stops move. */
 PRBM bool rate_at_time(const Equations *equations, const double *y, const Reference *near,
                        Evaluation *result, double *dy, Problem *problem);
+/* The states of each compliant stop behind the energies: integral of its force, dissipated energy. */
+enum { EXTRA_IMPULSE, EXTRA_LOSS, EXTRA_STATES };
 PRBM double gap(const Equations *equations, int i, double t, const Complex *e);
 PRBM double gap_acceleration(const Equations *equations, int i, double t, const Complex *e,
                              const double *v, const double *a);

@@ -20,7 +20,10 @@ PRBM void equations_place(Equations *equations, const System *system, Memory *me
     Equations q = {0};
     q.system = system;
     q.contacts.modes = place(memory, s + f, sizeof(ContactMode));
+    q.contacts.touching = place(memory, s, sizeof(Touching));
     q.held = place(memory, s, sizeof(int));
+    q.pressed = place(memory, s, sizeof(int));
+    q.laws = place(memory, s, sizeof(ComplianceLaw));
     q.sticking = place(memory, s + f, sizeof(int));
     q.slipping = place(memory, s + f, sizeof(int));
     q.stop_friction = place(memory, s, sizeof(double));
@@ -63,11 +66,15 @@ static void set_rows(Equations *q) {
         add_row(q, &loops, k, system->loops_c[k]);
     }
     q->first_hold = q->r;
-    q->held_count = q->sticking_count = q->slipping_count = 0;
+    q->held_count = q->sticking_count = q->slipping_count = q->pressed_count = 0;
     for (int i = 0; i < system->s; i++) {
+        const Touching *touching = &q->contacts.touching[i];
         if (q->contacts.modes[i] != CONTACT_OPEN) {
+            double depth = touching->phase == PHASE_SETTLED ? touching->depth : 0.0;
             q->held[q->held_count++] = i;
-            add_row(q, &gaps, i, system->gaps_c[i] + q->inputs.walls[i].position);
+            add_row(q, &gaps, i, system->gaps_c[i] + q->inputs.walls[i].position + depth);
+        } else if (is_pressed(touching)) {
+            q->pressed[q->pressed_count++] = i;
         }
     }
     q->first_stick = q->r;
@@ -124,7 +131,13 @@ static void set_laws(Equations *q) {
     q->beta = values[m->damping_beta];
     q->mass_damping = 2.0 * values[m->damping_zeta] * q->omega;
     for (int i = 0; i < m->stop_count; i++) {
-        q->stop_friction[i] = evaluate(m->stops[i].friction, values);
+        const Stop *stop = &m->stops[i];
+        q->stop_friction[i] = evaluate(stop->friction, values);
+        if (stop->compliant) {
+            q->laws[i].stiffness = evaluate(stop->stiffness, values);
+            q->laws[i].exponent = evaluate(stop->exponent, values);
+            q->laws[i].damping = damping_factor(evaluate(stop->restitution, values));
+        }
     }
     for (int i = 0; i < m->friction_count; i++) {
         q->rub_law[3 * i] = evaluate(m->frictions[i].coefficient, values);
@@ -175,6 +188,7 @@ PRBM void set_equations(Equations *equations, const Inputs *inputs,
     q->omega = omega;
     q->slipping_stops = 0;
     memmove(q->contacts.modes, contacts->modes, count * sizeof(ContactMode));
+    memmove(q->contacts.touching, contacts->touching, (size_t)q->system->s * sizeof(Touching));
     set_laws(q);
     set_rows(q);
     set_row_parts(q);

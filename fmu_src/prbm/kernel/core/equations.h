@@ -3,7 +3,7 @@
 #define PRBM_EQUATIONS_H
 
 #include "core/constraints.h"
-#include "core/contact_state.h"
+#include "core/compliance.h"
 
 /* A wall that joins its reference, a uniform motion, along a cubic.  At the time since, the wall is
  * ahead of the reference by the offset [m] and faster by the excess [m/s]; after the span [s] it
@@ -32,7 +32,10 @@ typedef struct {
     double omega, beta, mass_damping;
     int r, first_hold, first_stick;
     int held_count, sticking_count, slipping_count;
-    int *held;              /* the stops that are closed */
+    int *held;              /* the stops that are constraints */
+    int *pressed;           /* the compliant stops that are forces */
+    int pressed_count;
+    ComplianceLaw *laws;    /* (s,) of compliant stops */
     int *sticking;          /* contacts; the k-th has the row first_stick + k */
     int *slipping;          /* contacts; the first slipping_stops of them are stops */
     int slipping_stops;

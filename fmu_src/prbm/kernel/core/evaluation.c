@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/block_map.h"
+#include "core/dynamics.h"
 #include "core/evaluation.h"
 #include "core/forces.h"
 #include "core/kinetics.h"
@@ -54,6 +55,8 @@ PRBM void evaluation_place(Evaluation *evaluation, const System *system, Memory 
     result.a = place(memory, even + 2, sizeof(double));
     result.lam = place(memory, r, sizeof(double));
     result.block = place(memory, wide * wide, sizeof(double));
+    result.pressure = place(memory, (size_t)system->s, sizeof(double));
+    result.contact_loss = place(memory, (size_t)system->s, sizeof(double));
     result.factors.even = (int)even;
     result.factors.blocks = system->mass_blocks;
     result.factors.L = place(memory, n * n, sizeof(double));
@@ -554,6 +557,22 @@ RARE void add_friction_and_walls(const Equations *q, Evaluation *result) {
     }
 }
 
+/* Add the forces of pressed compliant stops. */
+RARE void add_pressure(const Equations *q, Evaluation *result) {
+    Rows gaps = gap_rows(q->system);
+    double t = result->at.time;
+    for (int k = 0; k < q->pressed_count; k++) {
+        int i = q->pressed[k];
+        double d = -gap(q, i, t, result->at.e);
+        double rate = -gap_rate(q, i, t, result->at.e, result->at.speed);
+        double force = contact_force(&q->laws[i], &q->contacts.touching[i], d, rate);
+        result->pressure[i] = force;
+        result->contact_loss[i] = (force - elastic_force(&q->laws[i], d)) * rate;
+        row_jacobian(&gaps, i, result->at.e, result->row);
+        add_scaled(q->system->n, force, result->row, result->a);
+    }
+}
+
 /* Set the columns of slipping stops.  Coulomb's law adds a force along the wall to the normal
  * force, so that the column of such a stop differs from its row. */
 RARE void set_columns(const Equations *q, Evaluation *result) {
@@ -609,6 +628,9 @@ SHARED bool motion_of_length(int even, const Equations *q, const Reference *near
     add_springs(even, q, result);
     if (q->friction_or_walls) {
         add_friction_and_walls(q, result);
+    }
+    if (q->pressed_count > 0) {
+        add_pressure(q, result);
     }
     if (!factor_motion(even, q, result)) {
         return false;

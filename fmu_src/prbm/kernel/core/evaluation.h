@@ -35,6 +35,7 @@ typedef struct {
     double *mass, *shift;            /* (n, n), (wide,) M and Im(w^2), if mapped */
     double *block;                   /* of M, below its diagonal */
     double spring_loss;              /* the power that the springs dissipate */
+    double *pressure, *contact_loss; /* (s,) forces and dissipated powers of pressed stops */
     Factors factors;
 } Evaluation;
 

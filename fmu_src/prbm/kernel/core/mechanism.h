@@ -63,6 +63,8 @@ typedef struct {
     Point point;
     double direction; /* deg */
     Expression position, offset, restitution, friction, rest_speed;
+    bool compliant;
+    Expression stiffness, exponent; /* of a compliant stop */
 } Stop;
 
 typedef struct {
@@ -109,8 +111,8 @@ typedef struct {
 
 /* The first slot of each group in the vector of all values. */
 typedef struct {
-    int parameters, inputs, bodies, stops, base, energies, latched, links, stretches, probes,
-        frequency, calculated, derivatives, indicators, time, count;
+    int parameters, inputs, bodies, stops, base, energies, latched, compliant, links, stretches,
+        probes, frequency, calculated, derivatives, indicators, time, count;
 } Slots;
 
 /* The first index of each group of inputs; the forces begin at 0. */
@@ -178,6 +180,7 @@ typedef struct {
     /* Sizes of the assembled system. */
     int coordinate_count, direction_count, loop_count, link_count, strain_count, stretch_count,
         mass_count, spring_count;
+    int compliant_count; /* Number of compliant stops. */
     int longest; /* Largest number of links or nodes of a flexure. */
     Slots slots;
 } Mechanism;

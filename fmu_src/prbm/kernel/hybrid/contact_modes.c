@@ -2,6 +2,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "hybrid/compliant.h"
 #include "hybrid/configuration.h"
 #include "hybrid/contact_modes.h"
 #include "hybrid/impacts.h"
@@ -23,6 +24,8 @@ static const ContactFailure UNSETTLED = {
 /* Set up the trial equations in a contact state. */
 static void try_contacts(Simulation *sim, const ContactMode *modes) {
     memmove(sim->trial.contacts.modes, modes, (size_t)contact_count(sim) * sizeof *modes);
+    memmove(sim->trial.contacts.touching, sim->state.touching,
+            (size_t)system_of(sim)->s * sizeof *sim->state.touching);
     set_equations(&sim->trial.equations, &sim->equations.inputs, &sim->trial.contacts,
                   sim->configuration.omega);
 }
@@ -119,6 +122,8 @@ static double least_pressing(Simulation *sim, int stop, const double *q) {
     double distance = gap(&sim->equations, stop, sim->state.front_time, directions_at(sim, q));
     const Configuration *configuration = &sim->configuration;
     sim->scratch.used = mark;
+    const Touching *touching = &sim->state.touching[stop];
+    distance += touching->phase == PHASE_SETTLED ? touching->depth : 0.0;
     return distance > -closing_depth(configuration) / 2.0 ? zero_acceleration(configuration) : 0.0;
 }
 
@@ -464,6 +469,17 @@ static bool choose_modes(Simulation *sim, const HoldingSet *touching, const Fric
     return settle_friction(sim, &holding, touching, event, modes, problem);
 }
 
+/* Remove the compliant stops that are pressed: they are no constraints. */
+static void remove_pressed(const Simulation *sim, HoldingSet *stops) {
+    int count = 0;
+    for (int k = 0; k < stops->count; k++) {
+        int i = stops->stops[k];
+        stops->stops[count] = i;
+        count += !is_pressed(&sim->state.touching[i]);
+    }
+    stops->count = count;
+}
+
 /* Choose the contact state at the front from its positions and velocities.  The projection closes
  * gaps of round-off, which changes the forces of stiff flexures: the modes are chosen again until
  * they stay the same.
@@ -492,6 +508,9 @@ PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const
         }
         bool same = k > 0 && memcmp(modes, sim->state.modes, bytes) == 0;
         set_contacts(sim, modes);
+        if (press_released(sim)) {
+            remove_pressed(sim, &all);
+        }
         if (same || sim->equations.held_count == 0) {
             return true;
         }
@@ -523,12 +542,14 @@ static int release_moving(Simulation *sim) {
     gaps_and_rates(sim, gaps, rates);
     for (int i = 0; i < system->s; i++) {
         bool closed = sim->state.modes[i] != CONTACT_OPEN;
+        bool compliant = system->mechanism->stops[i].compliant;
         if (closed && fabs(rates[i]) > bound) {
             set_mode(sim, i, CONTACT_OPEN);
-        } else if (closed || gaps[i] > TOUCHING_RTOL * system->length) {
+            (void)press_released(sim);
+        } else if (compliant || closed || gaps[i] > TOUCHING_RTOL * system->length) {
             continue;
         }
-        struck = rates[i] < -bound ? i : struck;
+        struck = rates[i] < -bound && !compliant ? i : struck;
     }
     return struck;
 }
@@ -536,6 +557,9 @@ static int release_moving(Simulation *sim) {
 /* Choose the contact state after changes of the walls' velocities or impulses. */
 PRBM bool settle_moved(Simulation *sim, Problem *problem) {
     int struck = release_moving(sim);
+    if (!rephase(sim, problem)) {
+        return false;
+    }
     if (struck >= 0) {
         return impact(sim, struck, problem);
     }

@@ -1,5 +1,6 @@
 /* Events: the table of guards and resets, the first event of a step, and the limit of the number of
  * events: the twin of hybrid/events.py. */
+#include "hybrid/compliant.h"
 #include "hybrid/contact_modes.h"
 #include "hybrid/events.h"
 #include "hybrid/guards.h"
@@ -14,7 +15,16 @@ static bool apply_impact(Simulation *sim, const Event *event, Problem *problem) 
 
 static bool apply_release(Simulation *sim, const Event *event, Problem *problem) {
     set_mode(sim, event->contact, CONTACT_OPEN);
+    (void)press_released(sim);
     return settle(sim, NULL, 0, NULL, problem);
+}
+
+static bool apply_switch(Simulation *sim, const Event *event, Problem *problem) {
+    return switch_phase(sim, event->contact, problem);
+}
+
+static bool apply_separation(Simulation *sim, const Event *event, Problem *problem) {
+    return separate(sim, event->contact, problem);
 }
 
 /* A slip or a reversal. */
@@ -31,6 +41,10 @@ static const Transition TRANSITIONS[EVENT_KINDS] = {
                     apply_friction},
     [EVENT_REVERSAL] = {{"reversal", reversal_guard, false}, slipping_contact, reversal_near, true,
                         reversal_time, apply_friction},
+    [EVENT_SWITCH] = {{"switch", switching_guard, false}, pressed_stop, pressed_near, true,
+                      switching_time, apply_switch},
+    [EVENT_SEPARATION] = {{"separation", indentation_guard, false}, pressed_stop, pressed_near,
+                          true, closing_time, apply_separation},
     [EVENT_IMPACT] = {{"impact", gap_guard, false}, open_stop, impact_near, true, closing_time,
                       apply_impact},
 };

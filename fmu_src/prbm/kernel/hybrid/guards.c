@@ -19,8 +19,44 @@ static double gap_rate_guard(const Equations *equations, const Instant *at, int 
     return gap_rate(equations, contact, at->time, at->e, at->v);
 }
 
+PRBM double indentation_guard(const Equations *equations, const Instant *at, int contact) {
+    return -gap_guard(equations, at, contact);
+}
+
+static double indentation_rate_guard(const Equations *equations, const Instant *at, int contact) {
+    return -gap_rate_guard(equations, at, contact);
+}
+
+/* The rate of the gap, or of the indentation, that a guard of a closing gap belongs to. */
+static GuardValue *rate_of(const Guard *guard) {
+    return guard->value == indentation_guard ? indentation_rate_guard : gap_rate_guard;
+}
+
+/* The margin of the phase of a contact.  It begins to rise when its rate exceeds the reference
+ * speed; it becomes free when its damping exceeds the elastic force. */
+PRBM double switching_guard(const Equations *equations, const Instant *at, int contact) {
+    const Touching *touching = &equations->contacts.touching[contact];
+    double rate = -gap_rate_guard(equations, at, contact);
+    double ratio = damping_ratio(&equations->laws[contact], touching, rate);
+    if (touching->phase == PHASE_FREE) {
+        return PHASE_RTOL - ratio;
+    }
+    return lesser(PHASE_RTOL + ratio, 1.0 + PHASE_RTOL - rate / touching->reference_speed);
+}
+
+/* The second derivative of the indentation, with which the reference speed rises. */
+static double rising_guard(const Equations *equations, const Instant *at, int contact) {
+    return -gap_acceleration(equations, contact, at->time, at->e, at->v, at->a);
+}
+
 PRBM double release_guard(const Equations *equations, const Instant *at, int contact) {
-    return stop_force(equations, at->lam, contact);
+    const Touching *touching = &equations->contacts.touching[contact];
+    double force = stop_force(equations, at->lam, contact);
+    if (touching->phase != PHASE_SETTLED) {
+        return force;
+    }
+    double elastic = elastic_force(&equations->laws[contact], touching->depth);
+    return SETTLED_FORCE_RTOL * elastic - fabs(force - elastic);
 }
 
 PRBM double slip_guard(const Equations *equations, const Instant *at, int contact) {
@@ -37,7 +73,8 @@ PRBM double reversal_guard(const Equations *equations, const Instant *at, int co
 /* --- contacts and steps in which events may occur --------------------------------------------- */
 
 PRBM bool held_stop(const Equations *equations, int contact) {
-    return is_stop(equations->system, contact) && !open_stop(equations, contact);
+    return is_stop(equations->system, contact) &&
+           equations->contacts.modes[contact] != CONTACT_OPEN;
 }
 
 PRBM bool sticking_contact(const Equations *equations, int contact) {
@@ -52,7 +89,18 @@ PRBM bool slipping_contact(const Equations *equations, int contact) {
 
 PRBM bool open_stop(const Equations *equations, int contact) {
     return is_stop(equations->system, contact) &&
-           equations->contacts.modes[contact] == CONTACT_OPEN;
+           equations->contacts.modes[contact] == CONTACT_OPEN &&
+           equations->contacts.touching[contact].phase == PHASE_NONE;
+}
+
+PRBM bool pressed_stop(const Equations *equations, int contact) {
+    return is_stop(equations->system, contact) &&
+           equations->contacts.modes[contact] == CONTACT_OPEN &&
+           is_pressed(&equations->contacts.touching[contact]);
+}
+
+PRBM bool pressed_near(Simulation *sim) {
+    return sim->equations.pressed_count > 0;
 }
 
 PRBM bool release_near(Simulation *sim) {
@@ -62,7 +110,8 @@ PRBM bool release_near(Simulation *sim) {
         return true;
     }
     for (int k = 0; k < q->held_count; k++) {
-        if (forces->least[k] <= RELEASE_WATCH_FACTOR * forces->largest[k]) {
+        if (q->contacts.touching[q->held[k]].phase == PHASE_SETTLED ||
+            forces->least[k] <= RELEASE_WATCH_FACTOR * forces->largest[k]) {
             return true;
         }
     }
@@ -187,7 +236,7 @@ static double guard_at(const ArcGuard *guard, double t) {
     const System *system = system_of(sim);
     Located *located = &sim->stepping.located;
     double *y = located->y;
-    Instant at = {t, y, y + system->n, located->e, NULL};
+    Instant at = {t, y, y + system->n, located->e, NULL, NULL};
     arc_at(sim, t, y);
     if (guard->forces) {
         Problem problem;
@@ -197,6 +246,7 @@ static double guard_at(const ArcGuard *guard, double t) {
         }
         at.e = evaluation->at.e;
         at.lam = evaluation->lam;
+        at.a = evaluation->a;
     } else {
         directions(system, y, located->e);
     }
@@ -282,6 +332,7 @@ static bool polish_impact(const Search *search, double apex, double *time) {
     int n = system_of(sim)->n, stop = search->contact;
     Located *located = &sim->stepping.located;
     double t = *time, *y = located->y;
+    double sign = search->guard->value == indentation_guard ? -1.0 : 1.0;
     Complex *e = located->e;
     if (t <= sim->state.arc.start) {
         return true;
@@ -297,8 +348,8 @@ static bool polish_impact(const Search *search, double apex, double *time) {
             return false;
         }
         directions(system_of(sim), y, e);
-        double distance = gap(&sim->equations, stop, t, e);
-        double speed = gap_rate(&sim->equations, stop, t, e, y + n);
+        double distance = sign * gap(&sim->equations, stop, t, e);
+        double speed = sign * gap_rate(&sim->equations, stop, t, e, y + n);
         double change = -distance / speed;
         if (speed >= 0.0 || fabs(distance) <= EVENT_TIME_ATOL * fabs(speed) ||
             fabs(change) > EVENT_CORRECTION_RTOL * located->h) {
@@ -337,7 +388,8 @@ PRBM void sample_arc(Simulation *sim) {
 static Instant sample(const Simulation *sim, int k) {
     int n = system_of(sim)->n;
     const double *y = sim->stepping.sample_y + k * 2 * n;
-    Instant at = {sample_time(sim, k), y, y + n, sim->stepping.sample_e + k * system_of(sim)->d, NULL};
+    Instant at = {sample_time(sim, k), y, y + n, sim->stepping.sample_e + k * system_of(sim)->d,
+                  NULL, NULL};
     return at;
 }
 
@@ -358,7 +410,7 @@ static bool detect_closing(Search *search, const double *gaps, const double *rat
                            Closing *closing) {
     Simulation *sim = search->sim;
     double length = system_of(sim)->length, depth = closing_depth(&sim->configuration);
-    ArcGuard guard = arc_guard(search), rate = {search, gap_rate_guard, false, 1.0, 0.0};
+    ArcGuard guard = arc_guard(search), rate = {search, rate_of(search->guard), false, 1.0, 0.0};
     bool dips = rates[0] < 0.0 && 0.0 < rates[1];
     closing->a = sample_time(sim, k);
     closing->b = sample_time(sim, k + 1);
@@ -417,7 +469,7 @@ PRBM bool closing_time(Simulation *sim, const Guard *guard, int stop, Fall *fall
     for (int k = 0; k <= GUARD_INTERVALS; k++) {
         Instant at = sample(sim, k);
         gaps[k] = guard->value(&sim->equations, &at, stop);
-        rates[k] = gap_rate_guard(&sim->equations, &at, stop);
+        rates[k] = rate_of(guard)(&sim->equations, &at, stop);
     }
     for (int k = 0; !fall->found && k < GUARD_INTERVALS; k++) {
         Closing closing;
@@ -469,6 +521,30 @@ PRBM bool yield_time(Simulation *sim, const Guard *guard, int contact, Fall *fal
         double after = guard_at(&on_arc, times[part + 1]);
         if (after <= 0.0) {
             double a = times[part], b = times[part + 1];
+            fall->found = true;
+            fall->time = before > 0.0 ? locate(&on_arc, a, b) : a;
+        }
+        before = after;
+    }
+    return !search.failed;
+}
+
+/* Find the time at which the phase of a pressed contact changes. */
+PRBM bool switching_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
+                         Problem *problem) {
+    const Guard rising = {guard->event, rising_guard, true};
+    if (sim->equations.contacts.touching[contact].phase == PHASE_RISING) {
+        return yield_time(sim, &rising, contact, fall, problem);
+    }
+    Search search = {sim, guard, contact, false, problem};
+    ArcGuard on_arc = arc_guard(&search);
+    Instant start = sample(sim, 0);
+    double before = guard->value(&sim->equations, &start, contact);
+    for (int k = 0; !fall->found && k < GUARD_INTERVALS; k++) {
+        Instant at = sample(sim, k + 1);
+        double after = guard->value(&sim->equations, &at, contact);
+        if (after <= 0.0) {
+            double a = sample_time(sim, k), b = sample_time(sim, k + 1);
             fall->found = true;
             fall->time = before > 0.0 ? locate(&on_arc, a, b) : a;
         }

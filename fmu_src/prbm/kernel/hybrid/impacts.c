@@ -2,6 +2,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "hybrid/compliant.h"
 #include "hybrid/configuration.h"
 #include "hybrid/contact_modes.h"
 #include "hybrid/impacts.h"
@@ -391,7 +392,7 @@ static bool captured(Simulation *sim, int stop, const Hits *hits, const double *
 /* --- bookkeeping ------------------------------------------------------------------------------ */
 
 /* Report an impact at angles q, with the rates v before and after. */
-static void report_impact(const Simulation *sim, int i, const double *q, const double *v,
+PRBM void report_impact(const Simulation *sim, int i, const double *q, const double *v,
                           const double *after) {
     const Latched *last = &sim->state.latched[i];
     Impact report = {i,
@@ -403,6 +404,9 @@ static void report_impact(const Simulation *sim, int i, const double *q, const d
                      last->energy_lost,
                      last->modal_restitution,
                      last->impulse_sum,
+                     last->peak_force,
+                     last->indentation,
+                     last->contact_duration,
                      last->count,
                      q,
                      v,
@@ -486,13 +490,14 @@ static void find_partners(Simulation *sim, int hit, const double *q, const doubl
     size_t mark = sim->scratch.used;
     double near = TOUCHING_RTOL * system_of(sim)->length, t = sim->state.front_time;
     Complex *e = directions_at(sim, q);
+    const Stop *stops = sim->configuration.mechanism->stops;
     hits->struck_count = hits->held_count = 0;
     for (int i = 0; i < system_of(sim)->s; i++) {
         double distance = gap(&sim->equations, i, t, e);
         rates[i] = gap_rate(&sim->equations, i, t, e, v);
         if (sim->state.modes[i] != CONTACT_OPEN) {
             hits->held[hits->held_count++] = i;
-        } else if (rates[i] < 0.0 && (i == hit || distance <= near)) {
+        } else if (!stops[i].compliant && rates[i] < 0.0 && (i == hit || distance <= near)) {
             hits->struck[hits->struck_count++] = i;
         }
     }
@@ -551,7 +556,15 @@ PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
     hits.after = take(&sim->scratch, (size_t)n);
     copy(n, sim->state.front, q);
     copy(n, sim->state.front + n, v);
+    if (sim->configuration.mechanism->stops[hit].compliant) {
+        sim->scratch.used = mark;
+        return touch(sim, hit, problem);
+    }
     find_partners(sim, hit, q, v, &hits, rates);
+    if (hits.struck_count > 0) {
+        unsettle(sim);
+        find_partners(sim, hit, q, v, &hits, rates);
+    }
     if (hits.struck_count == 0) {
         sim->scratch.used = mark;
         return settle(sim, &hit, fabs(rates[hit]) <= zero_speed(&sim->configuration), NULL,
@@ -567,7 +580,7 @@ PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
         touching_count = open_all(sim, &hits, touching);
     }
     sim->scratch.used = mark;
-    return ok && settle(sim, touching, touching_count, NULL, problem);
+    return ok && rephase(sim, problem) && settle(sim, touching, touching_count, NULL, problem);
 }
 
 /* --- impulses of the inputs ------------------------------------------------------------------- */

@@ -1,6 +1,7 @@
 /* The outputs at the present state: the twin of hybrid/outputs.py. */
 #include <string.h>
 
+#include "hybrid/compliant.h"
 #include "hybrid/configuration.h"
 #include "hybrid/impacts.h"
 #include "hybrid/outputs.h"
@@ -53,6 +54,23 @@ static void output_stops(const Simulation *sim, double *out) {
     }
 }
 
+static void output_compliant(Simulation *sim, double *out, double *latched) {
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        if (!sim->configuration.mechanism->stops[i].compliant) {
+            continue;
+        }
+        double depth, force;
+        peaks_until(sim, i, sim->state.time, &depth, &force);
+        out[COMPLIANT_PEAK_FORCE] = force;
+        out[COMPLIANT_INDENTATION] = depth;
+        out[COMPLIANT_CONTACT_DURATION] = sim->state.latched[i].contact_duration;
+        out += PER_COMPLIANT;
+        latched[PER_LATCHED * i + LATCHED_CONTACT] = sim->state.touching[i].phase != PHASE_NONE;
+        latched[PER_LATCHED * i + LATCHED_IMPULSE_SUM] =
+            sim->present.y[extra_index(sim, i) + EXTRA_IMPULSE];
+    }
+}
+
 static void output_latched(const Simulation *sim, double *out) {
     for (int i = 0; i < system_of(sim)->s; i++) {
         const Latched *last = &sim->state.latched[i];
@@ -94,6 +112,7 @@ static void output_places(Simulation *sim) {
     output_probes(sim, out + slots->probes);
     output_stops(sim, out + slots->stops);
     output_latched(sim, out + slots->latched);
+    output_compliant(sim, out + slots->compliant, out + slots->latched);
     output_links(sim, out + slots->links, out + slots->stretches);
     out[slots->energies + ENERGY_DISSIPATED] = sim->present.y[2 * system->n];
     out[slots->energies + ENERGY_WORK] = sim->present.y[2 * system->n + 1];
@@ -119,6 +138,10 @@ static bool output_motion(Simulation *sim, bool near, Problem *problem) {
         double force = present->evaluation.lam[q->first_hold + k];
         out[slots->stops + PER_STOP * q->held[k] + STOP_FORCE] = force;
     }
+    for (int k = 0; k < q->pressed_count; k++) {
+        int i = q->pressed[k];
+        out[slots->stops + PER_STOP * i + STOP_FORCE] = present->evaluation.pressure[i];
+    }
     out[slots->energies + ENERGY_KINETIC] = kinetic_energy_of(q, &present->evaluation, v);
     return true;
 }
@@ -143,6 +166,12 @@ static void output_energies(Simulation *sim) {
         deflection[j] = sim->present.y[j] - system->q0[j];
     }
     out[ENERGY_ELASTIC] = elastic_energy(n, system->K, deflection);
+    for (int i = 0; i < system->s; i++) {
+        if (sim->state.touching[i].phase != PHASE_NONE) {
+            double distance = gap(&sim->equations, i, sim->state.time, sim->present.e);
+            out[ENERGY_ELASTIC] += contact_energy(&sim->equations.laws[i], distance);
+        }
+    }
     out[ENERGY_GRAVITATIONAL] = gravitational_energy(system, sim->present.e);
     sim->scratch.used = mark;
 }

@@ -7,7 +7,7 @@
 #include "hybrid/simulation.h"
 #include "hybrid/snapshot.h"
 
-enum { SCALARS = 25, PER_STOP_STATE = 16 }; /* numbers of a simulation and of a stop */
+enum { SCALARS = 25, PER_STOP_STATE = 28 }; /* numbers of a simulation and of a stop */
 
 PRBM size_t simulation_state_count(const Simulation *simulation) {
     const Mechanism *m = simulation->configuration.mechanism;
@@ -20,13 +20,19 @@ PRBM size_t simulation_state_count(const Simulation *simulation) {
 static double *put_stop(const State *state, int i, double *to) {
     const Latched *last = &state->latched[i];
     const Wall *wall = &state->walls[i];
+    const Touching *touching = &state->touching[i];
+    const Touch *begun = &state->touches[i];
     const double stop[PER_STOP_STATE] = {
         state->modes[i],      state->driven[i],    wall->position,
         wall->rate,           wall->since,         wall->offset,
         wall->excess,         wall->span,          last->count,
         last->time,           last->approach_speed, last->rebound_speed,
         last->impulse,        last->energy_lost,   last->modal_restitution,
-        last->impulse_sum,
+        last->impulse_sum,   last->peak_force,   last->indentation,
+        last->contact_duration, touching->phase,  touching->reference_speed,
+        touching->depth,     begun->time,        begun->counted,
+        begun->impulse,      begun->loss,        begun->calm,
+        begun->calm_since,
     };
     memcpy(to, stop, sizeof stop);
     return to + PER_STOP_STATE;
@@ -108,6 +114,18 @@ static void get_scalars(State *state, StateReader *reader) {
     state->arc.before.time = get_number(reader);
 }
 
+static void get_touch(Touching *touching, Touch *begun, StateReader *reader) {
+    touching->phase = (Phase)get_integer(reader, PHASE_NONE, PHASE_SETTLED);
+    touching->reference_speed = get_number(reader);
+    touching->depth = get_number(reader);
+    begun->time = get_number(reader);
+    begun->counted = get_flag(reader);
+    begun->impulse = get_number(reader);
+    begun->loss = get_number(reader);
+    begun->calm = get_flag(reader);
+    begun->calm_since = get_number(reader);
+}
+
 static void get_stop(State *state, int i, StateReader *reader) {
     Latched *last = &state->latched[i];
     Wall *wall = &state->walls[i];
@@ -127,6 +145,10 @@ static void get_stop(State *state, int i, StateReader *reader) {
     last->energy_lost = get_number(reader);
     last->modal_restitution = get_number(reader);
     last->impulse_sum = get_number(reader);
+    last->peak_force = get_number(reader);
+    last->indentation = get_number(reader);
+    last->contact_duration = get_number(reader);
+    get_touch(&state->touching[i], &state->touches[i], reader);
 }
 
 /* Read the state; return whether its numbers are valid.  The states of model exchange, which come

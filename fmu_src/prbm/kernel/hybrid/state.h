@@ -35,8 +35,18 @@ typedef struct {
 typedef struct {
     int count;
     double time, approach_speed, rebound_speed, impulse, energy_lost, modal_restitution;
-    double impulse_sum; /* of all impulses so far, captures included */
+    double impulse_sum; /* of all impulses so far, captures included; not of compliant stops */
+    double peak_force, indentation, contact_duration; /* of compliant stops */
 } Latched;
+
+/* The begin of a contact at a compliant stop. */
+typedef struct {
+    double time;
+    bool counted;         /* whether it is an impact whose outputs are not yet latched */
+    double impulse, loss; /* states of the stop before the contact */
+    bool calm;            /* whether the contact is calm enough to settle */
+    double calm_since;
+} Touch;
 
 /* A state of the motion through which an interpolation passes. */
 typedef struct {
@@ -85,6 +95,8 @@ typedef struct {
     double longest;       /* recent longest communication step, at most a tenth of the period */
     ContactMode *modes;   /* (s + f,) of the contacts */
     bool *driven;         /* (s,): whether stop.velocity has ever been non-zero */
+    Touching *touching;   /* (s,) contacts at compliant stops */
+    Touch *touches;       /* (s,) */
     Latched *latched;     /* (s,) */
     Wall *walls;          /* (s,) */
     double *numbers;      /* the arrays below, one after another */
@@ -93,6 +105,7 @@ typedef struct {
     double *acting_values, *acting_given; /* parameters and inputs of the last restart */
     double *received;                     /* (3 per force): impulses that have acted */
     double *front, *k1;                   /* (ny,): state at the end of the last step, its rates */
+    double *first;                        /* (c, 3 n): q, v and M phi at first touch */
     double *fastest;                      /* (n,): shape of the fastest mode */
     double *floors;                       /* (s,): depth below zero at which gaps close */
     double *accepted;                     /* model exchange: (n,) angles of the last step */

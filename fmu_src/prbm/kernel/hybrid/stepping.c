@@ -3,6 +3,7 @@
 
 #include "core/vectors.h"
 #include "hybrid/arc.h"
+#include "hybrid/compliant.h"
 #include "hybrid/events.h"
 #include "hybrid/simulation.h"
 #include "hybrid/stability.h"
@@ -28,8 +29,9 @@ static void mean_squares(const Simulation *sim, const double *x, const double *z
         fine[SUM_OF(j)] += a * a;
         coarse[SUM_OF(j)] += b * b;
     }
-    means[0] = total(fine) / ny;
-    means[1] = total(coarse) / ny;
+    int core = 2 * system_of(sim)->n + 2;
+    means[0] = total(fine) / core;
+    means[1] = total(coarse) / core;
 }
 
 /* --- step sizes ------------------------------------------------------------------------------- */
@@ -48,7 +50,7 @@ static double first_step(const Simulation *sim) {
 }
 
 /* A step size rounded to four binary digits, so that round-off in the errors does not change it. */
-static double rounded_step(double h) {
+PRBM double rounded_step(double h) {
     double shifted = STEP_ROUNDING_FACTOR * h;
     return shifted - (shifted - h);
 }
@@ -106,6 +108,9 @@ static double step_error(Simulation *sim, double h, Problem *problem) {
     double means[2];
     mean_squares(sim, stepping->error, stepping->coarse_error, arc->y, stepping->end, means);
     double size = sqrt(means[0] + means[1]), error = size > 0.0 ? means[0] / size : size;
+    if (sim->equations.pressed_count > 0) {
+        error = greater(error, contact_error(sim, h));
+    }
     return error / (STEP_ERROR_FACTOR * sim->state.tolerance);
 }
 
@@ -182,7 +187,7 @@ static bool find_step(Simulation *sim, double longest, double *h, Problem *probl
     double wanted = state->step_size > 0.0 ? state->step_size : first_step(sim);
     wanted = rounded_step(lesser(wanted, lesser(longest_step(sim), stable_step(sim))));
     StepSizeController controller = {lesser(wanted, longest), state->log_of_error, STEP_GROWTH_MAX};
-    remember_start(state, ny / 2 - 1);
+    remember_start(state, system_of(sim)->n);
     copy(ny, state->front, state->arc.y);
     copy(ny, state->k1, state->arc.k);
     do {
@@ -239,7 +244,8 @@ static bool cut_step(Simulation *sim, const Event *event, Problem *problem) {
     state->step_size = state->arc.h; /* The event does not shorten the next step. */
     state->pending = *event;
     state->has_k1 = false;
-    if (event->kind == EVENT_IMPACT && event->time > state->arc.start) {
+    bool closing = event->kind == EVENT_IMPACT || event->kind == EVENT_SEPARATION;
+    if (closing && event->time > state->arc.start) {
         Located *located = &sim->stepping.located;
         if (located->stop != event->contact) {
             located->h = event->time - state->arc.start;
@@ -263,6 +269,9 @@ PRBM bool take_step(Simulation *sim, Problem *problem) {
     Stepping *stepping = &sim->stepping;
     int ny = state_size(sim);
     double h = 0.0, longest = sim->equations.walls_move ? follow_cubics(sim) : HUGE_VAL;
+    if (sim->equations.pressed_count > 0 && !settle_calm(sim, problem)) {
+        return false;
+    }
     if (!state->has_k1 && !rate(&sim->equations, state->front_time, state->front, NULL,
                                 &stepping->evaluation, state->k1, problem)) {
         return false;

@@ -120,7 +120,7 @@ PRBM double jump_allowed(const Simulation *sim, int i) {
 PRBM bool follow_walls(Simulation *sim, const double *lam, double time, Problem *problem) {
     size_t mark = sim->scratch.used;
     const Equations *q = &sim->equations;
-    int ny = state_size(sim), h = q->first_hold;
+    int ny = state_size(sim), n = system_of(sim)->n, h = q->first_hold;
     double gaps[STOPS_MAX], rates[STOPS_MAX], *y = sim->state.front, t = sim->state.front_time;
     double *P = take(&sim->scratch, (size_t)q->r), *after = take(&sim->scratch, (size_t)ny);
     copy(ny, y, after);
@@ -131,8 +131,8 @@ PRBM bool follow_walls(Simulation *sim, const double *lam, double time, Problem 
         follows = fabs(rates[q->held[k]]) <= jump_allowed(sim, q->held[k]) && P[h + k] >= -pull;
     }
     for (int k = 0; follows && k < q->held_count; k++) {
-        after[ny - 2] -= P[h + k] * rates[q->held[k]] / 2;
-        after[ny - 1] += push_wall(sim, q->held[k], P[h + k]);
+        after[2 * n] -= P[h + k] * rates[q->held[k]] / 2;
+        after[2 * n + 1] += push_wall(sim, q->held[k], P[h + k]);
     }
     copy(follows ? ny : 0, after, y);
     sim->scratch.used = mark;

@@ -1,0 +1,505 @@
+/* Contacts at compliant stops: first touch, phases, settling, separation, and their outputs: the
+ * twin of hybrid/compliant.py.  The kernel has no friction and no mobility of compliant stops. */
+#include <math.h>
+
+#include "core/matrix.h"
+#include "core/modal.h"
+#include "core/vectors.h"
+#include "hybrid/arc.h"
+#include "hybrid/compliant.h"
+#include "hybrid/configuration.h"
+#include "hybrid/contact_modes.h"
+#include "hybrid/impacts.h"
+#include "hybrid/simulation.h"
+#include "hybrid/stepping.h"
+
+/* --- access ----------------------------------------------------------------------------------- */
+
+static const Stop *stop_of(const Simulation *sim, int stop) {
+    return &sim->configuration.mechanism->stops[stop];
+}
+
+/* The number of compliant stops before a stop. */
+static int compliant_before(const Simulation *sim, int stop) {
+    int count = 0;
+    for (int i = 0; i < stop; i++) {
+        count += stop_of(sim, i)->compliant;
+    }
+    return count;
+}
+
+PRBM int extra_index(const Simulation *sim, int stop) {
+    return 2 * system_of(sim)->n + 2 + EXTRA_STATES * compliant_before(sim, stop);
+}
+
+/* Coordinates, rates and M phi at the first touch of a compliant stop, (3 n,). */
+static double *first_state(const Simulation *sim, int stop) {
+    return sim->state.first + 3 * system_of(sim)->n * compliant_before(sim, stop);
+}
+
+static double rest_speed_of(const Simulation *sim, int stop) {
+    return field_value(sim, stop_of(sim, stop)->rest_speed);
+}
+
+PRBM bool reject_unsupported(const Simulation *sim, Problem *problem) {
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        const Stop *stop = stop_of(sim, i);
+        double mobile = sim->equations.inputs.mobilities[i];
+        double rough = field_value(sim, stop->friction);
+        if (stop->compliant && (mobile > 0.0 || rough > 0.0)) {
+            return fail(problem, "%s.%s = %g: a compliant stop of the kernel has none; use the "
+                        "Python engine", stop->name, mobile > 0.0 ? "mobility" : "friction",
+                        mobile > 0.0 ? mobile : rough);
+        }
+    }
+    return true;
+}
+
+/* --- phases ----------------------------------------------------------------------------------- */
+
+static void set_phase(Simulation *sim, int stop, Phase phase, double speed, double depth) {
+    Touching touching = {phase, speed, depth};
+    sim->state.touching[stop] = touching;
+    sim->state.has_k1 = false;
+    set_inputs(sim);
+}
+
+/* Compute the second derivative of the indentation of a stop at the front. */
+static bool indentation_acceleration(Simulation *sim, int stop, double *result,
+                                     Problem *problem) {
+    size_t mark = sim->scratch.used;
+    const double *q = sim->state.front, *v = q + system_of(sim)->n;
+    double t = sim->state.front_time;
+    bool ok = evaluate_equations(&sim->equations, t, q, v, NULL, &sim->at_front, problem);
+    *result = ok ? -gap_acceleration(&sim->equations, stop, t, directions_at(sim, q), v,
+                                     sim->at_front.a)
+                 : 0.0;
+    sim->scratch.used = mark;
+    return ok;
+}
+
+static bool rephase_one(Simulation *sim, int stop, double rate, Problem *problem) {
+    Touching touching = sim->state.touching[stop];
+    double speed = greater(touching.reference_speed, rate), acceleration = 0.0;
+    set_phase(sim, stop, PHASE_PRESSED, speed, 0.0);
+    if (rate >= touching.reference_speed) {
+        set_phase(sim, stop, PHASE_RISING, speed, 0.0);
+        if (!indentation_acceleration(sim, stop, &acceleration, problem)) {
+            return false;
+        }
+        if (!(acceleration > 0.0)) {
+            set_phase(sim, stop, PHASE_PRESSED, speed, 0.0);
+        }
+    } else if (damping_ratio(&sim->equations.laws[stop], &sim->state.touching[stop], rate) < 0.0) {
+        set_phase(sim, stop, PHASE_FREE, speed, 0.0);
+    }
+    return true;
+}
+
+PRBM bool rephase(Simulation *sim, Problem *problem) {
+    double gaps[STOPS_MAX], rates[STOPS_MAX];
+    bool ok = true;
+    if (sim->equations.pressed_count == 0) {
+        return true;
+    }
+    gaps_and_rates(sim, gaps, rates);
+    for (int i = 0; ok && i < system_of(sim)->s; i++) {
+        if (is_pressed(&sim->state.touching[i])) {
+            ok = rephase_one(sim, i, -rates[i], problem);
+        }
+    }
+    return ok;
+}
+
+PRBM void unsettle(Simulation *sim) {
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        if (sim->state.touching[i].phase == PHASE_SETTLED) {
+            sim->state.modes[i] = CONTACT_OPEN;
+        }
+    }
+    (void)press_released(sim);
+}
+
+PRBM bool press_released(Simulation *sim) {
+    bool any = false;
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        Touching *touching = &sim->state.touching[i];
+        if (touching->phase == PHASE_SETTLED && sim->state.modes[i] == CONTACT_OPEN) {
+            set_phase(sim, i, PHASE_PRESSED, touching->reference_speed, 0.0);
+            any = true;
+        }
+    }
+    return any;
+}
+
+/* --- resets ----------------------------------------------------------------------------------- */
+
+/* Begin a contact with a closing speed. */
+static bool begin_contact(Simulation *sim, int stop, double speed, bool counted,
+                          Problem *problem) {
+    size_t mark = sim->scratch.used;
+    const System *system = system_of(sim);
+    int n = system->n;
+    const double *front = sim->state.front, *extra = front + extra_index(sim, stop);
+    double least = greater(rest_speed_of(sim, stop), zero_speed(&sim->configuration));
+    double *first = first_state(sim, stop);
+    Touch begun = {sim->state.front_time, counted, extra[EXTRA_IMPULSE], extra[EXTRA_LOSS], false,
+                   0.0};
+    bool ok = true;
+    sim->state.touches[stop] = begun;
+    copy(2 * n, front, first);
+    zeros(n, first + 2 * n);
+    if (counted) {
+        double *phi = take(&sim->scratch, (size_t)n), *M = take_matrix(&sim->scratch, n, n);
+        ok = fundamental_at(system, front, phi, M, &sim->scratch, problem);
+        for (int j = 0; ok && j < n; j++) {
+            first[2 * n + j] = dot(n, M + j * n, phi);
+        }
+    }
+    sim->scratch.used = mark;
+    set_phase(sim, stop, PHASE_PRESSED, greater(speed, least), 0.0);
+    return ok;
+}
+
+static bool check_depth(const Simulation *sim, int stop, double depth, double time,
+                        Problem *problem) {
+    if (!(depth <= sim->configuration.scales.length)) {
+        return fail(problem,
+                    "%s is indented by %.3g m at t = %.9g s, more than the size of the mechanism: "
+                    "raise its stiffness, or move it",
+                    stop_of(sim, stop)->name, depth, time);
+    }
+    return true;
+}
+
+PRBM bool preload(Simulation *sim, Problem *problem) {
+    double gaps[STOPS_MAX], rates[STOPS_MAX];
+    bool ok = true;
+    gaps_and_rates(sim, gaps, rates);
+    for (int i = 0; ok && i < system_of(sim)->s; i++) {
+        if (stop_of(sim, i)->compliant && gaps[i] < 0.0) {
+            ok = check_depth(sim, i, -gaps[i], sim->state.front_time, problem) &&
+                 begin_contact(sim, i, 0.0, false, problem);
+        }
+    }
+    return ok;
+}
+
+/* Shorten the first step of a contact to a fraction of the depth of a free hit over its speed. */
+static bool shorten_step(Simulation *sim, int stop, Problem *problem);
+
+PRBM bool touch(Simulation *sim, int stop, Problem *problem) {
+    double gaps[STOPS_MAX], rates[STOPS_MAX];
+    Latched *latched = &sim->state.latched[stop];
+    gaps_and_rates(sim, gaps, rates);
+    double speed = -rates[stop];
+    bool counted = speed >= rest_speed_of(sim, stop);
+    if (!begin_contact(sim, stop, speed, counted, problem)) {
+        return false;
+    }
+    if (counted) {
+        Latched fresh = {0};
+        fresh.count = latched->count + (latched->count < IMPACT_COUNT_MAX);
+        fresh.time = sim->state.front_time;
+        fresh.approach_speed = speed;
+        *latched = fresh;
+    }
+    return rephase(sim, problem) && settle(sim, NULL, 0, NULL, problem) &&
+           shorten_step(sim, stop, problem);
+}
+
+PRBM bool switch_phase(Simulation *sim, int stop, Problem *problem) {
+    double gaps[STOPS_MAX], rates[STOPS_MAX];
+    Touching touching = sim->state.touching[stop];
+    if (touching.phase == PHASE_RISING) {
+        gaps_and_rates(sim, gaps, rates);
+        set_phase(sim, stop, PHASE_PRESSED, greater(touching.reference_speed, -rates[stop]), 0.0);
+    } else if (!rephase(sim, problem)) {
+        return false;
+    }
+    return settle(sim, NULL, 0, NULL, problem);
+}
+
+/* Compute -(last^T v+) / (first^T v-), with M phi at first touch and now; 0 if first^T v- is
+ * round-off. */
+static bool modal_ratio(Simulation *sim, int stop, double *result, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    const System *system = system_of(sim);
+    int n = system->n;
+    const double *front = sim->state.front, *after = front + n, *before = first_state(sim, stop) + n;
+    const double *first = before + n;
+    double *phi = take(&sim->scratch, (size_t)n), *M = take_matrix(&sim->scratch, n, n);
+    double arriving = dot(n, first, before), leaving = 0.0, size = 0.0;
+    bool ok = fundamental_at(system, front, phi, M, &sim->scratch, problem);
+    for (int j = 0; ok && j < n; j++) {
+        leaving += dot(n, M + j * n, phi) * after[j];
+        size += fabs(first[j]) * (fabs(before[j]) + fabs(after[j]));
+    }
+    leaving = ok && dot(n, first, phi) < 0.0 ? -leaving : leaving;
+    *result = fabs(arriving) <= ZERO_MODE_RTOL * size ? 0.0 : -leaving / arriving;
+    sim->scratch.used = mark;
+    return ok;
+}
+
+/* Latch the outputs of an impact that ends, and report it. */
+static bool end_impact(Simulation *sim, int stop, Problem *problem) {
+    double gaps[STOPS_MAX], rates[STOPS_MAX];
+    int n = system_of(sim)->n;
+    Touch *begun = &sim->state.touches[stop];
+    Latched *latched = &sim->state.latched[stop];
+    const double *extra = sim->state.front + extra_index(sim, stop);
+    const double *first = first_state(sim, stop);
+    if (!begun->counted) {
+        return true;
+    }
+    gaps_and_rates(sim, gaps, rates);
+    latched->rebound_speed = rates[stop];
+    latched->impulse = extra[EXTRA_IMPULSE] - begun->impulse;
+    latched->energy_lost = extra[EXTRA_LOSS] - begun->loss;
+    latched->contact_duration = sim->state.front_time - begun->time;
+    if (!modal_ratio(sim, stop, &latched->modal_restitution, problem)) {
+        return false;
+    }
+    begun->counted = false;
+    report_impact(sim, stop, first, first + n, sim->state.front + n);
+    return true;
+}
+
+PRBM bool separate(Simulation *sim, int stop, Problem *problem) {
+    if (!end_impact(sim, stop, problem)) {
+        return false;
+    }
+    set_phase(sim, stop, PHASE_NONE, 0.0, 0.0);
+    return settle(sim, NULL, 0, NULL, problem);
+}
+
+/* --- settling --------------------------------------------------------------------------------- */
+
+/* Compute the inverse effective mass of a hit point at the front. */
+static bool point_mobility(Simulation *sim, int stop, double *result, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    const System *system = system_of(sim);
+    double *G = take(&sim->scratch, (size_t)system->n);
+    Inertia at = inertia_at(sim, sim->state.front);
+    Rows gaps = gap_rows(system);
+    row_jacobian(&gaps, stop, at.e, G);
+    bool ok = mobility(sim, &at, system->r, at.loops, G, result, problem);
+    sim->scratch.used = mark;
+    return ok;
+}
+
+static bool shorten_step(Simulation *sim, int stop, Problem *problem) {
+    const Touching *touching = &sim->state.touching[stop];
+    const ComplianceLaw *law = &sim->equations.laws[stop];
+    double inverse_mass = 0.0, speed = touching->reference_speed, rise = law->exponent + 1.0;
+    if (!is_pressed(touching)) {
+        return true;
+    }
+    if (!point_mobility(sim, stop, &inverse_mass, problem)) {
+        return false;
+    }
+    double work = 0.5 * rise * (speed * speed) / (law->stiffness * inverse_mass);
+    double h = rounded_step(TOUCH_STEP_FACTOR * power(work, 1.0 / rise) / speed);
+    if (h < sim->state.step_size) {
+        sim->state.step_size = h;
+    }
+    return true;
+}
+
+/* The kinetic energy at the front with the rates v. */
+static double kinetic_energy(Simulation *sim, const double *v) {
+    size_t mark = sim->scratch.used;
+    int n = system_of(sim)->n;
+    Inertia at = inertia_at(sim, sim->state.front);
+    double sum = 0.0;
+    for (int j = 0; j < n; j++) {
+        sum += 0.5 * v[j] * dot(n, at.M + j * n, v);
+    }
+    sim->scratch.used = mark;
+    return sum;
+}
+
+/* Whether the indentation is slow and the damping of a contact is small. */
+static bool is_calm(const Simulation *sim, int stop, double gap_now, double rate) {
+    const Touching *touching = &sim->state.touching[stop];
+    double damping = fabs(damping_ratio(&sim->equations.laws[stop], touching, rate) - 1.0);
+    return touching->phase != PHASE_FREE && gap_now < 0.0 &&
+           fabs(rate) < rest_speed_of(sim, stop) && damping < SETTLED_DAMPING_RTOL;
+}
+
+/* Project the front onto the constraint of a stop that settles, and book the loss. */
+static bool stop_motion(Simulation *sim, int stop, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    int n = system_of(sim)->n;
+    double *front = sim->state.front, *before = take(&sim->scratch, (size_t)n);
+    copy(n, front + n, before);
+    double loss = kinetic_energy(sim, before);
+    bool ok = project(&sim->equations, sim->state.front_time, front, &sim->scratch, problem);
+    loss -= kinetic_energy(sim, front + n);
+    front[2 * n] += loss;
+    front[extra_index(sim, stop) + EXTRA_LOSS] += loss;
+    sim->scratch.used = mark;
+    return ok;
+}
+
+/* Settle a calm contact if its force as a constraint is close to its elastic force. */
+static bool try_to_settle(Simulation *sim, int stop, double depth, Problem *problem) {
+    State *state = &sim->state;
+    const double *q = state->front, *v = q + system_of(sim)->n;
+    Touching before = state->touching[stop];
+    bool has_k1 = state->has_k1;
+    state->modes[stop] = CONTACT_FRICTIONLESS;
+    set_phase(sim, stop, PHASE_SETTLED, before.reference_speed, depth);
+    if (!evaluate_equations(&sim->equations, state->front_time, q, v, NULL, &sim->at_front,
+                            problem)) {
+        return false;
+    }
+    double elastic = elastic_force(&sim->equations.laws[stop], depth);
+    double force = stop_force(&sim->equations, sim->at_front.lam, stop);
+    if (fabs(force - elastic) > SETTLING_FACTOR * SETTLED_FORCE_RTOL * elastic) {
+        state->modes[stop] = CONTACT_OPEN;
+        set_phase(sim, stop, before.phase, before.reference_speed, 0.0);
+        state->has_k1 = has_k1;
+        return true;
+    }
+    state->arc.valid = false;
+    return stop_motion(sim, stop, problem) && end_impact(sim, stop, problem) &&
+           settle(sim, NULL, 0, NULL, problem);
+}
+
+PRBM bool settle_calm(Simulation *sim, Problem *problem) {
+    double gaps[STOPS_MAX], rates[STOPS_MAX], inverse_mass;
+    if (!latch_peaks(sim, sim->state.front_time, problem)) {
+        return false;
+    }
+    gaps_and_rates(sim, gaps, rates);
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        Touch *begun = &sim->state.touches[i];
+        if (!is_pressed(&sim->state.touching[i])) {
+            continue;
+        }
+        if (!is_calm(sim, i, gaps[i], -rates[i])) {
+            begun->calm = false;
+            begun->calm_since = 0.0;
+            continue;
+        }
+        begun->calm_since = begun->calm ? begun->calm_since : sim->state.front_time;
+        begun->calm = true;
+        if (!point_mobility(sim, i, &inverse_mass, problem)) {
+            return false;
+        }
+        double stiffness = contact_tangent(&sim->equations.laws[i], -gaps[i]);
+        double time = 0.5 * TWO_PI / sqrt(stiffness * inverse_mass);
+        if (sim->state.front_time - begun->calm_since >= time &&
+            !try_to_settle(sim, i, -gaps[i], problem)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* --- maxima ----------------------------------------------------------------------------------- */
+
+/* Compute the indentation of a stop at a time of the latest step, or its force. */
+static double contact_at(Simulation *sim, int stop, double t, bool force) {
+    Located *located = &sim->stepping.located;
+    const System *system = system_of(sim);
+    const Equations *equations = &sim->equations;
+    arc_at(sim, t, located->y);
+    directions(system, located->y, located->e);
+    double depth = -gap(equations, stop, t, located->e);
+    if (!force) {
+        return depth;
+    }
+    double rate = -gap_rate(equations, stop, t, located->e, located->y + system->n);
+    return contact_force(&equations->laws[stop], &equations->contacts.touching[stop], depth, rate);
+}
+
+static double clipped(double x, double low, double high) {
+    return lesser(greater(x, low), high);
+}
+
+/* Return the largest value between two times, by parabolas through its largest sample. */
+static double largest_value(Simulation *sim, int stop, bool force, double start, double end) {
+    double distance = (end - start) / (double)GUARD_INTERVALS, result = -HUGE_VAL;
+    int top = 0;
+    for (int k = 0; k <= GUARD_INTERVALS; k++) {
+        double x = contact_at(sim, stop, start + distance * k, force);
+        top = x > result ? k : top;
+        result = greater(x, result);
+    }
+    top = top < 1 ? 1 : top < GUARD_INTERVALS ? top : GUARD_INTERVALS - 1;
+    double t = start + distance * top;
+    for (int k = 0; k < PEAK_REFINEMENTS; k++) {
+        double before = contact_at(sim, stop, clipped(t - distance, start, end), force);
+        double at = contact_at(sim, stop, clipped(t, start, end), force);
+        double after = contact_at(sim, stop, clipped(t + distance, start, end), force);
+        double bend = before - 2.0 * at + after;
+        if (bend < 0.0) {
+            double shift = clipped(0.5 * (before - after) / bend, -1.0, 1.0);
+            t = clipped(t + distance * shift, start, end);
+        }
+        result = greater(result, contact_at(sim, stop, t, force));
+        distance *= PEAK_REFINEMENT_FACTOR;
+    }
+    return result;
+}
+
+PRBM void peaks_until(Simulation *sim, int stop, double time, double *depth, double *force) {
+    const Arc *arc = &sim->state.arc;
+    const Latched *latched = &sim->state.latched[stop];
+    double end = lesser(time, sim->state.front_time);
+    *depth = latched->indentation;
+    *force = latched->peak_force;
+    if (is_pressed(&sim->state.touching[stop]) && arc->valid && end > arc->start) {
+        *depth = greater(*depth, largest_value(sim, stop, false, arc->start, end));
+        *force = greater(*force, largest_value(sim, stop, true, arc->start, end));
+    }
+}
+
+PRBM bool latch_peaks(Simulation *sim, double time, Problem *problem) {
+    bool ok = true;
+    for (int k = 0; ok && k < sim->equations.pressed_count; k++) {
+        int i = sim->equations.pressed[k];
+        double depth, force;
+        peaks_until(sim, i, time, &depth, &force);
+        sim->state.latched[i].indentation = depth;
+        sim->state.latched[i].peak_force = force;
+        ok = check_depth(sim, i, depth, time, problem);
+    }
+    return ok;
+}
+
+/* --- errors of steps -------------------------------------------------------------------------- */
+
+PRBM double contact_error(Simulation *sim, double h) {
+    size_t mark = sim->scratch.used;
+    const System *system = system_of(sim);
+    const Stepping *stepping = &sim->stepping;
+    const double *y = sim->state.arc.y, *y1 = stepping->end;
+    int n = system->n;
+    double worst = 0.0, *row = take(&sim->scratch, (size_t)n);
+    double *change = take(&sim->scratch, (size_t)n);
+    Complex *e = directions_at(sim, y);
+    Rows gaps = gap_rows(system);
+    for (int j = 0; j < n; j++) {
+        change[j] = y1[j] - y[j];
+    }
+    for (int k = 0; k < sim->equations.pressed_count; k++) {
+        int i = sim->equations.pressed[k];
+        double speed = sim->equations.contacts.touching[i].reference_speed;
+        row_jacobian(&gaps, i, e, row);
+        double depth = greater(greater(fabs(dot(n, row, change)), speed * h),
+                               INDENTATION_MIN_RTOL * system->length);
+        double squares[2];
+        for (int part = 0; part < 2; part++) {
+            const double *error = part == 0 ? stepping->error : stepping->coarse_error;
+            double d = dot(n, row, error) / depth, rate = dot(n, row, error + n) / speed;
+            squares[part] = d * d + rate * rate;
+        }
+        double size = sqrt(squares[0] + squares[1]);
+        worst = greater(worst, size > 0.0 ? squares[0] / size : size);
+    }
+    sim->scratch.used = mark;
+    return worst;
+}

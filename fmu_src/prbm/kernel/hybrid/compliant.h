@@ -1,0 +1,29 @@
+/* Contacts at compliant stops. */
+#ifndef PRBM_COMPLIANT_H
+#define PRBM_COMPLIANT_H
+
+#include "hybrid/state.h"
+
+PRBM bool touch(Simulation *sim, int stop, Problem *problem); /* at first touch */
+PRBM bool switch_phase(Simulation *sim, int stop, Problem *problem);
+PRBM bool separate(Simulation *sim, int stop, Problem *problem); /* at the end of a contact */
+/* Begin the contacts of stops that are penetrated at the start. */
+PRBM bool preload(Simulation *sim, Problem *problem);
+/* Set the phases of all contacts for the present rates. */
+PRBM bool rephase(Simulation *sim, Problem *problem);
+/* Make settled stops forces, before impulses act. */
+PRBM void unsettle(Simulation *sim);
+/* Make the settled stops that are open forces; return whether there are any. */
+PRBM bool press_released(Simulation *sim);
+/* Settle the contacts at the front that have been calm for a contact time. */
+PRBM bool settle_calm(Simulation *sim, Problem *problem);
+/* Compute the largest indentation and force of a stop up to a time of the latest step. */
+PRBM void peaks_until(Simulation *sim, int stop, double time, double *depth, double *force);
+/* Add the maxima up to a time of the latest step to the latched values. */
+PRBM bool latch_peaks(Simulation *sim, double time, Problem *problem);
+/* Return the error of the contacts in a step of size h, relative to their scales. */
+PRBM double contact_error(Simulation *sim, double h);
+PRBM int extra_index(const Simulation *sim, int stop); /* of the states of a compliant stop */
+PRBM bool reject_unsupported(const Simulation *sim, Problem *problem);
+
+#endif
