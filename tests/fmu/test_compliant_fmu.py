@@ -22,28 +22,48 @@ def mass():
     return point_mass(stiffness=1e5, restitution=0.5)
 
 
-@pytest.fixture(scope="module")
-def path(tmp_path_factory):
+@pytest.fixture(scope="module", params=["python", "fmi2", "fmi3"])
+def path(request, tmp_path_factory):
     path = tmp_path_factory.mktemp("compliant") / "PointMass.fmu"
-    path.write_bytes(python_fmu.build(mass(), {}))
+    if request.param == "python":
+        path.write_bytes(python_fmu.build(mass(), {}))
+    else:
+        path.write_bytes(native_fmu.build(mass(), {}, int(request.param[-1])))
     return str(path)
 
 
 @pytest.mark.fmu
-def test_a_python_fmu_of_a_compliant_stop_simulates_like_the_engine(path):
+@pytest.mark.native
+@pytest.mark.parametrize("events", [False, True])
+def test_fmus_with_a_compliant_stop_simulate_like_the_engine(path, events):
+    """With event mode (FMI 3.0), steps end at first touch and at separation."""
+    description = read_model_description(path)
+    if events and description.fmiVersion != "3.0":
+        pytest.skip("FMI 3.0 only")
     assert not validate_fmu(path)
-    found = simulate_fmu(path, stop_time=END, output_interval=STEP, output=list(OUTPUTS))
+    assert description.modelExchange is None
+    found = simulate_fmu(
+        path, stop_time=END, output_interval=STEP, output=list(OUTPUTS),
+        use_event_mode=events, early_return_allowed=events,
+    )  # fmt: skip
+    steps = np.asarray(found["time"]) / STEP
+    rows = {round(x): k for k, x in enumerate(steps) if abs(x - round(x)) < 1e-6}
     sim = Simulation(mass())
     for k in range(round(END / STEP) + 1):
         sim.advance(k * STEP)
         out = sim.outputs()
-        row = [float(found[name][k]) for name in OUTPUTS]
-        np.testing.assert_allclose(row, [out[name] for name in OUTPUTS], rtol=1e-9, atol=1e-12)
+        row = [float(found[name][rows[k]]) for name in OUTPUTS]
+        np.testing.assert_allclose(row, [out[name] for name in OUTPUTS], rtol=1e-6, atol=1e-9)
     assert out["stop.impact_count"] == 1
     assert out["stop.contact_duration"] > 0.0
+    if events:
+        first = out["stop.impact_time"]
+        for t in (first, first + out["stop.contact_duration"]):
+            assert np.abs(np.asarray(found["time"]) - t).min() < 1e-12
 
 
 @pytest.mark.fmu
+@pytest.mark.native
 def test_parameters_and_outputs_of_a_compliant_stop_have_their_units(path):
     found = {v.name: v for v in read_model_description(path).modelVariables}
     units = {name: found[f"stop.{name}"].unit for name in (
@@ -56,8 +76,11 @@ def test_parameters_and_outputs_of_a_compliant_stop_have_their_units(path):
 
 
 @pytest.mark.fmu
-def test_a_state_saved_in_contact_restores_in_a_python_fmu(path, tmp_path):
+@pytest.mark.native
+def test_a_state_saved_in_contact_restores_in_an_fmu(path, tmp_path):
     description = read_model_description(path)
+    if description.fmiVersion == "3.0":
+        pytest.skip("the functions of FMI 2.0")
     folder = fmpy.extract(path, unzipdir=str(tmp_path))
     fmu = fmpy.instantiate_fmu(folder, description)
     fmu.setupExperiment(startTime=0.0)
@@ -78,6 +101,6 @@ def test_a_state_saved_in_contact_restores_in_a_python_fmu(path, tmp_path):
 
 
 @pytest.mark.parametrize("version", [2, 3])
-def test_a_native_fmu_of_a_compliant_stop_is_rejected(version):
-    with pytest.raises(MechanismError, match="a native FMU has rigid impacts only"):
-        native_fmu.build(mass(), {}, version)
+def test_a_native_fmu_with_friction_at_a_compliant_stop_is_rejected(version):
+    with pytest.raises(MechanismError, match="use the Python engine or a Python FMU"):
+        native_fmu.build(point_mass(friction=0.2), {}, version)

@@ -11,7 +11,7 @@ from ..base.errors import MechanismError
 from ..mechanics.inputs import MOBILITY, impulse_names, input_names
 from ..mechanism.description import Mechanism
 from .native import NativeInterface
-from .variables import BASE_OUTPUTS, INDICATORS, LATCHED, STORED
+from .variables import BASE_OUTPUTS, COMPLIANT_OUTPUTS, INDICATORS, LATCHED, STORED
 
 Dependencies = Mapping[str, tuple[str, ...]]
 
@@ -52,6 +52,9 @@ def dependencies(mechanism: Mechanism, interface: NativeInterface) -> Dependenci
         found |= {f"{stop}.point.{output}": shape for output in ("displacement", "mobility")}
         found[f"{stop}.point.velocity"] = moving
         found[f"{stop}.impact"] = moving + walls
+    for stop in (s.name for s in mechanism.stops if s.compliant):
+        found |= {f"{stop}.{output}": everything for output in COMPLIANT_OUTPUTS}
+        found[f"{stop}.impulse_sum"] = everything
     found |= {name: everything for name in interface.indicators}
     found |= {"energy.kinetic": moving, "energy.elastic": shape, "energy.gravitational": shape}
     found |= {name: everything for name in interface.derivatives}

@@ -61,8 +61,20 @@ def check_supported(
             if stop.compliant and number:
                 raise MechanismError(
                     f"{stop.name}.{name} = {number:g}: a compliant stop of the kernel has none; "
-                    "use the Python engine"
+                    "use the Python engine or a Python FMU"
                 )
+
+
+def check_start(mechanism: Mechanism, changes: Mapping[str, float]) -> None:
+    """Reject start values of a mechanism that the kernel does not support, by `check_supported`.
+
+    Raises
+    ------
+    PrbmError
+        If a value is invalid or not supported.
+    """
+    values, given, _ = start_values(mechanism, changes, 0.0)
+    check_supported(mechanism, values, given)
 
 
 class Tables:

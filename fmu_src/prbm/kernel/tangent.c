@@ -584,6 +584,9 @@ static Tangent begin_tangent(Simulation *sim, const Moment *now, const double *d
 
 PRBM bool exchange_directional(Simulation *simulation, const double *dx, const double *du,
                                double *dvalues, Problem *problem) {
+    if (simulation->configuration.mechanism->compliant_count > 0) {
+        return fail(problem, "there are no directional derivatives with compliant stops");
+    }
     Simulation *sim = simulation;
     size_t mark = sim->scratch.used;
     int stops = sim->configuration.mechanism->slots.stops;
