@@ -29,7 +29,8 @@ from support import ROOT, SUPPORT
 
 PAGE = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")
 COMMANDS = (
-    "list", "modes", "equilibrium", "simulate", "fit", "impact-map", "sweep", "study", "picture",
+    "list", "modes", "equilibrium", "simulate", "fit", "impact-map", "contact", "sweep", "study",
+    "picture",
     "animate", "validate", "measure youngs-modulus", "measure calibration", "measure frequency",
     "measure restitution", "completion",
 )  # fmt: skip
