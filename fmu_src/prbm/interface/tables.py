@@ -28,7 +28,6 @@ from ..mechanism.parts import (
     Part,
     Point,
     Release,
-    Stop,
     body_of,
     fields_of,
 )
@@ -246,7 +245,8 @@ class _Writer:
         m = self.mechanism
         for stop in m.stops:
             yield _text(stop.name) + _u32(self.body[stop.body], self.body[stop.on])
-            yield self._point(stop.point) + _f64(stop.direction) + self._stop_fields(stop)
+            yield self._point(stop.point) + _f64(stop.direction)
+            yield _u32(stop.compliant) + self._fields(stop)
         for friction in m.frictions:
             yield self._placed(friction) + _f64(friction.direction) + self._fields(friction)
         for force in m.forces:
@@ -297,16 +297,6 @@ class _Writer:
     def _fields(self, part: Part) -> bytes:
         names = fields_of(part)
         return b"".join(self._field(f"{part.name}.{n}", getattr(part, n)) for n in names)
-
-    def _stop_fields(self, stop: Stop) -> bytes:
-        """Return the fields of a stop; before those of the compliant law, whether it has them."""
-        rigid = [name for name in fields_of(stop) if name not in ("stiffness", "exponent")]
-        soft = ("stiffness", "exponent") if stop.compliant else ()
-        before, after = (
-            b"".join(self._field(f"{stop.name}.{n}", getattr(stop, n)) for n in names)
-            for names in (rigid, soft)
-        )
-        return before + _u32(stop.compliant) + after
 
     def _point(self, point: Point) -> bytes:
         return b"".join(self._expression(affine(coordinate)) for coordinate in point)

@@ -162,12 +162,12 @@ static void read_stops(Reader *reader, Mechanism *m) {
         }
         s->point = read_point(reader, m);
         s->direction = read_finite(reader);
+        s->compliant = read_index(reader, 0, 2) == 1;
         s->position = read_expression(reader, m);
         s->offset = read_expression(reader, m);
         s->restitution = read_expression(reader, m);
         s->friction = read_expression(reader, m);
         s->rest_speed = read_expression(reader, m);
-        s->compliant = read_index(reader, 0, 2) == 1;
         if (s->compliant) {
             s->stiffness = read_expression(reader, m);
             s->exponent = read_expression(reader, m);
