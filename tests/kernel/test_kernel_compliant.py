@@ -11,7 +11,7 @@ from prbm.base.errors import MechanismError, ParameterError, SimulationError
 from prbm.hybrid.simulation import Simulation
 from prbm.kernel.simulation import KernelSimulation
 from prbm.runs.engine import simulation
-from support import mechanism
+from support import energy_balance, mechanism
 
 
 def guide(name, stiffness):
@@ -110,3 +110,19 @@ def test_an_indentation_beyond_the_size_is_rejected_by_the_kernel():
     )
     with pytest.raises(SimulationError, match="more than the size of the mechanism"):
         sim.advance(0.1)
+
+
+@pytest.mark.parametrize("engine", [Simulation, KernelSimulation])
+@pytest.mark.parametrize("time", [0.00103, 0.02])
+def test_a_change_of_the_position_in_contact_is_work_of_the_wall(engine, time):
+    """The contact is pressed at the first time, and settled at the second one."""
+    values = {"push.x": 1.0} if time == 0.02 else {}
+    sim = engine(point_mass(velocity=0.0 if values else 0.1), values)
+    sim.advance(time)
+    start, before = energy_balance(sim.outputs()), sim.outputs()["energy.work"]
+    sim.set({"stop.position": -2e-7})
+    for k in range(1, 6):
+        sim.advance(time + 1e-5 * k)
+        assert energy_balance(sim.outputs()) == pytest.approx(start, abs=1e-6 * abs(start) + 1e-12)
+    assert sim.outputs()["energy.work"] != before
+    assert sim.outputs()["stop.contact"]
