@@ -52,7 +52,7 @@ ALLOWED = {
     "hybrid/simulation.c": {"60": "working memory", "64": "working memory"},
     "model_exchange.c": {"10.0": "base of powers of ten"},
     "dependents.c": {"80": "length of a name"},
-    "hybrid/snapshot.c": {"25": "scalars of the state", "28": "numbers of a stop"},
+    "hybrid/snapshot.c": {"25": "scalars of the state"},
     "fmi/state.c": {
         "20": "offset", "24": "offset", "28": "offset",
         "32": "offset or flag", "36": "offset", "64": "flag", "127": "all flags",

@@ -102,8 +102,6 @@ PRBM bool rate_at_time(const Equations *equations, const double *y, const Refere
     }
     if (q->driven) {
         dy[2 * n + 1] = input_power(q, result, v);
-    }
-    if (q->system->mechanism->compliant_count > 0) {
         compliant_rates(q, result, dy);
     }
     return true;

@@ -177,7 +177,8 @@ static void set_loads(Equations *q) {
         q->walls_move = q->walls_move || wall->rate != 0.0 || wall->span > 0.0;
     }
     q->driven = q->driven || q->walls_move;
-    q->friction_or_walls = q->walls_move || q->slipping_count > 0;
+    q->driven = q->driven || m->compliant_count > 0;
+    q->contacts_or_walls = q->walls_move || q->slipping_count > 0 || q->pressed_count > 0;
 }
 
 PRBM void set_equations(Equations *equations, const Inputs *inputs,

@@ -49,8 +49,8 @@ typedef struct {
     Complex *w, *w_input;   /* (d,) */
     double *moment;         /* (wide,) */
     bool walls_move;
-    bool driven;            /* inputs or walls do work */
-    bool friction_or_walls; /* whether contacts slip or walls move */
+    bool driven;            /* inputs or walls do work, or stops are compliant */
+    bool contacts_or_walls; /* whether contacts slip or are pressed, or walls move */
     Parts B_conjugate;      /* (r, wide) */
     Parts w_parts;          /* (wide,) */
 } Equations;

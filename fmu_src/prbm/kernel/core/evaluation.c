@@ -543,20 +543,6 @@ PRBM double rub_force(const Equations *q, int i, const Complex *e) {
     return -slip_sign(q->contacts.modes[q->system->s + i]) * rub_limit(q, i, e);
 }
 
-/* Add slipping friction points, and the accelerations of the walls of held stops. */
-RARE void add_friction_and_walls(const Equations *q, Evaluation *result) {
-    Rows rubs = rub_rows(q->system);
-    for (int k = q->slipping_stops; k < q->slipping_count; k++) {
-        int i = q->slipping[k] - q->system->s;
-        row_jacobian(&rubs, i, result->at.e, result->row);
-        add_scaled(q->system->n, rub_force(q, i, result->at.e), result->row, result->a);
-    }
-    for (int k = 0; q->walls_move && k < q->held_count; k++) {
-        const Wall *wall = &q->inputs.walls[q->held[k]];
-        result->lam[q->first_hold + k] -= wall_motion(wall, result->at.time).a;
-    }
-}
-
 /* Add the forces of pressed compliant stops. */
 RARE void add_pressure(const Equations *q, Evaluation *result) {
     Rows gaps = gap_rows(q->system);
@@ -570,6 +556,21 @@ RARE void add_pressure(const Equations *q, Evaluation *result) {
         result->contact_loss[i] = (force - elastic_force(&q->laws[i], d)) * rate;
         row_jacobian(&gaps, i, result->at.e, result->row);
         add_scaled(q->system->n, force, result->row, result->a);
+    }
+}
+
+/* Add pressed stops, slipping friction points, and the accelerations of the walls of held stops. */
+RARE void add_contacts_and_walls(const Equations *q, Evaluation *result) {
+    Rows rubs = rub_rows(q->system);
+    add_pressure(q, result);
+    for (int k = q->slipping_stops; k < q->slipping_count; k++) {
+        int i = q->slipping[k] - q->system->s;
+        row_jacobian(&rubs, i, result->at.e, result->row);
+        add_scaled(q->system->n, rub_force(q, i, result->at.e), result->row, result->a);
+    }
+    for (int k = 0; q->walls_move && k < q->held_count; k++) {
+        const Wall *wall = &q->inputs.walls[q->held[k]];
+        result->lam[q->first_hold + k] -= wall_motion(wall, result->at.time).a;
     }
 }
 
@@ -626,11 +627,8 @@ SHARED bool motion_of_length(int even, const Equations *q, const Reference *near
         rows_dispatch(even, q, &result->at, result->rows, result->lam);
     }
     add_springs(even, q, result);
-    if (q->friction_or_walls) {
-        add_friction_and_walls(q, result);
-    }
-    if (q->pressed_count > 0) {
-        add_pressure(q, result);
+    if (q->contacts_or_walls) {
+        add_contacts_and_walls(q, result);
     }
     if (!factor_motion(even, q, result)) {
         return false;
