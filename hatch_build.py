@@ -21,7 +21,7 @@ class LibrariesHook(BuildHookInterface):  # type: ignore[type-arg]
         if version == "editable":
             return
         sys.path.insert(0, str(Path(self.root) / "fmu_src"))
-        from prbm.kernel.compiler import ALL, PRODUCTS, libraries
+        from prbm.kernel.compiler import ALL, BROWSER, LIVE, PRODUCTS, browser_module, libraries
         from prbm.kernel.prebuilt import package_files
         from prbm.kernel.sources import kernel
 
@@ -30,6 +30,7 @@ class LibrariesHook(BuildHookInterface):  # type: ignore[type-arg]
             for product in PRODUCTS
             for platform, content in libraries([ALL], self.app.display_info, product).items()
         }
+        made[f"{BROWSER.name}/{LIVE.name}{BROWSER.suffix}"] = browser_module(self.app.display_info)
         compiler = f"ziglang {installed_version('ziglang')}"
         self.folder = tempfile.TemporaryDirectory(prefix="prbm_")
         for name, content in package_files(made, compiler, kernel()).items():

@@ -2,8 +2,9 @@
 
     python benchmarks/flexure_models.py
 
-writes the tables of ``docs/flexure-models.md`` (between their marks) and the figure
-``docs/figures/flexure-models.png``.  The tests compare the page with the results of this script.
+writes the tables of ``docs/flexure-models.md`` (between their marks) and the figures
+``docs/figures/flexure-models.png`` and ``docs/figures/flexure-coordinates.png``.  The tests compare
+the page with the results of this script.
 
 The tables contain model errors only: the equations of each model are solved to rounding.
 """
@@ -40,8 +41,9 @@ Cell = float | None
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "flexure-models.md"
 FIGURE = ROOT / "docs" / "figures" / "flexure-models.png"
+COORDINATES = ROOT / "docs" / "figures" / "flexure-coordinates.png"
 PUBLISHED = tuple(name for name, model in flexure.MODELS.items() if model.coefficients)
-MODELS = (*PUBLISHED, "10R", "40R")
+MODELS = (*PUBLISHED, "beam", "10R", "40R")
 FORCES = (0.1, 1.0, 2.0, 4.0, 8.0)  # Scaled forces P L^2/EI.
 MOMENTS = (0.1, math.pi / 4, math.pi / 2, math.pi)  # Scaled moments M L/EI.
 TIPS = (
@@ -52,9 +54,18 @@ TIPS = (
 )  # Mass and inertia of the tip body, in units of m and m L^2 of the beam.
 TIP_MASS_MIN = 1e-8  # Scaled mass of a missing tip body; a body must have a mass.
 
-FE_GUIDE = (10.7206, 4.9065, 130.65, 209.82, 302.05, 327.65)
+FE_GUIDE = (10.7206, 4.9065, 130.65, 209.85, 302.05, 327.65)
 """Rest position [mm] and frequencies at rest [Hz] of the steel guide: 64 ANCF cable elements
 per flexure (Exudyn), which stretch and whose sections have no rotary inertia."""
+FE_CONVERGENCE = {
+    2: (10.5214217, 5.036453, 301.191922, 311.276856, 342.677328, 464.069242),
+    4: (10.7032022, 4.918320, 136.300477, 217.666575, 303.495431, 329.686810),
+    8: (10.7193487, 4.907394, 131.062277, 210.404663, 302.151153, 327.800176),
+    16: (10.7204818, 4.906599, 130.674895, 209.883305, 302.057643, 327.658975),
+    32: (10.7205548, 4.906547, 130.649144, 209.849055, 302.051642, 327.649714),
+    64: (10.7205594, 4.906544, 130.647507, 209.846885, 302.051264, 327.649128),
+}
+"""The same figures by the number of elements per flexure."""
 FE_STRAIGHT = 4.6405  # Fundamental frequency of the straight guide, no gravity, 32 elements [Hz].
 FE_RESTITUTION = {
     -4: (0.4089, 0.5483, 0.4084),
@@ -73,9 +84,18 @@ MASS = DENSITY * WIDTH * THICKNESS * L
 
 
 def kind(name: str, model: str, *, axial: bool = False) -> FlexureType:
-    """Return a flexure type of the steel cantilever; ``10R`` is a chain of ten links."""
-    which = (model, 0) if model in flexure.MODELS else ("nR", int(model[:-1]))
-    return FlexureType(name, which[0], THICKNESS, WIDTH, MODULUS, DENSITY, n=which[1], axial=axial)
+    """Return a flexure type of the steel cantilever.
+
+    ``10R`` is a chain of ten links, ``beam 5`` a beam of the order 5 and ``beam 3/8`` one of the
+    order 3 with 8 nodes.
+    """
+    section = FlexureType(name, model, THICKNESS, WIDTH, MODULUS, DENSITY, axial=axial)
+    if model in flexure.MODELS:
+        return section
+    if model.startswith("beam"):
+        order, *nodes = map(int, model.removeprefix("beam ").split("/"))
+        return replace(section, model="beam", order=order, nodes=nodes[0] if nodes else None)
+    return replace(section, model="nR", n=int(model[:-1]))
 
 
 def cantilever(model: str, tip: tuple[float, float] = (0.0, 0.0), *, axial: bool = False) -> System:
@@ -127,8 +147,17 @@ def guide(model: str, *, axial: bool = False) -> Mechanism:
     """Return the steel guide of the thesis with another model of its flexures."""
     shipped_guide = load("PRBDM2R")
     section = kind("flexure", model, axial=axial)
-    flexure = replace(shipped_guide.flexure_types[0], model=section.model, n=section.n, axial=axial)
+    own = shipped_guide.flexure_types[0]
+    changed = ("model", "n", "order", "nodes", "axial")
+    flexure = replace(own, **{name: getattr(section, name) for name in changed})
     return replace(shipped_guide, flexure_types=(flexure,))
+
+
+def coordinates(model: str, *, axial: bool = False) -> tuple[int, int]:
+    """Return the number of coordinates of the guide, and without those that the loops determine."""
+    mechanism = guide(model, axial=axial)
+    system = assemble(mechanism, mechanism.values())
+    return system.n, system.n - len(system.loops)
 
 
 @cache
@@ -179,7 +208,7 @@ def force_table() -> str:
         )
         for load in FORCES
     ]
-    return table(["P L²/EI", *MODELS], rows, ".2f")
+    return table(["P L²/EI", *MODELS], rows, ".3f")
 
 
 def moment_table() -> str:
@@ -194,7 +223,7 @@ def moment_table() -> str:
     ]
     slopes = [tip_of(s, moment=1.0).slope for s in systems]
     # fmt: off
-    return table(["M L/EI", *MODELS], rows, ".2f") + "\n" + table(
+    return table(["M L/EI", *MODELS], rows, ".3f") + "\n" + table(
         [], [("slope / exact", slopes)], ".3f"
     ).splitlines()[-1]
     # fmt: on
@@ -215,11 +244,12 @@ def guide_table() -> str:
     """Return the table of rest positions and frequencies of the steel guide."""
     names = ("rest, mm", "f1", "f2", "f3", "f4", "f5", "f1 straight")
     columns = [guide_figures(model) for model in MODELS]
-    columns += [guide_figures(model, axial=True) for model in ("2R", "40R")]
+    stretching = ("2R", "beam", "40R")
+    columns += [guide_figures(model, axial=True) for model in stretching]
     columns.append(np.array([*FE_GUIDE, FE_STRAIGHT]))
-    head = ["", *MODELS, "2R axial", "40R axial", "FE"]
+    head = ["", *MODELS, *(f"{model} axial" for model in stretching), "FE"]
     rows = [(name, [float(c[i]) for c in columns]) for i, name in enumerate(names)]
-    return table(head, rows, ".5g")
+    return table(head, rows, "#.5g")
 
 
 def restitution_table() -> str:
@@ -231,12 +261,71 @@ def restitution_table() -> str:
     return table(["", *MODELS], rows, ".4f")
 
 
+BEAMS = (
+    ("beam 3/5", False), ("beam 3/6", False), ("beam 3/8", True), ("beam 4/8", True),
+    ("beam 6/8", True),
+)  # fmt: skip
+
+
+def beam_table() -> str:
+    """Return the table of beams: coordinates, rest position [mm] and frequencies [Hz]."""
+    rows = [("2R", coordinates("2R"), guide_figures("2R"))]
+    for model, axial in BEAMS:
+        order, nodes = model.removeprefix("beam ").split("/")
+        name = f"beam, order {order}, {nodes} nodes" + (", axial" if axial else "")
+        rows.append((name, coordinates(model, axial=axial), guide_figures(model, axial=axial)))
+    head = ["model", "coordinates (free)", "rest [mm]", *(f"f{k} [Hz]" for k in range(1, 6))]
+    lines = table(head, [], "").splitlines()
+    for name, (n, free), figures in rows:
+        lines.append(f"| {name} | {n} ({free}) | {_beam_cells(figures)} |")
+    return "\n".join([*lines, f"| finite elements | | {_beam_cells(limit_of_elements())} |"])
+
+
+def _beam_cells(figures: Sequence[float] | Real) -> str:
+    """Return rest position, the first frequency and the others with 5, 4 and 3 decimals."""
+    forms = (".5f", ".4f", *[".3f"] * 4)
+    return " | ".join(format(x, form) for x, form in zip(figures[:6], forms, strict=True))
+
+
+HEAVY_ORDERS = (3, 5, 7, 9, 12)
+MATERIALS = {
+    "steel": {},
+    "PMMA": {
+        "flexure.length": 0.2, "flexure.thickness": 2e-3, "flexure.width": 1e-2,
+        "flexure.youngs_modulus": 3.21e9, "flexure.density": 1190.0, "shuttle.width": 0.2,
+        "shuttle.mass": 1190 * 0.2 * 0.02 * 0.01,
+    },
+}  # fmt: skip
+"""Changes of the parameters of the steel guide."""
+
+
+def heavy_table() -> str:
+    """Return the table of modal restitutions of a centred rigid impact over the order [-]."""
+    rows = []
+    for name, changes in MATERIALS.items():
+        cells: list[Cell] = []
+        for order in HEAVY_ORDERS:
+            mechanism = guide(f"beam {order}", axial=True)
+            system = assemble(mechanism, mechanism.values({**changes, "gravity.x": 0.0}))
+            cells.append(modal_restitution(system, equilibrium(system, 0.0), 0, 0.6))
+        v = system.values
+        flexures = 2 * v["flexure.density"] * v["flexure.length"]
+        flexures *= v["flexure.width"] * v["flexure.thickness"]
+        share = flexures / v["shuttle.mass"]
+        cells += [1.6 / (1.0 + 13 / 35 * share) - 1.0]
+        rows.append((f"{name}, mass of the flexures {100 * share:.1f} %", cells))
+    head = ["guide", *(f"order {order}" for order in HEAVY_ORDERS), "limit"]
+    return table(head, rows, ".4f")
+
+
 TABLES: dict[str, Callable[[], str]] = {
+    "beams": beam_table,
     "end force": force_table,
     "end moment": moment_table,
     "frequencies": frequency_table,
     "guide": guide_table,
     "restitution": restitution_table,
+    "heavy flexures": heavy_table,
 }
 MARKED = r"(<!-- table: {} -->\n)(.*?)(<!-- end -->)"
 
@@ -265,8 +354,8 @@ def order(ns: Sequence[int], errors: Sequence[float]) -> float:
     return -float(np.polyfit(np.log(ns), np.log(errors), 1)[0])
 
 
-COLOURS = {"10R": "#009e73", "40R": "#0072b2"} | dict(
-    zip(PUBLISHED, ("#d55e00", "#e69f00", "#cc79a7", "#56b4e9", "#000000"), strict=False)
+COLOURS = {"beam": "#000000", "10R": "#009e73", "40R": "#0072b2"} | dict(
+    zip(PUBLISHED, ("#d55e00", "#e69f00", "#cc79a7"), strict=True)
 )  # Colours that colour-blind readers can distinguish.
 LOADS: dict[str, tuple[str, Callable[[float], Tip], float]] = {
     "force": ("end force, P L²/EI", end_force, 8.0),
@@ -320,7 +409,8 @@ def draw_errors(axes: plt.Axes, loading: str) -> None:
         ylabel="error of the tip / its displacement, %",
         title=name.split(",")[0].capitalize(),
     )
-    axes.legend(loc=(0.5, 0.13 if loading == "force" else 0.02), ncols=2)
+    axes.set_ylim(bottom=1e-5 if loading == "force" else 1e-9)  # Smaller errors are round-off.
+    axes.legend(loc=(0.5, 0.03 if loading == "force" else 0.3), ncols=2)
     axes.grid(alpha=0.3)
 
 
@@ -341,8 +431,64 @@ def draw_convergence(axes: plt.Axes) -> None:
     axes.legend()
 
 
+ORDERS = (3, 4, 5, 6, 7)
+PANELS = {"rest position": [0], "f2, f3": [2, 3], "f4, f5": [4, 5]}
+
+
+def element_coordinates(elements: int) -> int:
+    """Return the free coordinates of two cables: four per node, without those of their clamps.
+
+    Both cables are clamped to the ground, which takes three coordinates of a node, and to the
+    shuttle, which has three coordinates itself.
+    """
+    return 2 * (4 * (elements + 1) - 6) + 3
+
+
+def limit_of_elements() -> Real:
+    """Return the limit of the finite elements, whose errors are of the fourth order."""
+    coarse, fine = (np.array(FE_CONVERGENCE[n]) for n in sorted(FE_CONVERGENCE)[-2:])
+    return fine + (fine - coarse) / 15
+
+
+def coordinates_figure() -> None:
+    """Draw errors of the guide over the number of its free coordinates."""
+    fig, panels = plt.subplots(1, 3, figsize=(9.6, 4.0), layout="constrained", sharey=True)
+    limit = limit_of_elements()
+
+    def errors(found: Sequence[float] | Real, columns: list[int]) -> float:
+        return 100 * max(abs(found[i] / limit[i] - 1) for i in columns)
+
+    for axes, (title, columns) in zip(panels, PANELS.items(), strict=True):
+        for model in PUBLISHED:
+            x, y = coordinates(model)[1], errors(guide_figures(model), columns)
+            axes.loglog(x, y, "s", color=COLOURS[model], label=model)
+        series = {
+            "nR axial": ([f"{n}R" for n in CHAINS], True, "^-", "#0072b2"),
+            "beam": ([f"beam {n}" for n in ORDERS[:3]], False, "o--", "#777777"),
+            "beam axial": ([f"beam {n}" for n in ORDERS], True, "o-", "#000000"),
+        }
+        for name, (models, axial, line, colour) in series.items():
+            x = [coordinates(model, axial=axial)[1] for model in models]
+            y = [errors(guide_figures(model, axial=axial), columns) for model in models]
+            axes.loglog(x, y, line, color=colour, ms=4, label=name)
+        coarse = sorted(FE_CONVERGENCE)[:-1]
+        x = [element_coordinates(n) for n in coarse]
+        y = [errors(FE_CONVERGENCE[n], columns) for n in coarse]
+        axes.loglog(x, y, "d-", color="#009e73", ms=4, label="ANCF elements")
+        axes.set(title=title, xlabel="free coordinates")
+        axes.set_xticks([1, 5, 10, 20, 50, 100, 200, 500])
+        axes.get_xaxis().set_major_formatter(mpl.ticker.ScalarFormatter())
+        axes.minorticks_off()
+        axes.grid(alpha=0.3)
+    panels[0].set(ylabel="error, %")
+    fig.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=7)
+    COORDINATES.parent.mkdir(exist_ok=True)
+    fig.savefig(COORDINATES, dpi=110, metadata={"Software": None})
+    plt.close(fig)
+
+
 def main() -> None:
-    """Update the page and its figure."""
+    """Update the page and its figures."""
     page = PAGE.read_text(encoding="utf-8")
     for name, make in TABLES.items():
         body = make()
@@ -352,6 +498,7 @@ def main() -> None:
         )
     PAGE.write_text(page, encoding="utf-8")
     figure()
+    coordinates_figure()
 
 
 if __name__ == "__main__":

@@ -10,6 +10,8 @@ links   the guide with two chains of n links each, 4 to 50: one loop, growing bl
 axial   the same chains with links that stretch: twice the coordinates
 loops   a shuttle on k 2R flexures that stretch, 2 to 12: k - 1 loops, blocks of the mass matrix of
         constant size (parallel links that do not stretch would be over-constrained)
+beams   the guide on beams of several orders and numbers of nodes, relative to the 2R guide: the
+        right-hand side in instructions, and the default second in CPU time
 """
 
 import argparse
@@ -26,11 +28,12 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fmu_src"))
 
-from native import RIGHT_HAND_SIDE, inclusive
+from native import POINTS, RIGHT_HAND_SIDE, cost, inclusive
 
 from c_importer import Job, execute, kernel_library, unpack, write
 from prbm.fmu import native_fmu
 from prbm.fmu.reference_results import steps
+from prbm.kernel.compiler import FLAGS
 from prbm.mechanics.assembly import assemble
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.parts import Flexure
@@ -41,6 +44,7 @@ LINKS = (4, 8, 12, 18, 25, 35, 50)  # Links per flexure.
 LEAVES = (2, 3, 4, 6, 8, 10, 12)  # Parallel flexures.
 STOP_TIME_MAX = 2e-5  # Long enough for a mean over the steps [s].
 STEPS_MAX = 20  # Enough for a mean if the steps are short.
+BEAMS = ((3, 5, False), (3, 6, False), (5, 8, False), (3, 6, True))  # Order, nodes, axial.
 
 
 def chains(n: int, axial: bool = False) -> Mechanism:
@@ -69,16 +73,31 @@ def leaves(k: int) -> Mechanism:
     )
 
 
+def beams(order: int, nodes: int, axial: bool) -> Mechanism:
+    """Return the guide on two beams."""
+    guide = mechanism("PRBDM2R")
+    leaf = dataclasses.replace(
+        guide.flexure_types[0], model="beam", order=order, nodes=nodes, axial=axial, coefficients={}
+    )
+    name = f"Beams{order}{nodes}{'Axial' * axial}"
+    return dataclasses.replace(guide, name=name, flexure_types=(leaf,))
+
+
+def unpacked(given: Mechanism, folder: Path) -> Path:
+    """Return the folder of an unpacked native FMU, without reference results to save time."""
+    with patch.object(native_fmu, "reference", lambda *_: {}):
+        write(folder / "model.fmu", native_fmu.build(given, {}, 2, ("host",)))
+    return unpack(folder / "model.fmu", folder / "model")
+
+
 def instructions(given: Mechanism) -> float:
     """Return the mean number of instructions of a right-hand side of a mechanism."""
     stop_time = min(STOP_TIME_MAX, STEPS_MAX / steps(given, {}, Experiment(1.0)))
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        # Reference results are not needed here; their computation takes a second.
-        with patch.object(native_fmu, "reference", lambda *_: {}):
-            write(folder / "model.fmu", native_fmu.build(given, {}, 2, ("host",)))
-        unpack(folder / "model.fmu", folder / "model")
-        library = kernel_library("profiled", ("-g",))
+        unpacked(given, folder)
+        optimized = [flag for flag in FLAGS if flag != "-g0"]
+        library = kernel_library("profiled", ("-g", *optimized))
         job = Job(
             folder / "model",
             points=np.array([0.0, stop_time]),
@@ -116,6 +135,29 @@ def print_growth(title: str, sizes: tuple[int, ...], make: Callable[[int], Mecha
     return float(slope)
 
 
+def default_second(given: Mechanism, runs: int) -> float:
+    """Return the median CPU time of the steps of the default second [s]."""
+    with tempfile.TemporaryDirectory() as name:
+        job = Job(unpacked(given, Path(name)), points=POINTS, records=("shuttle.x",))
+        return cost(job, runs, 0)
+
+
+def print_beams(runs: int) -> None:
+    """Print the costs of beams, relative to those of the 2R guide."""
+    print("\nBeams: the guide on two beams, relative to the 2R guide")
+    guide = mechanism("PRBDM2R")
+    reference = instructions(guide), default_second(guide, runs)
+    for order, nodes, axial in BEAMS:
+        given = beams(order, nodes, axial)
+        one, all_ = instructions(given), default_second(given, 1 if axial else runs)
+        print(
+            f"  order {order}, {nodes} nodes{', axial' * axial:7s} "
+            f"{one:8.0f} instructions, ratio {one / reference[0]:5.2f}; default second "
+            f"{1e3 * all_:8.1f} ms, ratio {all_ / reference[1]:6.2f}",
+            flush=True,
+        )
+
+
 def main() -> None:
     """Print the costs and exponents of all series."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
@@ -125,13 +167,22 @@ def main() -> None:
         default=50,
         help="largest number of links per chain (default: %(default)s)",
     )
-    largest = parser.parse_args().largest
+    parser.add_argument(
+        "--runs", type=int, default=7, help="runs of a default second (default: %(default)s)"
+    )
+    parser.add_argument("--beams", action="store_true", help="measure only beams")
+    arguments = parser.parse_args()
+    largest = arguments.largest
     if shutil.which("valgrind") is None:
         sys.exit("valgrind is not installed; it is needed to count instructions")
+    if arguments.beams:
+        print_beams(arguments.runs)
+        return
     sizes = tuple(n for n in LINKS if n <= largest)
     print_growth("Links: two chains of n links", sizes, chains)
     print_growth("Axial: chains of n links that stretch", sizes, lambda n: chains(n, axial=True))
     print_growth("Loops: k parallel 2R flexures that stretch", LEAVES, leaves)
+    print_beams(arguments.runs)
 
 
 if __name__ == "__main__":

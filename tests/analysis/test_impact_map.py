@@ -329,3 +329,11 @@ def test_coefficients_are_kept_only_for_the_same_model():
     parts = replace(guide("1R"), flexure_types=(own,))
     assert impact_map.with_flexures(parts, "1R", axial=True).values()["flexure.K_theta"] == 2.5449
     assert impact_map.with_flexures(parts, "2R").values()["flexure.K_theta1"] == 3.4710
+
+
+def test_order_and_nodes_are_kept_only_for_beams():
+    beams = impact_map.with_flexures(guide(), "beam", order=5, nodes=9)
+    (same,) = impact_map.with_flexures(beams, "beam", axial=True).flexure_types
+    assert (same.order, same.nodes, same.axial) == (5, 9, True)
+    (other,) = impact_map.with_flexures(beams, "2R").flexure_types
+    assert (other.order, other.nodes) == (None, None)

@@ -29,10 +29,10 @@ from support import ROOT, SUPPORT
 
 PAGE = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")
 COMMANDS = (
-    "list", "modes", "equilibrium", "simulate", "fit", "impact-map", "contact", "sweep", "study",
-    "picture",
-    "animate", "validate", "measure youngs-modulus", "measure calibration", "measure frequency",
-    "measure restitution", "completion",
+    "list", "modes", "equilibrium", "simulate", "stress", "shock", "fit", "impact-map", "contact",
+    "sweep", "study", "picture", "animate", "explore", "validate", "measure youngs-modulus",
+    "measure calibration",
+    "measure frequency", "measure restitution", "completion",
 )  # fmt: skip
 
 

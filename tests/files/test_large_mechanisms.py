@@ -1,5 +1,6 @@
 """Mechanism files are read in linear time in the number of their parts."""
 
+import math
 import time
 from pathlib import Path
 
@@ -34,26 +35,29 @@ def text(parts: str, n: int, last: str = "") -> str:
 
 
 def duration(path: Path, content: str, valid: bool) -> float:
-    """Return the smallest of three processor times of reading a file [s]."""
+    """Return the processor time of reading a file [s]."""
     path.write_text(content)
-    durations = []
-    for _ in range(3):
-        begin = time.process_time()
-        if valid:
+    begin = time.process_time()
+    if valid:
+        read_mechanism(path)
+    else:
+        with pytest.raises(MechanismError, match="unknown key"):
             read_mechanism(path)
-        else:
-            with pytest.raises(MechanismError, match="unknown key"):
-                read_mechanism(path)
-        durations.append(time.process_time() - begin)
-    return min(durations)
+    return time.process_time() - begin
 
 
 @pytest.mark.parametrize("valid", [True, False])
 @pytest.mark.parametrize("parts", PARTS)
 def test_four_times_as_many_parts_take_about_four_times_as_long(parts, valid, tmp_path):
-    """A quadratic part of the time would make the ratio larger than 8 at these numbers."""
-    path = tmp_path / "many.toml"
+    """A quadratic part of the time would make the ratio larger than 8 at these numbers.
+
+    Other programs may disturb the times.  The smallest of up to three times counts.
+    """
+    path, few, many = tmp_path / "many.toml", math.inf, math.inf
     last = "" if valid else "stroke = 3\n"
-    few, many = (duration(path, text(parts, n, last), valid) for n in (500, 2000))
-    assert many < 8 * few
-    assert many < 4.0
+    for _ in range(3):
+        few = min(few, duration(path, text(parts, 500, last), valid))
+        many = min(many, duration(path, text(parts, 2000, last), valid))
+        if many < 8 * few and many < 4.0:
+            return
+    pytest.fail(f"{few:.3g} s for 500 parts, {many:.3g} s for 2000")

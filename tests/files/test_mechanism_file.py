@@ -211,6 +211,9 @@ def test_units_of_parameters_are_coherent_and_known_to_the_fmu():
     assert known <= {"", *units.COHERENT}
     for unit in units.COHERENT:
         units.check_coherent(unit.replace(".", "·"))
+        if unit.startswith("1/"):
+            assert units.converted("1", unit.replace("/", "/m"), unit) == 1e3
+            continue
         small = f"m{unit.removeprefix('k')}"
         assert units.converted("1", small, unit) == (1e-6 if unit.startswith("k") else 1e-3)
     for unit in ("mm", "deg", "g", "kN", "g/cm3", "1/ms"):
@@ -282,9 +285,13 @@ def test_keys_have_the_defaults_of_the_fields_of_the_parts(tmp_path):
         kind = MechanismTable.model_fields[key].annotation
         table = kind if key == "release" else kind.__args__[0]
         own = {f.name: f for f in fields(part)}
-        assert set(table.model_fields) == set(own)
+        more = {"mirror", "repeat"} if part in (Body, Joint) else set()
+        if part is Body:
+            more |= {"thickness", "material", "density"}
+        assert set(table.model_fields) == set(own) | more
         for name, field in table.model_fields.items():
-            if not field.is_required() and name != "points":
+            optional = part is Body and name in ("mass", "inertia", "centre")
+            if not field.is_required() and not optional and name not in {"points", *more}:
                 assert field.default == own[name].default, (key, name)
     without_field = {"materials"}
     assert set(MechanismTable.model_fields) - without_field == {
@@ -500,6 +507,11 @@ SCHEMA_MISTAKES = (
     "type and section", "no type and no section", "section without width", "too dense",
     "unknown model", "n too large", "n of zero", "ends wrong", "three ends", "only one end", "huge",
     "damping out of bounds", "text as a number",
+    "mass and density", "plate without a thickness", "plate without an outline",
+    "plate without a material", "plate with material and density", "plate without density",
+    "plate of zero thickness", "mirror about an unknown axis", "mirror without a line",
+    "mirror with a number", "mirror with three lines", "repeat of zero parts",
+    "repeat of too many parts", "repeat with an unknown key", "repeat that is a number",
 )  # fmt: skip
 
 
@@ -577,6 +589,7 @@ def test_the_page_has_every_key_with_unit_default_and_range():
     page = REFERENCE.read_text("utf-8")
     root = schema()
     tables = {key: _definition(root, key) for key in root["properties"]}
+    tables["repeat"] = root["definitions"]["RepeatTable"]
     wrong = ""
     for key, table in {"mechanism": root, **tables}.items():
         if table is not None:

@@ -19,7 +19,10 @@ from support import energy_balance
 
 END, STEP = 0.04, 1e-3
 BLOW = {"blow.y": -0.6}
-OUTPUTS = ("face.gap", "hammer.y", "tip.x", "tip.vy", "face.impact_count", "side.gap_rate")
+OUTPUTS = (
+    "face.gap", "hammer.y", "tip.x", "tip.vy", "face.impact_count", "side.gap_rate",
+    "one.stress_start", "one.peak_stress", "three.stress_end", "three.stress",
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module", params=["python", "fmi2", "fmi3"])

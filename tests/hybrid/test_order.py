@@ -111,7 +111,7 @@ def test_error_of_the_interpolation_through_three_states_falls_with_the_eighth_p
         k, end = stages(PAIR, energized_orbit, 0.0, y, h, energized_orbit(0.0, y))
         last = Arc(0.0, h, h, y, k, 2)
         k, _ = stages(PAIR, energized_orbit, h, end, h, k[-1])
-        arc = Arc(h, h, 2 * h, end, k, 2).following(last)
+        arc = Arc(h, h, 2 * h, end, k, 2, last.start_before(h))
         third = arc.before if previous else arc.middle(energized_orbit)
         t = 1.3 * h
         exact = solve_ivp(energized_orbit, (0.0, t), y, "DOP853", rtol=2.3e-14, atol=1e-15).y[:, -1]
@@ -122,10 +122,9 @@ def test_error_of_the_interpolation_through_three_states_falls_with_the_eighth_p
 
 def test_a_short_previous_step_is_no_node_of_the_interpolation():
     """Two nodes close to each other amplify round-off."""
-    k = np.zeros((10, 4))
-    last, arc = (Arc(t, h, t + h, np.zeros(4), k, 1) for t, h in ((0.0, 0.1), (0.1, 1.0)))
-    assert arc.following(last).before is None
-    assert last.following(arc).before is not None
+    arc = Arc(0.0, 0.1, 0.1, np.zeros(4), np.zeros((10, 4)), 1)
+    assert arc.start_before(1.0) is None
+    assert arc.start_before(0.1) is not None
 
 
 def test_error_is_roughly_proportional_to_the_tolerance():

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import pytest
 
 from kernel_library import KernelError, kernel
-from many_parts import anvil, elastic
+from many_parts import anvil, elastic, profiles
 from prbm.base.errors import MechanismError
 from prbm.files.mechanism_file import read_mechanism, shipped
 from prbm.fmu.native_fmu import described
@@ -18,9 +18,10 @@ from prbm.mechanics.independent import independent
 from prbm.mechanics.inputs import input_names
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.expressions import affine
-from prbm.mechanism.parts import FIELDS, fields_of, value
+from prbm.mechanism.parts import FIELDS, FlexureType, field_of, fields_of, value
 from support import SHIPPED
 
+REQUIRED = ("thickness", "width", "youngs_modulus", "density")
 TOKEN = "{0}"
 STEP = 2e-3  # s, communication step of the default experiment
 TYPES = {0: "Real", 1: "Integer", 2: "Boolean", 3: CLOCK}
@@ -116,10 +117,10 @@ class Reader:
         return lambda values: (x(values), y(values))
 
 
-@pytest.fixture(scope="module", params=[*SHIPPED, "Lever", "Elastic"])
+@pytest.fixture(scope="module", params=[*SHIPPED, "Lever", "Elastic", "Profiles"])
 def mechanism(request, tmp_path_factory) -> Mechanism:
-    if request.param == "Elastic":
-        return elastic()
+    if request.param in ("Elastic", "Profiles"):
+        return elastic() if request.param == "Elastic" else profiles()
     if request.param == "Lever":
         path = tmp_path_factory.mktemp("lever") / "lever.toml"
         path.write_text(EXPRESSIONS)
@@ -158,7 +159,7 @@ class Comparison:
             (part, name)
             for part in mechanism._parts()
             for name in fields_of(part)
-            if isinstance(getattr(part, name), str)
+            if isinstance(field_of(part, name), str)
         ]
 
     def fields(self, part) -> None:
@@ -224,9 +225,17 @@ class Comparison:
         for kind in m.flexure_types:
             model = m.model(kind)
             assert r.text() == kind.name
-            assert r.take("III") == (model.lumped, model.rate_with_gamma, kind.axial)
+            assert r.take("IIII") == (
+                model.lumped, model.rate_with_gamma, kind.axial, kind.stress,
+            )  # fmt: skip
             assert r.take("II") == (len(model.gamma), kind.n)
             assert r.take("II") == (model.order, model.nodes)
+            assert r.take("I") == ("leaf", "taper", "notch").index(kind.profile)
+            given = r.take("I")
+            names = [name for name in FIELDS[FlexureType] if name not in REQUIRED]
+            assert [bool(given >> i & 1) for i, _ in enumerate(names)] == [
+                field_of(kind, name) is not None for name in names
+            ]
             self.fields(kind)
             for c in (*model.gamma, *model.K_theta):
                 given = kind.coefficients.get(c.name, 0.0)
@@ -279,7 +288,7 @@ class Comparison:
         for part, name in self.bounds:
             unit, _, minimum, maximum, *_ = FIELDS[type(part)][name]
             assert (r.text(), r.text()) == (f"{part.name}.{name}", unit)
-            assert_same(self.mechanism, r.expression(), affine(getattr(part, name)))
+            assert_same(self.mechanism, r.expression(), affine(field_of(part, name)))
             assert r.take("dd") == (minimum, maximum)
 
     def variables(self) -> None:
@@ -351,14 +360,14 @@ def test_mechanisms_too_large_for_the_kernel_are_not_written(parts, counted):
     [
         ("knock", 1, 2, "a stop whose wall is on its own body"),
         ("knock", 1, 9, "an index out of range"),
-        ("leaf", 3, 0, "a flexure type without a model, or with several"),
-        ("leaf", 4, 3, "a flexure type without a model, or with several"),
+        ("leaf", 4, 0, "a flexure type without a model, or with several"),
         ("leaf", 5, 3, "a flexure type without a model, or with several"),
         ("leaf", 6, 3, "a flexure type without a model, or with several"),
-        ("leaf", 5, 13, "an index out of range"),
+        ("leaf", 7, 3, "a flexure type without a model, or with several"),
+        ("leaf", 6, 13, "an index out of range"),
         ("leaf", 2, 2, "an index out of range"),
-        ("chain", 4, 100000, "an index out of range"),
-        ("chain", 4, 200, "a wrong number of independent coordinates"),
+        ("chain", 5, 100000, "an index out of range"),
+        ("chain", 5, 200, "a wrong number of independent coordinates"),
         ("hook", 0, 1, "a part that connects a body with itself"),
         ("hook", 0, 2, "a body without a connection to the ground"),
         ("tip", 0, 9, "an index out of range"),

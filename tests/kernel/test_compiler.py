@@ -10,6 +10,7 @@ import shutil
 import struct
 import subprocess
 import sys
+import tempfile
 import zipfile
 from pathlib import Path
 
@@ -149,6 +150,28 @@ def test_the_next_compiler_is_used_if_one_fails(cache, tmp_path, monkeypatch):
 def test_a_compiler_that_writes_no_file_is_an_error(cache, tmp_path, monkeypatch):
     monkeypatch.setenv("CC", str(script(tmp_path / "bin" / "idle", "exit 0")))
     with pytest.raises(CompilerError, match=r"cannot compile .*status 0: no message"):
+        libraries([HOST])
+
+
+def test_a_compiler_that_has_been_removed_is_an_error(cache):
+    removed = compiler.Compiler(("/none/cc",), "cc 1.0", "cc")
+    job = compiler.Job(this_platform(), removed, compiler.FMU, {"prbm_fmu.c": STUB})
+    with pytest.raises(CompilerError, match=r"cc cannot be run \(No such file .*; install one"):
+        compiler.compiled(job)
+
+
+def test_an_error_of_the_temporary_folder_is_one_of_the_compilation(cache, tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
+    with pytest.raises(CompilerError, match=r"temporary folder \(No such file .*variable TMPDIR"):
+        libraries([HOST])
+
+
+def test_an_unreadable_source_is_an_error_of_the_compilation(cache, monkeypatch):
+    def unreadable():
+        raise PermissionError(13, "Permission denied", "walls.c")
+
+    monkeypatch.setattr(compiler, "kernel", unreadable)
+    with pytest.raises(CompilerError, match=r"walls\.c cannot be read \(Permission denied\)"):
         libraries([HOST])
 
 

@@ -7,6 +7,7 @@ import json
 import math
 import pickle
 import re
+import tempfile
 import threading
 from contextlib import suppress
 from dataclasses import asdict, replace
@@ -19,8 +20,8 @@ from many_parts import elastic, two_stops
 from prbm.base.errors import MechanismError, ParameterError, PrbmError, SimulationError
 from prbm.hybrid.simulation import Simulation
 from prbm.kernel import library as library_module
-from prbm.kernel.library import FUNCTIONS, MESSAGE_LENGTH, library
-from prbm.kernel.simulation import IMPACT, KernelSimulation, tables_of
+from prbm.kernel.library import FUNCTIONS, MESSAGE_LENGTH, LibraryError, library
+from prbm.kernel.simulation import IMPACT, UNFINISHED, KernelSimulation, tables_of
 from support import case, each_shipped, mechanism
 
 pytestmark = pytest.mark.native
@@ -62,8 +63,9 @@ def prototypes():
 def test_the_functions_are_declared_as_in_the_header():
     assert prototypes() == FUNCTIONS
     header = (KERNEL / "engine.h").read_text() + (KERNEL / "core" / "memory.h").read_text()
-    numbers = dict(re.findall(r"enum \{ (\w+) = (\d+) \};", header))
+    numbers = dict(re.findall(r"enum \{ (\w+) = (-?\d+) \};", header))
     assert int(numbers["ENGINE_IMPACT"]) == IMPACT
+    assert int(numbers["ENGINE_UNFINISHED"]) == UNFINISHED
     assert int(numbers["PROBLEM_LENGTH"]) == MESSAGE_LENGTH
 
 
@@ -171,7 +173,7 @@ def test_a_rejected_change_has_the_same_message_and_changes_nothing(changes):
     assert kernel.outputs() == untouched.outputs()
 
 
-@pytest.mark.parametrize("target", [-1.0, math.nan, math.inf, 1e9])
+@pytest.mark.parametrize("target", [-1.0, math.nan, math.inf, 1e9, "a", None, [0.2], 1j, True])
 def test_an_invalid_target_time_has_the_same_message(target):
     python, kernel = both(mechanism("PRBDM"))
     for one in (python, kernel):
@@ -394,6 +396,31 @@ def test_a_damaged_copy_of_the_library_is_written_again(tmp_path, monkeypatch):
     with library_module._file(b"content", ".so") as path:
         assert path.read_bytes() == b"content"
     assert not path.exists()
+
+
+def test_an_error_of_the_temporary_folder_is_one_of_the_library(tmp_path, monkeypatch):
+    monkeypatch.setattr(library_module, "private_cache", lambda: None)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
+    written = library_module._file(b"content", ".so")
+    with pytest.raises(LibraryError, match=r"temporary folder \(No such file .* TMPDIR"), written:
+        pytest.fail("no file has been written")
+
+
+@pytest.mark.parametrize("start_time", ["a", None, math.nan])
+def test_an_invalid_start_time_has_the_same_message(start_time):
+    guide = mechanism("PRBDM")
+    found, expected = (
+        message(one, guide, start_time=start_time) for one in (KernelSimulation, Simulation)
+    )
+    assert found == expected
+    assert found[1].startswith("start_time = ")
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("times", [["a"], [None, "b"], [[0.1], [0.1, 0.2]], "abc"])
+def test_times_that_are_no_numbers_are_rejected(engine, times):
+    with pytest.raises(ParameterError, match=r"times = .* must be a list of numbers in s"):
+        engine(mechanism("PRBDM")).sample(times, ["shuttle.x"])
 
 
 @pytest.mark.parametrize("times", [np.empty((2, 0)), [[0.001, 0.002]], 0.001])

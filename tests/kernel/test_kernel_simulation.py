@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kernel_simulation import KernelMistake, KernelSimulation, library
-from many_parts import anvil, beams, elastic, two_stops
+from many_parts import anvil, beams, elastic, profiles, two_stops
 from prbm.base.errors import PrbmError
 from prbm.fmu.python_fmu import interface
 from prbm.hybrid.simulation import Simulation
@@ -134,7 +134,9 @@ def test_impacts_and_rest_between_bodies_in_the_kernel_equal_those_in_the_engine
     assert found["face.impact_count"] + found["face.contact"] > 0.0
 
 
-@pytest.mark.parametrize("guide", [elastic(), beams()], ids=["links", "beams"])
+@pytest.mark.parametrize(
+    "guide", [elastic(), beams(), profiles()], ids=["links", "beams", "profiles"]
+)
 def test_the_motion_with_all_kinds_of_parts_in_the_kernel_equals_that_in_the_engine(guide):
     """A chain, a free end, bars, joints and walls on bodies, over the first impacts."""
     compared(

@@ -30,7 +30,7 @@ from kernel_library import (
     prototypes,
     structures,
 )
-from many_parts import beams, elastic, links_and_beams, rich
+from many_parts import beams, elastic, links_and_beams, profiles, rich
 from prbm.base import tolerances
 from prbm.base.errors import EquilibriumError, MechanismError, ParameterError, SimulationError
 from prbm.hybrid import runge_kutta
@@ -46,7 +46,9 @@ from prbm.mechanics import (
     forces,
     kinetics,
     modal,
+    profile,
     statics,
+    stress,
 )
 from prbm.mechanics import inputs as input_data
 from prbm.mechanics import system as system_arrays
@@ -110,7 +112,10 @@ def spread(condition):
 
 
 NAMES = ("PRBDM", "PRBDM2R", "Rich", "Elastic", "Beams", "Mixed")
-OWN_MECHANISMS = {"Rich": rich, "Elastic": elastic, "Beams": beams, "Mixed": links_and_beams}
+OWN_MECHANISMS = {
+    "Rich": rich, "Elastic": elastic, "Beams": beams, "Mixed": links_and_beams,
+    "Profiles": profiles,
+}  # fmt: skip
 
 
 def described(name):
@@ -279,18 +284,54 @@ def test_unit_vectors_are_exact_along_the_axes():
         assert_same(found, expected)
 
 
-@twin(integrals=beam.integrals)
+@twin(
+    integrals=beam.integrals,
+    interpolation=beam.interpolation,
+    orthogonal=beam.orthogonal,
+)
 def test_beams_are_the_same():
     for order, nodes in ((1, 3), (3, 6), (7, 10), (12, 24)):
         for x in (-1.0, -0.3, 0.5, 1.0):
             S = np.zeros(order + 1)
             kernel().integrals(order, x, S)
             assert_same(S, beam.integrals(order, np.array([x]))[0])
+            lengths = np.zeros(nodes)
+            kernel().interpolation(nodes, x, lengths)
+            assert_same(lengths, beam.interpolation(nodes, np.array([x]))[0], scale=1.0)
         x, weights = np.zeros((2, nodes))
         kernel().gauss(nodes, x, weights)
         exact = np.polynomial.legendre.leggauss(nodes)
         assert_same(x, exact[0])
         assert_same(weights, exact[1])
+        peak = weights / (0.02 + x * x) ** 3
+        P = np.zeros((nodes, order + 1))
+        kernel().orthogonal(nodes, order, x, peak / peak.sum(), P)
+        assert_same(P, beam.orthogonal(order, x, peak / peak.sum()), 1e-9)
+
+
+@twin(notch_panels=profile.notch_panels, tangent=profile.Line.tangent)
+def test_panels_and_lines_are_the_same():
+    shapes = [(1e-3, 8e-3, (4e-3, 2e-3), H, w) for H in (5e-3, 3e-3, 9e-3) for w in (None, 6e-3)]
+    for shape in shapes:
+        notch = profile.Notch(*shape)
+        ours = structures()["Notch"](
+            *shape[:2], *shape[2], shape[3], shape[4] or 0.0, bool(shape[4])
+        )
+        expected = profile.notch_panels("neck", notch, 0.02, 7)
+        panels = (structures()["Panel"] * len(expected))()
+        kernel().notch_panels(b"neck", ours, 0.02, 7, ctypes.addressof(panels))
+        for panel, other in zip(panels, expected, strict=True):
+            assert panel.nodes == other.nodes
+            for x in (-1.0, -0.4, 0.0, 1.0):
+                section = kernel().section_at(panel, x)
+                found = [section.v, section.dv, section.thickness, section.width]
+                assert_same(found, np.ravel(other.at(np.array([x]))))
+    for line in (profile.Line(0.1), profile.Line(0.1, 12.0), profile.Line(0.1, 0.0, -0.02)):
+        ours = structures()["Line"](line.chord, line.curvature, line.rise)
+        assert kernel().line_length(ours) == pytest.approx(line.length, rel=1e-14)
+        for v in (0.0, 0.3, 1.0):
+            x = v * line.length
+            assert_same(kernel().tangent(ours, x), line.tangent(np.array([x]))[0])
 
 
 @twin(pull=direction_map.DirectionMap.pull, mass_matrix=system_arrays.System.mass_matrix)
@@ -344,7 +385,10 @@ def test_the_arrays_of_a_mechanism_are_the_same(name):
         assert_same(array(ours.calculated, len(known)), list(known.values()), scale=1.0)
         assert not outside(ours.blocks(), system.H).any()
         e = system.directions(random_state(system, rng)[0])
-        assert not outside(ours.mass_blocks(), system.mass_matrix(e)).any()
+        M = system.mass_matrix(e)
+        assert not outside(ours.mass_blocks()[:, :2], M).any()
+        for start, size, apart in ours.mass_blocks():
+            assert not M[start + apart + 1 : start + size, start : start + apart].any()
 
 
 def test_the_size_of_a_mechanism_with_all_centres_at_one_point_is_the_same():
@@ -548,8 +592,11 @@ def even(x):
     return np.ascontiguousarray(padded)
 
 
-def factors_of(M, rows, columns, sizes):
-    """Return the kernel's Factors of a matrix with blocks of some sizes, and their arrays."""
+def factors_of(M, rows, columns, sizes, apart=0):
+    """Return the kernel's Factors of a matrix with blocks of some sizes, and their arrays.
+
+    The rows of a block after the row ``apart`` are zero in the columns before it.
+    """
     r, n = rows.shape
     L = np.linalg.cholesky(M)
     root = np.diag(L).copy()
@@ -559,7 +606,7 @@ def factors_of(M, rows, columns, sizes):
         Z_columns = Z  # The kernel compares the pointers.
     starts = np.cumsum([0, *sizes])
     parts = np.concatenate([L[a:b, a:b].ravel() for a, b in itertools.pairwise(starts)])
-    blocks = np.array([starts[:-1], sizes], np.int32).T.copy()
+    blocks = np.array([starts[:-1], sizes, [apart] * len(sizes)], np.int32).T.copy()
     S, pivots = np.full(r * (2 * r + 1), np.nan), np.zeros(r, np.int32)
     arrays = [blocks, parts, even(1.0 / root**2), Z, Z_columns, S, pivots]
     addresses = (part.ctypes.data for part in arrays)
@@ -574,8 +621,11 @@ def solved_again(factors, right, n):
 
 
 @twin(factor_schur=constraints.factor_and_solve, solve_again=constraints.solve_again)
-@pytest.mark.parametrize("sizes", [(1,), (3,), (4, 3), (2, 1, 4), (5, 6)])
-def test_repeated_solutions_with_one_factorization_are_the_same(sizes):
+@pytest.mark.parametrize(
+    ("sizes", "apart"),
+    [((1,), 0), ((3,), 0), ((4, 3), 0), ((2, 1, 4), 0), ((5, 6), 0), ((7,), 3), ((8,), 5)],
+)
+def test_repeated_solutions_with_one_factorization_are_the_same(sizes, apart):
     """With columns that differ from the rows, as for sliding friction, and with equal ones."""
     rng, n = np.random.default_rng(0), sum(sizes)
     block = np.repeat(range(len(sizes)), sizes)
@@ -583,8 +633,12 @@ def test_repeated_solutions_with_one_factorization_are_the_same(sizes):
         for own in (False, True):
             M, rows = random_saddle(rng, n, r)
             M[block[:, None] != block] = 0.0
+            if apart:
+                M += np.diag(np.abs(M).sum(axis=1))  # Definite with zeros, too.
+                M[:apart, apart + 1 :] = 0.0
+                M[apart + 1 :, :apart] = 0.0
             columns = rows + 0.2 * own * rng.normal(size=rows.shape)
-            factors, _arrays = factors_of(M, rows, columns, sizes)
+            factors, _arrays = factors_of(M, rows, columns, sizes, apart)
             assert kernel().factor_schur(factors)
             kkt = constraints.saddle(M, columns, rows)
             rel = spread(np.linalg.cond(kkt) * np.linalg.cond(M))
@@ -994,7 +1048,8 @@ def test_fundamental_modes_away_from_equilibrium_are_the_same(name):
         kernel().fundamental_at(ours.structure, q, phi, M)
         expected, M_expected = modal.fundamental_at(system, q)
         assert_same(M, M_expected)
-        assert_same(np.sign(phi @ M @ expected) * phi, expected, 1e-9)
+        # Rounding errors are those of the fastest modes, which are those of notches.
+        assert_same(np.sign(phi @ M @ expected) * phi, expected, 1e-8)
 
 
 @twin(simulated_restitution=modal.simulated_restitution)
@@ -1054,6 +1109,12 @@ class KernelEquations:
     def multiplied(self, n):
         """Return the accelerations and multipliers of the evaluation."""
         return array(self.evaluation.a, n), array(self.evaluation.lam, self.structure.r)
+
+    def given(self, a, lam):
+        """Set the accelerations and multipliers of the evaluation, and return them as one."""
+        for address, x in ((self.evaluation.a, a), (self.evaluation.lam, lam)):
+            ctypes.memmove(address, np.ascontiguousarray(x).ctypes.data, 8 * len(x))
+        return dynamics.Evaluation(a, lam, None, None)
 
     def rate(self, t, y):
         """Return the rates of a state at a time."""
@@ -1341,6 +1402,23 @@ def test_reactions_on_the_base_are_the_same(name):
         expected = dynamics.base_reaction(theirs, q, v, a)
         assert_same(force[0], expected[0])
         assert_same(moment[0], expected[1], scale=abs(expected[0]) * theirs.system.length)
+
+
+@twin(stresses=stress.stresses)
+@pytest.mark.parametrize("name", [*OWN_MECHANISMS])
+def test_stresses_of_flexures_are_the_same(name):
+    for theirs, mine, y, rng in equations(name):
+        n = theirs.n
+        q, v, a = y[:n], y[n : 2 * n], 100.0 * rng.normal(size=n)
+        lam = rng.normal(size=len(theirs.rows))
+        e = theirs.system.directions(q)
+        given = mine.given(a, lam)
+        expected = [tuple(x) for x in stress.stresses(theirs, q, v, given).values()]
+        found = np.full((len(expected), 5), np.nan)
+        kernel().stresses(mine.structure, e, q, v, mine.evaluation, found.ctypes.data)
+        scale = max(one[2] for one in expected)
+        assert_same(found[:, :3], [one[:3] for one in expected], 1e-11, scale=scale)
+        assert_same(found[:, 3:], [one[3:] for one in expected], 1e-12)
 
 
 PAIR = runge_kutta.TSITOURAS_PAPAKOSTAS

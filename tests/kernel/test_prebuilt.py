@@ -8,6 +8,7 @@ from prbm.kernel.prebuilt import FOLDER, LIST, DamagedLibraryError
 
 SOURCES = {"a.c": b"int a;", "b.c": b"int b;"}
 NAME = "x86_64-linux/prbm_fmu.so"
+UNREADABLE = object()  # Stands for a file that cannot be read.
 
 
 @pytest.fixture
@@ -37,12 +38,22 @@ def test_a_package_without_libraries_has_none(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(
     ("file", "content"),
-    [(NAME, b"librarx"), (NAME, b""), (NAME, None), (LIST, b"{"), (LIST, b"[]"), (LIST, b"\xff")],
+    [
+        (NAME, b"librarx"),
+        (NAME, b""),
+        (NAME, None),
+        (LIST, b"{"),
+        (LIST, b"[]"),
+        (LIST, b"\xff"),
+        (LIST, UNREADABLE),
+    ],
 )
 def test_error_for_a_damaged_package_names_the_file_and_the_remedy(package, file, content):
     path = package / FOLDER / file
     path.unlink()
-    if content is not None:
+    if content is UNREADABLE:
+        path.mkdir()
+    elif content is not None:
         path.write_bytes(content)
     with pytest.raises(DamagedLibraryError, match=rf"{file} of the .* damaged.*--force-reinstall"):
         prebuilt.prebuilt(NAME, SOURCES)
@@ -63,3 +74,13 @@ def test_exports_use_the_libraries_of_the_package_unless_cc_is_set(tmp_path, mon
     assert libraries(["host"]) == {here: here.name.encode()}
     monkeypatch.setenv("CC", "cc")
     assert libraries(["host"]) == {here: b"compiled"}
+
+
+def test_live_pages_use_the_module_of_the_package_even_if_cc_is_set(tmp_path, monkeypatch):
+    made = {"wasm32-wasi/prbm_live.wasm": b"module"}
+    for name, content in prebuilt.package_files(made, "a compiler", compiler.kernel()).items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes(content)
+    monkeypatch.setattr(prebuilt, "files", lambda _: tmp_path)
+    monkeypatch.setenv("CC", "cc")
+    assert compiler.browser_module(lambda step: pytest.fail(step)) == b"module"

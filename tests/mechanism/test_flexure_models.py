@@ -20,6 +20,7 @@ from prbm.mechanics.modal import modal_restitution, modes
 from prbm.mechanics.statics import equilibrium
 from prbm.mechanism.flexure import BEAM, MODELS, segments
 from prbm.references.beams import end_force, end_moment, wavenumber
+from prbm.references.finite_elements import FiniteElements
 from support import ROOT, mechanism
 
 PAGE = (ROOT / "docs" / "flexure-models.md").read_text(encoding="utf-8")
@@ -69,7 +70,9 @@ def test_a_beam_with_a_heavy_tip_has_the_frequencies_of_a_massless_beam():
 
 # --- cantilevers --------------------------------------------------------------------------------
 
-FORCE_ERRORS = {"1R": 3.8, "2R": 1.0, "3R": 2.3, "10R": 0.51, "40R": 0.033}  # % of the displacement
+FORCE_ERRORS = {  # % of the displacement
+    "1R": 3.8, "2R": 1.0, "3R": 2.3, "beam": 0.003, "10R": 0.51, "40R": 0.033,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("model", FORCE_ERRORS)
@@ -85,7 +88,7 @@ def test_tip_displacements_under_an_end_force_are_those_of_the_elastica(model):
 
 
 SLOPES = {name: model.end_slope for name, model in MODELS.items() if model.coefficients}
-SLOPES |= {"10R": 1.0, "40R": 1.0}
+SLOPES |= {"beam": 1.0, "10R": 1.0, "40R": 1.0}
 
 
 @pytest.mark.parametrize("model", SLOPES)
@@ -116,7 +119,8 @@ def test_a_chain_converges_to_the_elastica_at_second_order():
 
 
 FREQUENCY_ERRORS = {  # Largest errors of f1 and f2 [%] with tip masses (no inertia).
-    "1R": (5.9, None), "2R": (1.3, 14.0), "3R": (3.1, 2.1), "10R": (0.5, 1.6), "40R": (0.03, 0.11),
+    "1R": (5.9, None), "2R": (1.3, 14.0), "3R": (3.1, 2.1), "beam": (0.003, 0.6),
+    "10R": (0.5, 1.6), "40R": (0.03, 0.11),
 }  # fmt: skip
 
 
@@ -275,12 +279,25 @@ def test_the_finite_element_figures_of_the_page_are_reproduced():
     np.testing.assert_allclose(models.richardson(chains)[:6], exact, rtol=1e-4)
 
 
+@pytest.mark.parametrize("elements", [2, 4, 8])
+def test_finite_elements_of_the_figure_are_reproduced(elements):
+    """The figure has their number of coordinates without constraints."""
+    pytest.importorskip("exudyn", reason="finite elements need exudyn: pip install exudyn")
+    models = script()
+    fe = FiniteElements(mechanism("PRBDM2R"), elements=elements)
+    shape = fe.equilibrium()
+    frequency = fe.modes(shape).frequency
+    assert models.element_coordinates(elements) == len(frequency)
+    found = [1e3 * fe.displacement(shape.q), *frequency[:5]]
+    np.testing.assert_allclose(found, models.FE_CONVERGENCE[elements], rtol=1e-5)
+
+
 # --- axial compliance ---------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("model", "axial", "error"), [
-    ("2R", True, 0.003), ("40R", True, 0.0005), ("1R", True, 0.0135), ("3R", True, 0.006),
-    ("2R", False, 0.0485),
+    ("2R", True, 0.003), ("beam", True, 0.003), ("40R", True, 0.0005), ("1R", True, 0.0135),
+    ("3R", True, 0.006), ("2R", False, 0.0485),
 ])  # fmt: skip
 def test_modal_restitution_is_that_of_finite_elements(model, axial, error):
     """The limit at nine hit points is the error of the model, without tuning."""
@@ -339,7 +356,12 @@ def unit_of_last_digit(number):
     return 10.0 ** -len(number.partition(".")[2])
 
 
-@pytest.mark.parametrize("name", ["end force", "end moment", "frequencies", "guide", "restitution"])
+TABLES = (
+    "beams", "end force", "end moment", "frequencies", "guide", "restitution", "heavy flexures",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", TABLES)
 def test_the_tables_of_the_page_are_reproduced(name):
     """Numbers agree to one unit of their last digit."""
     models = script()
@@ -354,12 +376,13 @@ def test_the_tables_of_the_page_are_reproduced(name):
             assert abs(float(new) - expected) <= 1.01 * unit_of_last_digit(old)
 
 
-def test_the_page_has_all_tables_and_the_figure():
+def test_the_page_has_all_tables_and_figures():
     models = script()
-    assert set(models.TABLES) == {"end force", "end moment", "frequencies", "guide", "restitution"}
+    assert set(models.TABLES) == set(TABLES)
     assert PAGE.count("<!-- table:") == len(models.TABLES)
-    assert models.FIGURE.is_file()
-    assert models.FIGURE.name in PAGE
+    for figure in (models.FIGURE, models.COORDINATES):
+        assert figure.is_file()
+        assert figure.name in PAGE
 
 
 def test_the_block_of_the_page_runs(capsys):
@@ -368,9 +391,12 @@ def test_the_block_of_the_page_runs(capsys):
     assert re.fullmatch(r"f1 = \d\.\d{3} Hz\n", capsys.readouterr().out)
 
 
-def test_the_figure_is_drawn(tmp_path, monkeypatch):
+def test_the_figures_are_drawn(tmp_path, monkeypatch):
     models = script()
     monkeypatch.setattr(models, "FIGURE", tmp_path / "figures" / "models.png")
     monkeypatch.setattr(models, "CHAINS", (5, 10, 20))
+    monkeypatch.setattr(models, "COORDINATES", tmp_path / "figures" / "coordinates.png")
     models.figure()
+    models.coordinates_figure()
     assert models.FIGURE.stat().st_size > 20_000
+    assert models.COORDINATES.stat().st_size > 10_000

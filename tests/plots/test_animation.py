@@ -49,7 +49,7 @@ def short(mechanisms: dict[str, Mechanism]) -> Result:
 
 def places(artist: object, scene: Scene) -> np.ndarray:
     """Return the points of an artist of a scene as complex numbers [m]."""
-    xy = artist.get_xydata() if hasattr(artist, "get_xydata") else artist.get_xy()[:4]
+    xy = artist.get_xydata() if hasattr(artist, "get_xydata") else artist.get_path().vertices[:4]
     return np.asarray(xy) @ np.array([1, 1j]) / scene.factor
 
 
@@ -215,6 +215,13 @@ def test_a_clamped_flexure_is_drawn_as_the_elastic_line() -> None:
 def test_only_flexures_of_few_links_have_a_smooth_curve(result: Result) -> None:
     assert all(len(line.c) - 2 <= CURVED_PIVOTS_MAX for line in motion(result).system.outlines)
     assert scene_of(result).curves.keys() == {"left_flexure", "right_flexure"}
+
+
+def test_a_beam_is_drawn_as_its_own_curve(mechanisms: dict[str, Mechanism]) -> None:
+    scene = scene_of(simulate(mechanisms["GuideBeam"], stop_time=0.02))
+    scene.frame(1)
+    for name, line in scene.links.items():
+        np.testing.assert_array_equal(places(scene.curves[name], scene), places(line, scene))
 
 
 def test_axes_are_to_scale_and_contain_the_whole_motion(result: Result) -> None:

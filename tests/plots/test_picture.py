@@ -165,6 +165,16 @@ def test_the_picture_contains_all_parts_and_their_names(name: str) -> None:
         assert low < z.imag.min() < z.imag.max() < high
 
 
+@pytest.mark.parametrize(("name", "count"), [("PRBDM2R", 4), ("GuideBeam", 0)])
+def test_pivots_are_drawn_on_links_but_not_on_beams(name: str, count: int) -> None:
+    """A 2R flexure between two clamps has four pivots."""
+    axes = picture(mechanism(name), shown=1).axes[0]
+    circles = [line for line in axes.get_lines() if line.get_markerfacecolor() == "white"]
+    assert [len(line.get_xdata()) for line in circles if len(line.get_xdata())] == [count] * (
+        2 if count else 0
+    )
+
+
 def labels(chosen: Mechanism, **options: object) -> list[str]:
     """Return the texts in the main panel of a picture, and its caption."""
     axes = picture(chosen, **options).axes[0]  # type: ignore[arg-type]
@@ -307,7 +317,8 @@ def test_mechanisms_are_found_by_path_and_by_name() -> None:
     [
         (
             ["Bistabel"],
-            "unknown mechanism 'Bistabel' (mechanism files end in .toml); did you mean Bistable?",
+            "unknown mechanism 'Bistabel' (mechanism files end in .toml); did you mean Bistable "
+            "or CurvedBistable?",
         ),
         (["none.toml"], "none.toml: cannot be read"),
         (["PRBDM", "--set", "shuttle.mas=1"], "did you mean shuttle.mass"),

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from fmpy import simulate_fmu
 
-from prbm.kernel.compiler import PLATFORMS, PRODUCTS
+from prbm.kernel.compiler import BROWSER, LIVE, PLATFORMS, PRODUCTS
 
 ROOT = Path(__file__).parents[2]
 
@@ -68,7 +68,8 @@ def test_the_wheel_lists_the_hash_of_each_library_and_is_small(wheel):
     with zipfile.ZipFile(wheel) as archive:
         listed = json.loads(archive.read("prbm/kernel/libraries/libraries.json"))
         assert listed["libraries"].keys() == {
-            f"{p.name}/{product.name}{p.suffix}" for p in PLATFORMS.values() for product in PRODUCTS
+            *(f"{p.name}/{q.name}{p.suffix}" for p in PLATFORMS.values() for q in PRODUCTS),
+            f"{BROWSER.name}/{LIVE.name}{BROWSER.suffix}",
         }
         for name, digest in listed["libraries"].items():
             content = archive.read(f"prbm/kernel/libraries/{name}")

@@ -133,7 +133,9 @@ def test_responses_maps_and_spectra_are_equal_in_both_engines():
     np.testing.assert_allclose(kernel.turning, python.turning, atol=1e-4)
 
 
-@pytest.mark.parametrize("command", ["simulate", "impact-map", "fit", "measure", "animate"])
+@pytest.mark.parametrize(
+    "command", ["simulate", "impact-map", "fit", "measure", "animate", "study"]
+)
 def test_the_engine_is_an_option_of_each_command_that_simulates(command, capsys):
     words = ["restitution"] if command == "measure" else []
     assert main([command, *words, "--help"]) == 0
@@ -141,11 +143,14 @@ def test_the_engine_is_an_option_of_each_command_that_simulates(command, capsys)
 
 
 @pytest.mark.parametrize("name", ENGINES)
-def test_the_command_runs_the_chosen_engine(monkeypatch, name):
+def test_the_command_runs_the_chosen_engine(monkeypatch, capsys, name):
     classes = {"kernel": "Simulation", "python": "KernelSimulation"}
     monkeypatch.setattr(engine, classes[name], None)  # The other engine cannot be called.
     options = ["--stop-time", "0.06", "--engine", name]
     assert main(["simulate", "PRBDM", "--spectrum", "--spectrum-time", "0.01", *options]) == 0
+    grid = ["--vary", "stop.offset=0:1 mm:2", "--of", "impacts", "--step", "0.03"]
+    assert main(["study", "PRBDM", *grid, "--workers", "1", *options]) == 0
+    assert "2 simulations, 0 failed" in capsys.readouterr().out
 
 
 def test_an_unknown_engine_on_the_command_line_is_one_sentence(capsys):

@@ -325,6 +325,34 @@ def test_slopes_are_derivatives(signal):
         assert Slope(signal).value(t, t) == signal.slope(t, t)
 
 
+def test_a_function_is_not_evaluated_outside_of_the_simulated_time(guide):
+    times = []
+
+    def displacement(t):
+        times.append(t)
+        return 1e-3 * math.sin(50.0 * t) ** 2
+
+    result = simulate(guide, inputs={"stop.displacement": displacement}, stop_time=0.02)
+    assert (min(times), max(times)) == (0.0, 0.02)
+    rate = 0.05 * np.sin(100.0 * result["time"])
+    np.testing.assert_allclose(result["stop.velocity"], rate, atol=1e-10)
+
+
+BY_HAND = [
+    (lambda: Steps((0.1,), (0.0,)), "1 breaks and 1 levels do not match"),
+    (lambda: Steps((0.2, 0.1), (0.0, 1.0, 0.0)), "the breaks must increase, but 0.1 s follows"),
+    (lambda: Steps((), (math.nan,)), "must be finite"),
+    (lambda: Wave(1.0, 5.0, 5.0, 0.1, 0.1), "the end, t = 0.1 s, is not after the start"),
+    (lambda: Wave(1.0, math.inf, 5.0, 0.0, 0.1), "the frequencies inf Hz and 5 Hz must be finite"),
+]
+
+
+@pytest.mark.parametrize(("signal", "sentence"), BY_HAND)
+def test_mistakes_in_signals_built_by_hand_are_reported(signal, sentence):
+    with pytest.raises(ParameterError, match=sentence):
+        signal()
+
+
 def test_a_column_of_a_file_is_converted_to_si(guide, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("shock.csv").write_text("t [ms],a [g],F [mN]\n0,0,1\n2,100,3\n4,0,5\n")
@@ -347,6 +375,12 @@ MISTAKES = [
     ({"force.x": "half-sine(1 N)"}, r"duration is missing; write half-sine\(height, duration"),
     ({"force.x": "half-sine(1 N, 0 s)"}, "duration = 0 s must be positive"),
     ({"force.x": "half-sine(1 N, -1 ms)"}, r"duration = -0\.001 s must be positive"),
+    ({"force.x": "half-sine(1 N, 1e-320 s)"}, "duration = .* s must be at least 1e-15 s"),
+    ({"force.x": "pulse(1 N, 2 fs, 99 s)"}, "the breaks must increase, but 99 s follows 99 s"),
+    (
+        {"force.x": "sine(1 N, 5 Hz, 99 s, 2 fs)"},
+        "the end, t = 99 s, is not after the start",
+    ),
     ({"force.x": "sine(nan, 5 Hz)"}, "amplitude = nan: write a finite number"),
     ({"force.x": "sine(1 N, 0 Hz)"}, "frequency = 0 Hz must be positive"),
     ({"force.x": "sine(1 N, 5 Hz, 0 s, 1 s, 0, 7)"}, "6 arguments are given; at most 5"),
@@ -358,15 +392,26 @@ MISTAKES = [
     ({"force.x": True}, "must be a text such as"),
     ({"force.x": [1.0, 2.0, 3.0]}, "must be a text such as"),
     ({"force.x": math.inf}, r"force\.x = inf must be finite"),
-    ({"force.x": ([0.0, 1.0], [0.0, math.nan])}, "row 1 has the time 1 s and the value nan"),
-    ({"force.x": ([1.0, 0.0], [0.0, 1.0])}, "the times must increase"),
+    ({"force.x": ([0.0, 1.0], [0.0, math.nan])}, "row 1: the time 1 s and the value nan must"),
+    ({"force.x": ([1.0, 0.0], [0.0, 1.0])}, "row 1: the times must increase"),
     ({"force.x": ([0.0], [0.0])}, "1 times and 1 values must be equally many, at least two"),
-    ({"force.x": lambda t: math.nan}, r"force\.x = nan"),
+    ({"force.x": lambda t: math.nan}, r"force\.x\(0 s\) = nan N must be a finite number"),
+    (
+        {"force.x": lambda t: None if t > 0.0 else 1.0},
+        r"force\.x\(.* s\) = None must be a number in N",
+    ),
+    ({"force.x": lambda t: [t, t]}, r"force\.x\(0 s\) = \[0\.0, 0\.0\] must be a number in N"),
+    (
+        {"stop.displacement": lambda t: None},
+        r"stop\.displacement\(0 s\) = None must be a number in m",
+    ),
     ({"force.x": "csv(none.csv, a)"}, r"none\.csv cannot be read"),
     ({"force.x": "csv(a.csv, c)"}, "the file has no column 'c'; known names are a, b"),
     ({"force.x": "csv(a.csv)"}, "the file has 3 columns; name one of a, b"),
     ({"force.x": "csv(a.csv, b)"}, r"column 'b \[mm\]', 1 mm: the unit 'mm' has another dimen"),
     ({"force.x": "csv(gap.csv)"}, "line 3 has no number for t or F"),
+    ({"force.x": "csv(blank.csv, F)"}, "line 5 has no number for t or F"),
+    ({"force.x": "csv(blank.csv, b)"}, "line 5: the times must increase"),
     ({"force.x": "csv(bare.csv)"}, r"bare\.csv must have a head"),
 ]
 
@@ -376,6 +421,7 @@ def test_mistakes_in_signals_are_reported(guide, inputs, sentence, tmp_path, mon
     monkeypatch.chdir(tmp_path)
     Path("a.csv").write_text("t [s],a [N],b [mm]\n0,0,1\n2,100,3\n")
     Path("gap.csv").write_text("t,F\n0,0\n1,\n")
+    Path("blank.csv").write_text("\nt,F,b\n1,1,2\n\n0,-,4\n")
     Path("bare.csv").write_text("0,0\n1,1\n2,2\n")
     with pytest.raises(PrbmError, match=sentence):
         simulate(guide, inputs=inputs, stop_time=0.01)

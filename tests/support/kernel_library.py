@@ -6,6 +6,7 @@ message is raised as :class:`KernelError`.  After each call the working memory m
 """
 
 import ctypes
+import math
 import re
 import shutil
 import subprocess
@@ -24,7 +25,7 @@ from prbm.mechanism.description import Mechanism
 
 KERNEL = Path(prbm.kernel.__file__).parent
 FLAGS = (
-    "-std=c99", "-O2", "-fPIC", "-shared", "-ffp-contract=off", "-DPRBM=", f"-I{KERNEL}",
+    "-std=c99", "-O1", "-fPIC", "-shared", "-ffp-contract=off", "-DPRBM=", f"-I{KERNEL}",
     "-Wl,-Bsymbolic",  # Calls within the library use its own functions.
 )  # fmt: skip
 WORKING_MEMORY = 1 << 16  # Doubles.
@@ -122,7 +123,9 @@ def constants() -> dict[str, int]:
         number = -1
         for entry in filter(None, (part.strip() for part in body.split(","))):
             name, _, given = (part.strip() for part in entry.partition("="))
-            number = int(given) if given else number + 1
+            factors = (factor.strip() for factor in given.split("*"))
+            known = (found[x] if x in found else int(x) for x in factors if x)
+            number = math.prod(known) if given else number + 1
             found[name] = number
     return found
 
@@ -367,11 +370,11 @@ class KernelSystem:
 
     def blocks(self) -> np.ndarray:
         """Return the starts and sizes of the blocks of the mass matrix of the directions."""
-        return array(self.structure.blocks, self.structure.block_count, 2, kind="int")
+        return array(self.structure.blocks, self.structure.block_count, 3, kind="int")[:, :2]
 
     def mass_blocks(self) -> np.ndarray:
-        """Return the starts and sizes of the blocks of the mass matrix."""
-        return array(self.structure.mass_blocks, self.structure.mass_block_count, 2, kind="int")
+        """Return start, size and the row apart of each block of the mass matrix."""
+        return array(self.structure.mass_blocks, self.structure.mass_block_count, 3, kind="int")
 
     def frame(self, group: str, i: int) -> tuple[int, int, complex, complex, np.ndarray]:
         """Return ``(j, arm, c, drawn, A)`` of the i-th point of a group, fixed to a body.

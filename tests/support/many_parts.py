@@ -37,7 +37,7 @@ def rich(model="3R"):
             Body("tip", 0.004, 2e-7, ("0.03", "1.6*L + 0.02"), {"end": (0.03, "1.5*L + 0.02")}),
         ),
         flexure_types=(
-            FlexureType("leaf", model, "L/400", 8e-3, 1.8e11, 7800.0),
+            FlexureType("leaf", model, "L/400", 8e-3, 1.8e11, 7800.0, stress=True),
             FlexureType("thin", "1R", 1e-4, 8e-3, 1.8e11, 7800.0),
         ),
         flexures=(
@@ -88,8 +88,8 @@ def elastic():
             Body("pendulum", 0.002, 1e-7, (0.021, "L - 0.012"), {"pin": (0.02, "L")}),
         ),
         flexure_types=(
-            FlexureType("leaf", "2R", "L/100", 8e-3, 3e9, 1200.0, axial=True),
-            FlexureType("chain", "nR", "L/80", 8e-3, 3e9, 1200.0, n=4, axial=True),
+            FlexureType("leaf", "2R", "L/100", 8e-3, 3e9, 1200.0, axial=True, stress=True),
+            FlexureType("chain", "nR", "L/80", 8e-3, 3e9, 1200.0, n=4, axial=True, stress=True),
             FlexureType("bar", "1R", 5e-4, 4e-3, 2e9, 1200.0, axial=True),
         ),
         flexures=(
@@ -135,8 +135,8 @@ def anvil():
             Body("hammer", 0.006, 3e-7, (0.05, "L + 0.02"), {"root": (0.045, "L + 0.02")}),
         ),
         flexure_types=(
-            FlexureType("leaf", "1R", "L/100", 8e-3, 1e9, 1200.0, axial=True),
-            FlexureType("arm", "2R", "L/100", 8e-3, 5e9, 1200.0, axial=True),
+            FlexureType("leaf", "1R", "L/100", 8e-3, 1e9, 1200.0, axial=True, stress=True),
+            FlexureType("arm", "2R", "L/100", 8e-3, 5e9, 1200.0, axial=True, stress=True),
         ),
         flexures=(
             Flexure("one", "leaf", "ground.left", "stage.left"),
@@ -207,3 +207,29 @@ def links_and_beams() -> Mechanism:
         for kind in links.flexure_types
     )
     return dataclasses.replace(links, flexure_types=kinds)
+
+
+def profiles(*, axial: bool = True) -> Mechanism:
+    """Return a mechanism of a notch, a taper, an arc, and a notch with fillets, from either end."""
+    links = elastic()
+    extra = {
+        "leaf": {
+            "order": 2, "profile": "taper", "end_thickness": "L/140", "end_width": 6e-3,
+            "rise": 1e-3,
+        },
+        "chain": {
+            "profile": "notch", "notch_radius": "L/80", "notch_depth": 1.5e-3, "waist_length": 0.02,
+        },
+        "bar": {"order": 1, "curvature": 12.0},
+    }  # fmt: skip
+    kinds = [
+        dataclasses.replace(kind, model="beam", n=0, axial=axial, stress=True, **extra[kind.name])
+        for kind in links.flexure_types
+    ]
+    hinge = FlexureType(
+        "neck", "beam", 6e-4, 8e-3, 3e9, 1200.0, stress=True, profile="notch", notch_radius=3e-3
+    )
+    flexures = [
+        dataclasses.replace(f, type="neck") if f.name == "three" else f for f in links.flexures
+    ]
+    return dataclasses.replace(links, flexure_types=(*kinds, hinge), flexures=tuple(flexures))

@@ -29,6 +29,10 @@ value = 0.5
 name = "steel"
 youngs_modulus = "181.5 GPa"
 density = "7.8 g/cm3"
+yield_strength = "1.2 GPa"
+tensile_strength = "1500 MPa"
+fatigue_strength = "450 MPa"
+fatigue_cycles = 1e7
 
 [[flexure_types]]
 name = "leaf"
@@ -36,6 +40,7 @@ model = "2R"
 thickness = "0.1 mm"
 width = "8 mm"
 material = "steel"
+stress = true
 
 [ground]
 foot = [0, 0]
@@ -130,6 +135,14 @@ displacement = "-3 mm"
 """
 
 HANGER = 'youngs_modulus = "70 GPa"\ndensity = 2700\n'
+LEFT = 'type = "leaf"\nstart = "ground.foot"\nend = "arm.root"\n'
+ANVIL = 'mass = "2e-3 kg"\ninertia = 1e-6\ncentre = [0.06, 0.0]\n'
+TRIANGLE = """\
+outline = [[0.05, 0], [0.06, 0], [0.06, 0.02]]
+thickness = 1e-3
+material = "steel"
+"""
+HOLE = "[[0.055, 0.002], [0.057, 0.002], [0.057, 0.003]]"
 RIGHT = 'thickness = "50 um"\nwidth = 8e-3\nmaterial = "steel"\n'
 CHANGES = {
     # units
@@ -239,14 +252,14 @@ CHANGES = {
     ),
     "key of another part": (
         "n = 8",
-        "stroke = 8",
+        "travel = 8",
         "allowed keys are name, model, n, order, nodes, thickness, width",
     ),
-    "missing key": ("inertia = 1e-6\n", "", "bodies.1.inertia (of anvil) is missing: add the key"),
-    "body without mass": ('mass = "2e-3 kg"\n', "", "bodies.1.mass (of anvil) is missing: add the"),
+    "missing key": ("inertia = 1e-6\n", "", "anvil.inertia is missing: add the key, or outline"),
+    "body without mass": ('mass = "2e-3 kg"\n', "", "anvil.mass is missing: add the key, or"),
     "missing release": ("[release]", "[relaese]", "unknown key relaese; did you mean release?"),
     "key defined twice": ("damping_zeta = 0.01", "name = 'x'", "(at line 6, column "),
-    "table defined twice": ("[release]", "[ground]", "line 116"),
+    "table defined twice": ("[release]", "[ground]", "line 121"),
     # names
     "name of two parts": ('name = "anvil"', 'name = "arm"', "the name 'arm' is used twice"),
     "name of two types": ('name = "hanger"', 'name = "leaf"', "the name 'leaf' is used twice"),
@@ -356,6 +369,33 @@ CHANGES = {
         "geometry.1.value (of ratio",
     ),
     # materials and sections
+    "strength without a unit": (
+        'yield_strength = "1.2 GPa"',
+        "yield_strength = 1.2e9",
+        'write the strength with its unit, for example "1500 MPa"',
+    ),
+    "strength of another quantity": ('"1500 MPa"', '"1500 mm"', "tensile_strength"),
+    "strength of zero": ('"1.2 GPa"', '"0 GPa"', "must be between 1 and 1e+12 Pa"),
+    "fatigue without cycles": (
+        "fatigue_cycles = 1e7",
+        "",
+        "give fatigue_strength and fatigue_cycles, or none of them",
+    ),
+    "fatigue without tensile strength": (
+        'tensile_strength = "1500 MPa"',
+        "",
+        "fatigue_strength needs tensile_strength: add it",
+    ),
+    "fatigue strength as large as the tensile strength": (
+        '"450 MPa"',
+        '"1.5 GPa"',
+        "fatigue_strength must be less than 0.9 of tensile_strength",
+    ),
+    "too few cycles": (
+        "fatigue_cycles = 1e7",
+        "fatigue_cycles = 100",
+        "fatigue_cycles must be between",
+    ),
     "material unknown": (
         'material = "steel"\naxial',
         'material = "stel"\naxial',
@@ -420,6 +460,205 @@ CHANGES = {
         'model = "2R"\nn = 3',
         "leaf.n = 3: the 2R model has a fixed number",
     ),
+    # bodies that are cut from a plate
+    "mass and density": (
+        "inertia = 1e-6",
+        'inertia = 1e-6\nmaterial = "steel"',
+        "anvil has mass and inertia and centre as well as material: give mass, inertia and centre,",
+    ),
+    "plate without a thickness": (
+        ANVIL,
+        TRIANGLE.replace("thickness = 1e-3\n", ""),
+        "anvil.thickness is missing: add the key, or give mass, inertia and centre",
+    ),
+    "plate without an outline": (
+        ANVIL,
+        'thickness = 1e-3\nmaterial = "steel"\n',
+        "anvil.outline is missing: add the key",
+    ),
+    "plate without a material": (
+        ANVIL,
+        TRIANGLE.replace('material = "steel"\n', ""),
+        "anvil has no material: add material with the name of one, or density",
+    ),
+    "plate of an unknown material": (
+        ANVIL,
+        TRIANGLE.replace("steel", "stele"),
+        "anvil.material = 'stele' is not defined; materials are steel",
+    ),
+    "plate with material and density": (
+        ANVIL,
+        f"{TRIANGLE}density = 1000\n",
+        "anvil has material as well as density: remove one of them",
+    ),
+    "plate without density": (
+        ANVIL,
+        TRIANGLE.replace('material = "steel"', "density = 0"),
+        "anvil.density = 0 kg/m3 must be at least 1 kg/m3",
+    ),
+    "plate of zero thickness": (
+        ANVIL,
+        TRIANGLE.replace("1e-3", "0"),
+        "anvil.thickness = 0 m must be at least 1e-09 m",
+    ),
+    "thickness of a plate as an expression": (
+        ANVIL,
+        TRIANGLE.replace("1e-3", '"arm.length"'),
+        "bodies.1.thickness (of anvil) = 'arm.length': write a number in m",
+    ),
+    "outline with two corners": (
+        ANVIL,
+        TRIANGLE.replace(", [0.06, 0.02]", ""),
+        "anvil.outline has 2 corners: write 3 to 1000 corners",
+    ),
+    "outline that crosses itself": (
+        ANVIL,
+        TRIANGLE.replace("[0.06, 0.02]", "[0.05, 0.02], [0.04, 0.02], [0.06, 0.01]"),
+        "anvil.outline crosses or touches itself: at its sides that begin at (0.06 m, 0 m) and",
+    ),
+    "outline without an area": (
+        ANVIL,
+        TRIANGLE.replace("[0.06, 0.02]", "[0.055, 0]"),
+        "anvil.outline crosses or touches itself",
+    ),
+    "corner given twice": (
+        ANVIL,
+        TRIANGLE.replace("[0.06, 0.02]", "[0.06, 0.02], [0.06, 0.02]"),
+        "anvil.outline has the corner (0.06 m, 0.02 m) twice: remove one",
+    ),
+    "outline that changes its shape": (
+        ANVIL,
+        TRIANGLE.replace("[0.06, 0.02]", '["arm.length", 0.02]'),
+        "anvil.outline changes its shape with arm.length: write its dimensions as numbers",
+    ),
+    "corner that is no point": (
+        ANVIL,
+        TRIANGLE.replace("[0.06, 0.02]", '"nose"'),
+        "anvil.outline: 'nose' is not a point of the body anvil; its points are top, hook",
+    ),
+    "hole outside the outline": (
+        ANVIL,
+        f"{TRIANGLE}holes = [[[0, 0], [1e-3, 0], [0, 1e-3]]]\n",
+        "anvil.holes: a hole at (0 m, 0 m) is not inside the outline",
+    ),
+    "hole across the outline": (
+        ANVIL,
+        f"{TRIANGLE}holes = [[[0.055, 0.002], [0.07, 0.003], [0.055, 0.003]]]\n",
+        "anvil.holes: a hole at (0.055 m, 0.002 m) is not inside the outline",
+    ),
+    "holes that overlap": (
+        ANVIL,
+        f"{TRIANGLE}holes = [{HOLE}, {HOLE.replace('0.003', '0.004')}]\n",
+        "anvil.holes: the holes at (0.055 m, 0.002 m) and (0.055 m, 0.002 m) overlap",
+    ),
+    "holes without an outline": (
+        "inertia = 1e-6",
+        f"inertia = 1e-6\nholes = [{HOLE}]",
+        "anvil.holes needs an outline: add the key outline",
+    ),
+    # copies
+    "mirror about an unknown axis": (
+        LEFT,
+        f'{LEFT}mirror = "z = 0"\n',
+        "flexures.0.mirror (of left) = 'z = 0': write the line of symmetry, \"x = 0\" or",
+    ),
+    "mirror without a line": (LEFT, f'{LEFT}mirror = "x"\n', "write the line of symmetry"),
+    "mirror at a mass": (LEFT, f'{LEFT}mirror = "x = 3 kg"\n', "'kg' has another dimension"),
+    "mirror without a unit": (
+        LEFT,
+        f'{LEFT}mirror = "x = 3"\n',
+        '3 has no unit: write a unit after each number, as in "3 m"\n',
+    ),
+    "outline that is a number": (
+        ANVIL,
+        "outline = 3\n",
+        "bodies.1.outline (of anvil) = 3: write a list of corners",
+    ),
+    "holes that are a number": (
+        ANVIL,
+        f"{TRIANGLE}holes = 3\n",
+        "bodies.1.holes (of anvil) = 3: write a list of corners, [[..., ...], [..., ...], [..., .",
+    ),
+    "mirror with a number": (LEFT, f"{LEFT}mirror = 3\n", "flexures.0.mirror (of left) = 3: write"),
+    "mirror with three lines": (
+        LEFT,
+        f'{LEFT}mirror = ["x = 0", "y = 0", "x = 1 m"]\n',
+        "remove the surplus values",
+    ),
+    "mirror with an unknown parameter": (
+        LEFT,
+        f'{LEFT}mirror = "y = arm.lenght"\n',
+        "left.mirror: ground.foot_mirrored_y refers to 'arm.lenght', which is not a parameter",
+    ),
+    "copy with the name of another part": (
+        LEFT,
+        f'{LEFT}mirror = "x = 1 mm"\n',
+        "left.mirror: the name 'right' of a copy is used twice or reserved; rename left or the",
+    ),
+    "copy with the name of another copy": (
+        LEFT,
+        f'{LEFT}mirror = ["y = 1 mm", "y = 2 mm"]\n',
+        "left.mirror: the name 'left_mirrored_y' of a copy is used twice",
+    ),
+    "copy with a name too long": (
+        'name = "left"',
+        f'name = "{"a" * 99}"\nrepeat = {{ count = 2, step = [0, "1 mm"] }}',
+        "_2' of a copy is too long",
+    ),
+    "flexure on its line of symmetry": (
+        LEFT,
+        f'{LEFT}mirror = "y = 0"\n',
+        "left.mirror: a copy of left joins the same points; remove mirror",
+    ),
+    "body on its line of symmetry": (
+        "inertia = 1e-6",
+        'inertia = 1e-6\nmirror = "y = 0"',
+        "anvil.mirror: a copy of the body anvil is at the same place; remove mirror",
+    ),
+    "image of a point drawn elsewhere": (
+        'points.hook = ["arm.length", 0]\n',
+        'points.hook = ["arm.length", 0]\npoints.bottom = ["arm.length", 0]\n\n'
+        '[[flexures]]\nname = "upper"\ntype = "leaf"\nstart = "ground.far"\nend = "anvil.top"\n'
+        'mirror = "y = 0"\n',
+        "upper.mirror: the image of anvil.top is anvil.bottom = [arm.length + 0.02, -0.02 m], but "
+        "that point is drawn at [arm.length, 0 m]; move or rename it",
+    ),
+    "copy far away": (
+        LEFT,
+        f'{LEFT}mirror = "y = 900 m"\n',
+        "left.mirror: ground.foot_mirrored_y is drawn at (0 m, 1800 m): draw",
+    ),
+    "repeat of zero parts": (
+        LEFT,
+        f"{LEFT}repeat = {{ count = 0, step = [0, 1] }}\n",
+        "flexures.0.repeat.count (of left) = 0: write a number of at least 1",
+    ),
+    "repeat of too many parts": (
+        LEFT,
+        f"{LEFT}repeat = {{ count = 1001, step = [0, 1] }}\n",
+        "flexures.0.repeat.count (of left) = 1001: write a number of at most 1000",
+    ),
+    "repeat without a step": (
+        LEFT,
+        f"{LEFT}repeat = {{ count = 2 }}\n",
+        "left.repeat has neither step nor angle: give one of them",
+    ),
+    "repeat with a step and an angle": (
+        LEFT,
+        f"{LEFT}repeat = {{ count = 2, step = [0, 1], angle = 3 }}\n",
+        "left.repeat has step as well as angle: give one of them",
+    ),
+    "repeat at the same place": (
+        LEFT,
+        f"{LEFT}repeat = {{ count = 2, step = [0, 0] }}\n",
+        "left.repeat: a copy of left joins the same points; remove repeat",
+    ),
+    "repeat with an unknown key": (
+        LEFT,
+        f"{LEFT}repeat = {{ number = 2 }}\n",
+        "unknown key flexures.0.repeat.number (of left); allowed keys are count, step, angle, abo",
+    ),
+    "repeat that is a number": (LEFT, f"{LEFT}repeat = 3\n", "flexures.0.repeat (of left) = 3: wr"),
     # geometry of the drawing
     "ends wrong": (
         'ends = "clamp"',

@@ -44,7 +44,15 @@ Choose = Callable[[Sequence], object]
 """Function that picks an element of a sequence; the first element is the simplest."""
 
 CELL = 0.06  # m; bodies are within a fifth of this length of the points of a lattice.
-MODELS = tuple((name, n) for name in flexure.MODELS for n in ((1, 2, 4) if name == "nR" else (0,)))
+BEAMS = (
+    {},
+    {"profile": "taper", "end_thickness": 4e-4},
+    {"profile": "notch", "notch_radius": 5e-4, "waist_length": 2e-3},
+    {"curvature": 5.0},
+    {"rise": -1e-3},
+)
+OPTIONS = {"nR": ({"n": 1}, {"n": 2}, {"n": 4}), "beam": BEAMS}
+MODELS = tuple((name, given) for name in flexure.MODELS for given in OPTIONS.get(name, ({},)))
 ENDS = ((CLAMP, CLAMP), (CLAMP, PIN), (PIN, CLAMP), (CLAMP, FREE), (FREE, CLAMP), (PIN, PIN))
 RUBBER = {"thickness": (2e-3, 3e-3), "modulus": (5e6, 4e7)}  # Axial modes of some hundred Hz.
 STEEL = {"thickness": (2e-4, 3e-4), "modulus": (1e9, 1e10)}
@@ -70,14 +78,14 @@ class _Builder:
         return self.real(0.2, 1.0) * radius * complex(np.exp(1j * self.real(0, 2 * math.pi)))
 
     def add_type(self) -> None:
-        model, n = self.choose(MODELS)
+        model, given = self.choose(MODELS)
         axial = self.choose((False, True)) and model != "1R"  # A 1R cantilever cannot stretch.
         section = RUBBER if axial or self.choose((False, True)) else STEEL
         self.types.append(
             FlexureType(
                 f"type{len(self.types)}", model, self.real(*section["thickness"]),
                 self.real(5e-3, 2e-2), self.real(*section["modulus"]), self.real(1e3, 8e3),
-                n=n, axial=axial,
+                axial=axial, stress=not self.types, **given,
             )
         )  # fmt: skip
 

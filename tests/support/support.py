@@ -38,7 +38,7 @@ GUIDES = ("PRBDM", "PRBDM2R")
 
 IMPACT_END_TIMES = {
     "Bistable": 0.09, "Cantilever": 0.24, "FoldedSuspension": 0.135, "ImpactOscillator": 0.12,
-    "PRBDM2RAxial": 0.045, "PRBDM3R": 0.048,
+    "PRBDM2RAxial": 0.045, "PRBDM3R": 0.048, "CurvedBistable": 0.01, "NotchGuide": 0.02,
 }  # fmt: skip
 """Times [s] before which the default experiment has an impact; 0.3 s for other mechanisms."""
 
@@ -48,7 +48,7 @@ QUICK_MODELS = (*GUIDES, "ImpactOscillator")
 Checks of the other mechanisms are marked as slow.
 """
 
-COSTLY_MODELS = ("FoldedSuspension", "PRBDM2RAxial", "PRBDM3R")
+COSTLY_MODELS = ("CurvedBistable", "FoldedSuspension", "NotchGuide", "PRBDM2RAxial", "PRBDM3R")
 """Mechanisms whose default experiment of 1 s takes the engine 5 to 20 s."""
 
 SHIPPED = [

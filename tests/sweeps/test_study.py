@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from prbm.base.errors import ParameterError
+from prbm.files.settings import UserMistake
 from prbm.plots.study import curves, maps
 from prbm.runs.run import simulate
 from prbm.sweeps import study as module
@@ -191,7 +192,19 @@ MISTAKES = [
     ({"minimise": "settling"}, "no simulation has a value of settling; simulate longer"),
     ({"workers": 0}, "workers = 0 must be 1 or more"),
     ({"workers": 2, "inputs": {"force.x": math.sin}}, "a function cannot be sent to other proc"),
+]
+EVERYWHERE = [  # Mistakes at which every simulation would fail.
     ({"stop_time": "1 m"}, "another dimension"),
+    ({"stop_time": -1.0}, r"stop_time = -1 s must be positive and finite"),
+    ({"stop_time": math.nan}, "stop_time = nan s must be positive and finite"),
+    ({"step": 0.0}, "step = 0 s must be positive and finite"),
+    ({"step": 1e-12}, "choose a larger step"),
+    ({"tolerance": 2.0}, "tolerance = 2 must lie between"),
+    ({"tolerance": "tight"}, "write a number"),
+    ({"values": {"stop.positon": 0.0}}, r"unknown variable 'stop\.positon'; did you mean"),
+    ({"values": {"stop.restitution": 2.0}}, r"stop\.restitution = 2 must be at most 1"),
+    ({"values": {"stop.restitution": "1 mm"}}, "another dimension"),
+    ({"engine": "kernle"}, "engine = 'kernle' must be one of kernel, python"),
 ]
 
 
@@ -203,6 +216,16 @@ def test_mistakes_in_studies_are_reported(mechanisms, arguments, sentence):
     }  # fmt: skip
     with pytest.raises((ParameterError, ValueError), match=sentence):
         study(mechanisms["PRBDM"], **(given | arguments))
+
+
+@pytest.mark.parametrize(("arguments", "sentence"), EVERYWHERE)
+def test_mistakes_in_all_simulations_are_reported_before_the_first_one(
+    mechanisms, arguments, sentence, monkeypatch
+):
+    monkeypatch.setattr(module, "simulate", None)
+    given = {"stop_time": 0.01, "step": 1e-3, "workers": 1} | arguments
+    with pytest.raises((ParameterError, UserMistake), match=sentence):
+        study(mechanisms["PRBDM"], {"stop.position": [0.0, 1e-3]}, ["impacts"], **given)
 
 
 def test_quantities_that_a_mechanism_does_not_have_are_rejected(mechanisms):

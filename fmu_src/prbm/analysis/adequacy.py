@@ -5,8 +5,8 @@ mechanism with modes of the flexures only, at far too high frequencies.  Few piv
 the loads that their coefficients were fitted to, and less so for others.  :func:`check` computes
 the lowest frequencies and the modal restitution of a mechanism in given shapes, and again
 
-* with stretching flexures and the same pivots, and
-* with stretching chains of many links, the finer model.
+* with stretching flexures of the same model, and
+* with stretching beams of a high order, the finer model.
 
 It returns a :class:`Finding` for a difference above a limit, with the simplest model that removes
 it.  All models follow Newton's law of a rigid impact; the effect of stretching is smaller, or
@@ -36,10 +36,10 @@ ZERO_FREQUENCY_RTOL = 1e-3  # Of the largest compared frequency: a lower one is 
 STRETCH_RESTITUTION_ATOL = 0.02  # Largest unreported effect of stretching on the restitution.
 PIVOTS_RESTITUTION_ATOL = 0.05  # Largest unreported effect of few pivots on the restitution.
 LEVER_MIN = 0.01  # Least lever of an impact that a finding names, as a share of the size.
-LINKS = 24  # Links of a flexure of the finer model.
-LINKS_MIN = 12  # The finer model needs at least as many.
-CANDIDATES = (("2R", 0), ("3R", 0), ("nR", 12))  # Models to propose, in rising order of cost.
-COORDINATES_MAX = 240  # Coordinates of the flexures of the finer model.
+FINE_ORDER = 7  # Order of the beams of the finer model.
+FINE_LINKS = 24  # Chains of as many links are not compared with the finer model.
+ORDERS = (3, 5)  # Orders of beams to propose, if they agree with the finer model.
+FLEXURES_MAX = 24  # Flexures of a mechanism that is compared with the finer model.
 
 
 # --- shapes and quantities ------------------------------------------------------------------------
@@ -90,7 +90,7 @@ class Cause(Enum):
     """Simplifications that cause a difference."""
 
     INEXTENSIBLE = "inextensible flexures"
-    PIVOTS = "few pivots"
+    PIVOTS = "few pivots, or a low order"
 
 
 @dataclass(frozen=True)
@@ -300,14 +300,11 @@ class _Models:
         return None
 
     def _choice(self) -> str:
-        """Return the keys of the simplest model that agrees with the finer one in all shapes."""
+        """Return the keys of the beams of least order that agree with the finer model."""
         assert self.fine is not None
         fine, mechanism = self.fine, self.own.mechanism
-        for name, links in CANDIDATES:
-            try:
-                model = _with_model(mechanism, name, links, self.own.given)
-            except PrbmError:  # For instance a flexure of one link with a free end.
-                continue
+        for order in ORDERS:
+            model = _with_beams(mechanism, order, self.own.given)
             if all(_agree(model.values(shape), fine.values(shape)) for shape in self.shapes):
                 return model.choice
         return fine.choice
@@ -353,24 +350,22 @@ def _stretched(mechanism: Mechanism, values: Mapping[str, float]) -> _Model | No
 
 
 def _finer(mechanism: Mechanism, values: Mapping[str, float]) -> _Model | None:
-    """Return the mechanism with stretching chains; None if it consists of such chains."""
-    if all(kind.n >= LINKS for kind in mechanism.flexure_types):
+    """Return the mechanism with stretching beams; None if its flexures are as accurate."""
+    kinds = mechanism.flexure_types
+    if all(kind.n >= FINE_LINKS or (kind.order or 0) >= FINE_ORDER for kind in kinds):
         return None
-    links = min(LINKS, COORDINATES_MAX // (2 * len(mechanism.flexures)))
-    if links < LINKS_MIN:
+    if len(mechanism.flexures) > FLEXURES_MAX:
         raise ParameterError(
-            f"{len(mechanism.flexures)} flexures of {LINKS_MIN} links have more than "
-            f"{COORDINATES_MAX} coordinates; compare with finite elements, prbm validate"
+            f"the mechanism has {len(mechanism.flexures)} flexures, and the comparison is made for "
+            f"at most {FLEXURES_MAX}; compare with finite elements, prbm validate"
         )
-    return _with_model(mechanism, "nR", max(links, *(k.n for k in mechanism.flexure_types)), values)
+    return _with_beams(mechanism, FINE_ORDER, values)
 
 
-def _with_model(
-    mechanism: Mechanism, model: str, links: int, values: Mapping[str, float]
-) -> _Model:
-    """Return the mechanism with another, stretching model of its flexures."""
-    text = f'model = "{model}", ' + (f"n = {links}, " if links else "") + "axial = true"
-    return _Model(text, with_flexures(mechanism, model, axial=True, n=links), values)
+def _with_beams(mechanism: Mechanism, order: int, values: Mapping[str, float]) -> _Model:
+    """Return the mechanism with stretching beams of an order."""
+    text = f'model = "beam", order = {order}, axial = true'
+    return _Model(text, with_flexures(mechanism, "beam", axial=True, order=order), values)
 
 
 # --- shapes in words ------------------------------------------------------------------------------

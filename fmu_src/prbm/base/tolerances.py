@@ -150,4 +150,10 @@ DEPENDENT_PIVOT_RTOL = 1e-7  # Of the largest pivot: smaller pivots make the sta
 
 # --- beams ---
 
+NOTCH_PEAK_FACTOR = 0.7  # Of the distance of the poles: width of the peak where nodes are dense.
+FINE_POINTS = 8  # Gauss points between two nodes, for the integrals of the flexibility.
 GAUSS_ITERATIONS_MAX = 8  # The nodes of Gauss' quadrature need four iterations of Newton's method.
+
+# --- stress ---
+
+STRESS_TIE_RTOL = 1e-9  # Stresses of two sections that differ less are equal apart from round-off.

@@ -4,11 +4,15 @@ This module imports no slow packages, so that help appears at once.
 """
 
 import re
-from argparse import ArgumentParser
+import textwrap
+from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
+WIDTH = 79  # Columns of a description.
+MECHANISM = "name of a shipped mechanism (see prbm list), or mechanism file FILE.toml"
+QUANTITIES = 'quantities are in SI or have a unit: 0.01, 10mm, "-10 mm"; in lists also -10 0 10 mm'
 ANIMATION_USAGE = "[options] (RESULT.csv | MECHANISM | --model NAME | --mechanism FILE) OUT.gif"
 
 INVALID_CHOICE = re.compile(r"invalid choice: '(?P<word>.*?)' \(choose from (?P<choices>.*)\)")
@@ -52,6 +56,66 @@ def _proposal(word: str, known: Iterable[str]) -> str:
     names = {name.lstrip("-"): name for name in known}
     near = get_close_matches(word.lstrip("-"), names, n=1, cutoff=SIMILARITY_MIN)
     return f"; did you mean {names[near[0]]}?" if near else ""
+
+
+class ArgumentMistake(Exception):
+    """Invalid command line."""
+
+
+class Parser(ProposingParser):
+    """A parser that reports a mistake in one sentence."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise ArgumentMistake with the message."""
+        raise ArgumentMistake(f"{self.prog}: {self.proposed(message)}; see {self.prog} --help")
+
+
+Commands = Any  # argparse does not name the type of add_subparsers()
+
+
+def add_command(
+    commands: Commands,
+    name: str,
+    run: str,
+    summary: str,
+    example: str,
+    *,
+    details: str = "",
+    **more: Any,
+) -> ArgumentParser:
+    """Add a command.
+
+    Parameters
+    ----------
+    commands : subparsers of argparse
+        The commands so far.
+    name : str
+        Name of the command.
+    run : str
+        Its function as module:function, imported when the command runs.
+    summary, details : str
+        Phrase for the list of commands; further sentences for the help of this command.
+    example : str
+        Examples of command lines.
+    more : dict
+        Further arguments of the parser.
+    """
+    parser: ArgumentParser = commands.add_parser(
+        name,
+        help=summary,
+        description=textwrap.fill(f"{summary[0].upper()}{summary[1:]}.  {details}", WIDTH),
+        epilog=f"{example}\n\n{QUANTITIES}",
+        formatter_class=RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+        **more,
+    )
+    parser.set_defaults(run=run, prog=parser.prog)
+    return parser
+
+
+def examples(*lines: str) -> str:
+    """Return the text of examples in the help of a command."""
+    return "\n  ".join(["example:" if len(lines) == 1 else "examples:", *lines])
 
 
 def picture_arguments(parser: ArgumentParser) -> None:
@@ -187,3 +251,93 @@ def set_argument(parser: ArgumentParser, meaning: str = "value of a parameter") 
         "--set", action="append", default=[], metavar="NAME=VALUE",
         help=f'{meaning}, in SI or with a unit: "release.displacement=-10 mm"; repeatable',
     )  # fmt: skip
+
+
+def stress_arguments(parser: ArgumentParser) -> None:
+    """Add the arguments of ``prbm stress``."""
+    parser.add_argument(
+        "--held", nargs="+", metavar="X",
+        help="displacements [m] or angles [rad] at which the body is held (default: in motion)",
+    )  # fmt: skip
+    stop_time_argument(parser)
+    set_argument(parser, "value of a parameter or input")
+    input_argument(parser)
+    engine_argument(parser)
+
+
+def shock_arguments(parser: ArgumentParser) -> None:
+    """Add the arguments of ``prbm shock``."""
+    add = parser.add_argument
+    add(
+        "--pulse", default="half-sine", choices=("half-sine", "sawtooth", "trapezoid"),
+        help="shape of the pulse (default: %(default)s); the sawtooth ends at its peak",
+    )  # fmt: skip
+    add("--peak", metavar="A", help='largest acceleration of the base [m/s2], "500 g"')
+    add("--height", metavar="H", help="drop height onto a pad without rebound [m]")
+    add("--duration", metavar="T", help="duration of the pulse [s]")
+    add("--axis", default="x", choices=("x", "y"), help="direction (default: %(default)s)")
+    add(
+        "--peaks", nargs="+", metavar="A",
+        help="several peaks, for the level at which a flexure yields",
+    )  # fmt: skip
+    add("--record", metavar="FILE.csv", help="acceleration over time, in place of a pulse")
+    stop_time_argument(parser)
+    set_argument(parser, "value of a parameter or input")
+    engine_argument(parser)
+
+
+def mechanism_argument(parser: ArgumentParser) -> None:
+    """Add the mechanism."""
+    parser.add_argument("mechanism", metavar="MECHANISM", help=MECHANISM)
+
+
+def out_argument(parser: ArgumentParser) -> None:
+    """Add the folder of tables and figures."""
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR",
+        help="folder for tables and figures (default: none are written)",
+    )  # fmt: skip
+
+
+def record_arguments(parser: ArgumentParser) -> None:
+    """Add the options for files whose head lacks names or units."""
+    group = parser.add_argument_group("names and units of columns")
+    group.add_argument(
+        "--unit", action="append", default=[], metavar="NAME=UNIT",
+        help="unit of a column without a unit, or with a wrong one; repeatable",
+    )  # fmt: skip
+    group.add_argument(
+        "--columns", nargs="+", metavar="HEAD",
+        help='names and units of all columns of a file without a head: --columns "t [s]" "x [mm]"',
+    )  # fmt: skip
+
+
+def signal_arguments(parser: ArgumentParser) -> None:
+    """Add the options that select the signal and its time span."""
+    group = parser.add_argument_group("selection of the signal")
+    group.add_argument(
+        "--column", metavar="NAME",
+        help="column of the signal (default: the only column with a suitable unit)",
+    )  # fmt: skip
+    group.add_argument("--from", dest="start", metavar="T", help="start of the time span [s]")
+    group.add_argument("--to", dest="end", metavar="T", help="end of the time span [s]")
+    group.add_argument(
+        "--calibration", metavar="FILE.csv",
+        help="readings of the sensor beside a reference; the signal is converted accordingly",
+    )  # fmt: skip
+
+
+def response_arguments(parser: ArgumentParser) -> None:
+    """Add the options that relate a recorded signal to a simulation."""
+    add = parser.add_argument
+    add("--release", metavar="T", help="time of the release in the record [s] (default: 0)")
+    add(
+        "--output", metavar="NAME",
+        help="recorded output of the mechanism, e.g. shuttle.x (default: the displacement of the "
+        "released body along the direction of the release)",
+    )  # fmt: skip
+    add(
+        "--uncertainty", metavar="U",
+        help="standard uncertainty of a sample (default: estimated from the residuals)",
+    )  # fmt: skip
+    engine_argument(parser)

@@ -358,7 +358,7 @@ def _progress(name: str) -> Callable[[str], None]:
 
 def _simulate(fmus: Sequence[Path]) -> int:
     """Simulate each FMU in a separate process; return the exit status."""
-    source = str(Path(__file__).resolve().parents[1])
+    source = str(Path(__file__).resolve().parents[2])
     paths = os.pathsep.join(filter(None, (source, os.environ.get("PYTHONPATH"))))
     status = OK
     for fmu in fmus:

@@ -8,6 +8,7 @@ EXTRAS = {
     "imageio_ffmpeg": "video",
     "pandas": "sweep",
     "pyarrow": "sweep",
+    "rainflow": "fatigue",
     "ziglang": "platforms",
 }
 """Extras by the modules of their packages; a module without an extra is required."""

@@ -1,7 +1,7 @@
 """``prbm picture`` and ``prbm animate``: drawings and films of mechanisms."""
 
 import argparse
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from ..analysis.adequacy import Vibration, notes
@@ -9,10 +9,13 @@ from ..base.atomic import FileError, check_file
 from ..base.errors import ParameterError
 from ..base.names import unknown
 from ..base.progress import reporter
+from ..base.unit_text import length_unit
 from ..files.mechanism_file import load, read_mechanism, shipped
 from ..files.settings import UserMistake, quantity, settings
+from ..interface.variables import extent
 from ..mechanics.assembly import assemble
 from ..mechanism.description import Mechanism
+from ..mechanism.expressions import affine
 from ..plots.animation import AnimationError, check_encoder, write_film
 from ..plots.figures import save
 from ..plots.motion import FPS, film, fmpy_command, motion, needed
@@ -21,6 +24,8 @@ from ..plots.scene import Scene
 from ..runs.result import Columns, Result, ResultError, names, read_csv
 from ..runs.run import simulate
 from .duration import given_inputs, span
+
+CENTRE_DIGITS = 3  # Decimal places of a printed centre of mass.
 
 
 def write_picture(options: argparse.Namespace) -> None:
@@ -36,9 +41,26 @@ def write_picture(options: argparse.Namespace) -> None:
         if isinstance(error, FileError):
             raise
         raise FileError(f"{error.filename}: cannot be written ({error.strerror})") from None
+    for sentence in plates(mechanism, mechanism.values(values)):
+        print(sentence)
     if options.modes:
         for sentence in notes(mechanism, values, [Vibration()]):
             print(sentence)
+
+
+def plates(mechanism: Mechanism, values: Mapping[str, float]) -> Iterator[str]:
+    """Yield mass, moment of inertia and centre of mass of each body that is cut from a plate."""
+    for body in mechanism.bodies:
+        if body.outline and isinstance(body.mass, str):
+            mass, inertia, *centre = (
+                affine(quantity)(values) for quantity in (body.mass, body.inertia, *body.centre)
+            )
+            factor, unit = length_unit(extent(mechanism))
+            x, y = (f"{round(factor * c, CENTRE_DIGITS) + 0.0:g}" for c in centre)
+            yield (
+                f"{body.name}: {1e3 * mass:.4g} g, {1e6 * inertia:.4g} kg.mm2, centre of mass at "
+                f"({x}, {y}) {unit}"
+            )
 
 
 def run_animation(options: argparse.Namespace) -> None:

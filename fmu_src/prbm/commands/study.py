@@ -39,10 +39,10 @@ def run_study(options: argparse.Namespace) -> None:
     tolerance = _optional(options.tolerance, "", "--tolerance")
     found = study(
         mechanism, varied, options.of or [], minimise=options.minimise, maximise=options.maximise,
-        values={name: x for name, x in values.items()}, inputs=inputs,
+        values=values, inputs=inputs,
         stop_time=_optional(options.stop_time, "s", "--stop-time"),
         step=_optional(options.step, "s", "--step"), tolerance=tolerance,
-        workers=options.workers, progress=reporter(),
+        workers=options.workers, engine=options.engine, progress=reporter(),
     )  # fmt: skip
     columns = dict(zip(found.varied, found.points.T, strict=True)) | dict(found.outputs)
     _print_table(columns, found.units)

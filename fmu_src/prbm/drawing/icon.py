@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Polygon
+from matplotlib.patches import PathPatch
 
 from ..mechanics.arrays import Complex, Real
 from ..mechanics.assembly import assemble
@@ -14,7 +14,7 @@ from ..mechanism.description import Mechanism
 from ..mechanism.parts import value
 from .motion import angles, closed, stretched
 from .shapes import Shapes, corners, curve
-from .style import CURVED_PIVOTS_MAX, own_style, png
+from .style import CURVED_PIVOTS_MAX, area, own_style, png
 
 STEEL, BODY, WALL, GHOST = "#1f4e79", "#9dc3e6", "#595959", "#d0d0d0"
 PIXELS = 256
@@ -84,10 +84,9 @@ def _line(axes: Axes, z: Complex, color: str, width: float, zorder: float) -> No
 
 
 def _body(axes: Axes, shapes: Shapes, name: str, E: Complex, faint: bool) -> None:
-    z = shapes.body(name, E)
     axes.add_patch(
-        Polygon(
-            np.column_stack([z.real, z.imag]),
+        PathPatch(
+            area(shapes.areas(name, E)),
             facecolor="none" if faint else BODY,
             edgecolor=GHOST if faint else STEEL,
             linewidth=1.0,

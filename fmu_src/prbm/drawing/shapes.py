@@ -13,8 +13,8 @@ from scipy.spatial import ConvexHull, QhullError
 from ..mechanics.arrays import Complex, Real
 from ..mechanics.system import FIXED, BodyFrame, Outline, System, unit
 from ..mechanism.expressions import affine
-from ..mechanism.flexure import PIN
-from ..mechanism.parts import GROUND, Flexure, Stop, body_of, value
+from ..mechanism.flexure import BEAM, PIN
+from ..mechanism.parts import GROUND, Flexure, Point, Stop, body_of, value
 
 CURVE_POINTS = 40  # Points of the drawn curve of a flexure.
 # Shares of the size of the mechanism:
@@ -139,10 +139,11 @@ def _surrounds(around: Complex, distance: float) -> bool:
 
 @dataclass(frozen=True)
 class FlexureLine:
-    """A flexure and its outline."""
+    """A flexure and its outline; ``jointed`` unless it is a beam, which has no pivots."""
 
     flexure: Flexure
     outline: Outline
+    jointed: bool = True
 
     @property
     def guided(self) -> tuple[bool, bool]:
@@ -169,12 +170,16 @@ class Shapes:
         self.system = system
         self.straight = self.arms(system.q0)
         named = {flexure.name: flexure for flexure in system.mechanism.flexures}
+        beams = {kind.name for kind in system.mechanism.flexure_types if kind.model == BEAM}
         self.flexures = [
-            FlexureLine(named[o.name], o) for o in system.outlines if o.kind == "flexure"
+            FlexureLine(named[o.name], o, named[o.name].type not in beams)
+            for o in system.outlines
+            if o.kind == "flexure"
         ]
         self.joints = [o for o in system.outlines if o.kind == "joint"]
         self.hits = [self._hit(stop) for stop in system.mechanism.stops]
         self.bodies = {name: self._body(name) for name in system.bodies}
+        self.holes = {name: self._holes(name) for name in system.bodies}
 
     def arms(self, q: Real) -> Complex:
         """Return the arms E of a shape; entries at stretches are undefined and have no effect."""
@@ -201,10 +206,13 @@ class Shapes:
     def _body(self, name: str) -> Complex:
         """Return the corners of a body about its centre of mass, as drawn [m].
 
-        The corners are the hull of its points and hit points if it contains the centre of mass,
-        otherwise the smallest box about the centre of mass that contains them.
+        The corners are those of its outline.  Without an outline they are the hull of its points
+        and hit points if it contains the centre of mass, otherwise the smallest box about the
+        centre of mass that contains them.
         """
         body = next(b for b in self.system.mechanism.bodies if b.name == name)
+        if body.outline:
+            return self._reach(name, body.outline)
         drawn = [complex(self._number(x), self._number(y)) for x, y in body.points.values()]
         stops = self.system.mechanism.stops
         drawn += [z for stop, z in zip(stops, self.hits, strict=True) if stop.body == name]
@@ -213,6 +221,17 @@ class Shapes:
         if _surrounds(around, INSIDE_RTOL * self.size):
             return around
         return box(reach, BODY_THICKNESS_MIN * self.size / 2)
+
+    def _holes(self, name: str) -> list[Complex]:
+        """Return the corners of the holes of a body about its centre of mass, as drawn [m]."""
+        body = next(b for b in self.system.mechanism.bodies if b.name == name)
+        return [self._reach(name, hole)[::-1] for hole in body.holes]
+
+    def _reach(self, name: str, drawn: Sequence[Point]) -> Complex:
+        """Return corners about the centre of mass of a body, counter-clockwise [m]."""
+        z = np.array([complex(self._number(x), self._number(y)) for x, y in drawn])
+        z -= self.system.bodies[name].drawn
+        return z if float((z.conj() * np.roll(z, -1)).imag.sum()) > 0.0 else z[::-1]
 
     def carried(self, body: str, drawn: complex, E: Complex) -> complex:
         """Return the position in a shape of a drawn point of a body or of the ground [m]."""
@@ -231,6 +250,11 @@ class Shapes:
         frame = self.system.bodies[name]
         result: Complex = self.centre(name, E) + E[frame.arm] * self.bodies[name]
         return result
+
+    def areas(self, name: str, E: Complex) -> list[Complex]:
+        """Return the corners of a body, counter-clockwise, and of its holes, clockwise [m]."""
+        centre, turn = self.centre(name, E), E[self.system.bodies[name].arm]
+        return [centre + turn * z for z in (self.bodies[name], *self.holes[name])]
 
     def hit(self, i: int, E: Complex) -> complex:
         """Return the hit point of a stop in a shape [m]."""

@@ -5,10 +5,15 @@ A body, a flexure or a wall has the same colour in all drawings.  This module is
 """
 
 import io
+from collections.abc import Sequence
 from functools import partial
 
 import matplotlib.style
+import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.path import Path
+
+from ..mechanics.arrays import Complex
 
 LINK, FLEXURE, BODY, WALL = "#1f4e79", "#8fb4d8", "#9dc3e6", "#595959"
 STRAIGHT, GRID, PROBE = "#b4bcc6", "#eeeeee", "#cc79a7"
@@ -16,6 +21,14 @@ PAST, FUTURE, IMPACT, REST = "#1f4e79", "#c8ced6", "#d55e00", "#009e73"
 CURVED_PIVOTS_MAX = 9  # More pivots are joined by straight lines, not by a curve.
 
 own_style = partial(matplotlib.style.context, "default")  # Independent of the user's matplotlibrc.
+
+
+def area(rings: Sequence[Complex], scale: float = 1.0) -> Path:
+    """Return the path of an area: an outline, and holes with the opposite sense of rotation."""
+    closed = (np.append(ring, ring[0]) * scale for ring in rings)
+    return Path.make_compound_path(
+        *(Path(np.column_stack([z.real, z.imag]), closed=True) for z in closed)
+    )
 
 
 @own_style()

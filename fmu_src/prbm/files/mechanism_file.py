@@ -20,8 +20,10 @@ from ..base import reading
 from ..base.errors import MechanismError, ParameterError, PrbmError
 from ..base.names import proposal
 from ..mechanism.description import Mechanism
-from .schema import NAME_LENGTH_MAX, TAGS, MechanismTable, Table, mechanism
+from .schema import MechanismTable, mechanism
+from .tables import RepeatTable, Table
 from .toml_lines import key_length, line_of, lines
+from .values import NAME_LENGTH_MAX, TAGS
 
 Item = TypeVar("Item")
 FILE_SIZE_MAX = 1 << 20  # bytes; a mechanism of a hundred flexures has 20 kB.
@@ -159,8 +161,13 @@ def _problem(error: dict[str, Any], data: Any) -> str:
         remedy = str(error["ctx"]["error"])
     elif kind == "string_pattern_mismatch":
         remedy = NAME_REMEDIES[str(loc[-1])]
+    elif kind == "tuple_type" and loc[-1] in ("outline", "holes"):
+        remedy = "write a list of corners, [[..., ...], [..., ...], [..., ...]]"
+        remedy += ", for each hole" if loc[-1] == "holes" else ""
     elif kind == "tuple_type" and len(loc) > 1:
         remedy = "write a pair, [..., ...]"
+    elif kind == "less_than_equal":
+        remedy = f"write a number of at most {error['ctx']['le']}"
     else:
         remedy = REMEDIES.get(kind, error["msg"])
     if remedy.startswith("cannot read the expression"):
@@ -170,6 +177,8 @@ def _problem(error: dict[str, Any], data: Any) -> str:
 
 def _keys(loc: Sequence[str | int]) -> list[str]:
     """Return the allowed keys of the table that has an unknown key."""
+    if "repeat" in loc[:-1]:
+        return [*RepeatTable.model_fields]
     return [*_table(str(loc[0]) if loc[1:] else "").model_fields]
 
 

@@ -6,195 +6,80 @@ quantities may have units.
 """
 
 import math
-import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from keyword import iskeyword
 from typing import Annotated, Any
 
 from pydantic import (
-    AfterValidator,
-    BaseModel,
     ConfigDict,
-    Discriminator,
     Field,
-    GetCoreSchemaHandler,
-    GetJsonSchemaHandler,
     StrictBool,
     StrictInt,
     StrictStr,
-    Tag,
     ValidationInfo,
     field_validator,
-    model_validator,
 )
-from pydantic_core import CoreSchema, core_schema
 
-from ..base.errors import MechanismError
+from ..base.errors import MechanismError, PrbmError
 from ..mechanism import parameters, parts
 from ..mechanism.description import RESERVED, Mechanism
 from ..mechanism.expressions import Quantity, affine
-from ..mechanism.flexure import CLAMP, ENDS, LINKS_MAX, MODELS, NODES_MAX, ORDER_DEFAULT, ORDER_MAX
-from ..mechanism.parameters import NAME
+from ..mechanism.flexure import (
+    CLAMP,
+    HINGE_ORDER_DEFAULT,
+    LEAF,
+    LINKS_MAX,
+    NODES_MAX,
+    NOTCH_NODES,
+    ORDER_DEFAULT,
+    ORDER_MAX,
+)
 from ..mechanism.parts import FIELDS, GROUND, LENGTH_MAX, LENGTH_MIN
-from .units import check_coherent, number, quantity, si_unit
+from .copies import (
+    Copied,
+    Drawing,
+    check_names,
+    copied_bodies,
+    explained,
+    mirrored_types,
+    origins,
+)
+from .outlines import plate
+from .tables import STRENGTHS, MaterialTable, Named, ParameterTable, RepeatTable, Table
+from .units import check_coherent, si_unit
+from .values import (
+    NAME_LENGTH_MAX,
+    Acceleration,
+    Angle,
+    Corner,
+    EndOrEnds,
+    Law,
+    LineOrLines,
+    Measured,
+    Model,
+    Point,
+    PointName,
+    PointOrName,
+    Profile,
+    Reference,
+    measured,
+)
 
-NAME_LENGTH_MAX = 100  # Characters; names become parts of file names.
+GIVEN = ("mass", "inertia", "centre")
+PLATE = ("thickness", "material", "density")
 MATERIAL = ("youngs_modulus", "density")
 SECTION = ("thickness", "width")
-TEXT, LIST = TAGS = ("<text>", "<list>")  # Tags of the two forms of a point, or of the ends.
+PROFILE = (
+    "profile", "end_thickness", "end_width", "notch_radius", "notch_depth", "waist_length",
+    "curvature", "rise",
+)  # fmt: skip
 IDENTIFIER = "^[A-Za-z_][A-Za-z0-9_]*$"
-
-
-# --- values of keys ---------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Measured:
-    """Type of a quantity: a plain number, a number with a unit, or an expression.
-
-    Parameters
-    ----------
-    description : str
-        Meaning, for the schema.
-    unit : str
-        Unit of plain numbers and of the result; empty if dimensionless.
-    minimum, maximum : float
-        Bounds, for the schema.
-    expression : bool
-        Whether expressions in parameters are allowed.
-    """
-
-    description: str
-    unit: str
-    minimum: float = -math.inf
-    maximum: float = math.inf
-    expression: bool = True
-
-    def read(self, written: object) -> Quantity:
-        """Return the number in the unit of the key, or the expression."""
-        return (quantity if self.expression else number)(written, self.unit)
-
-    def __get_pydantic_core_schema__(self, _: Any, __: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(self.read)
-
-    def __get_pydantic_json_schema__(self, _: CoreSchema, __: GetJsonSchemaHandler) -> Any:
-        bounds = {"minimum": self.minimum, "maximum": self.maximum}
-        finite = {name: bound for name, bound in bounds.items() if math.isfinite(bound)}
-        choices: list[dict[str, Any]] = [{"type": "number", **finite}]
-        if self.expression or self.unit:
-            choices.append({"type": "string", "pattern": r"\S" if self.expression else r"\d"})
-        return {"description": f"{self.description} [{self.unit or '-'}]", "anyOf": choices}
-
-
-@dataclass(frozen=True)
-class InUnit:
-    """Type of a number in the unit of its parameter; a bound may be infinite."""
-
-    bound: bool = False
-
-    def read(self, written: object, info: ValidationInfo) -> float:
-        """Return the number in the unit of the parameter."""
-        if self.bound and isinstance(written, float) and math.isinf(written):
-            return written
-        return number(written, str(info.data.get("unit", "")).removeprefix("1"))
-
-    def __get_pydantic_core_schema__(self, _: Any, __: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.with_info_plain_validator_function(self.read)
-
-    def __get_pydantic_json_schema__(self, _: CoreSchema, __: GetJsonSchemaHandler) -> Any:
-        return {"anyOf": [{"type": "number"}, {"type": "string", "pattern": r"\d"}]}
-
-
-def measured(part: type, key: str) -> Measured:
-    """Return the type of a field that is a parameter of the mechanism."""
-    unit, description, minimum, maximum, *_ = FIELDS[part][key]
-    return Measured(description, unit, minimum, maximum)
-
-
-def _allowed(name: str) -> str:
-    """Return a name; reject keywords of Python, because expressions are parsed as Python."""
-    if any(iskeyword(word) for word in re.split(r"[.\[]", name)):
-        raise MechanismError("a keyword of Python; choose another name")
-    return name
-
-
-Name = Annotated[
-    StrictStr,
-    Field(max_length=NAME_LENGTH_MAX, pattern=f"^{NAME.pattern}$"),
-    AfterValidator(_allowed),
-]
-PointName = Annotated[StrictStr, Field(max_length=NAME_LENGTH_MAX, pattern=r"^[^\W\d]\w*$")]
-Coordinate = Annotated[Quantity, Measured("Coordinate", "m")]
-Point = tuple[Coordinate, Coordinate]
-Reference = Annotated[StrictStr, Field(pattern=r"^\S+\.[^.\s]+$")]
-Angle = Annotated[float, Measured("Direction, counter-clockwise from +x", "deg", expression=False)]
-Acceleration = Annotated[
-    float, Measured("Acceleration of gravity", "m/s2", -1e6, 1e6, expression=False)
-]
-End = Annotated[StrictStr, Field(json_schema_extra={"enum": list(ENDS)})]
-Law = Annotated[StrictStr, Field(json_schema_extra={"enum": list(parts.LAWS)})]
-Model = Annotated[StrictStr, Field(json_schema_extra={"enum": list(MODELS)})]
-
-
-def _written_as(value: object) -> str:
-    """Return the tag of the form of a point, or of the ends."""
-    return TEXT if isinstance(value, str) else LIST
-
-
-PointOrName = Annotated[
-    Annotated[Point, Tag(LIST)] | Annotated[Reference, Tag(TEXT)], Discriminator(_written_as)
-]
-EndOrEnds = Annotated[
-    Annotated[tuple[End, End], Tag(LIST)] | Annotated[End, Tag(TEXT)],
-    Discriminator(_written_as),
-]
 
 
 # --- tables -----------------------------------------------------------------------------------
 
 
-class Table(BaseModel):
-    """A table that rejects unknown keys."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Named(Table):
-    """A table with a name."""
-
-    name: Name = Field(description="Name")
-
-
-class ParameterTable(Named):
-    """A parameter that points and other quantities refer to."""
-
-    unit: StrictStr = Field("", description="SI unit of the parameter (default: that of the value)")
-    value: Annotated[float, InUnit()] = Field(description="Default value")
-    description: StrictStr = Field("", description="Description of the FMU parameter")
-    minimum: Annotated[float, InUnit(bound=True)] | None = Field(None, description="Smallest value")
-    maximum: Annotated[float, InUnit(bound=True)] | None = Field(None, description="Largest value")
-    nominal: Annotated[float, InUnit(bound=True)] | None = Field(
-        None, description="Typical magnitude"
-    )
-    tunable: StrictBool = Field(False, description="Whether it may change during a simulation")
-
-    @model_validator(mode="before")
-    @classmethod
-    def _unit_of_value(cls, data: Any) -> Any:
-        if isinstance(data, dict) and "unit" not in data and isinstance(data.get("value"), str):
-            try:
-                return {"unit": si_unit(data["value"]), **data}
-            except MechanismError:
-                pass  # The value is read later, and rejected there.
-        return data
-
-
-class MaterialTable(Named):
-    """A material, with the parameters name.youngs_modulus and name.density."""
-
-    youngs_modulus: Annotated[Quantity, measured(parts.FlexureType, "youngs_modulus")]
-    density: Annotated[Quantity, measured(parts.FlexureType, "density")]
+MIRROR: Any = Field((), description='Line of symmetry, "x = ..." or "y = ...", or a list of both')
+REPEAT: Any = Field(None, description="Equal parts in a row or on a circle")
 
 
 class Section(Named):
@@ -209,11 +94,15 @@ class Section(Named):
     ) = Field(
         None,
         description="Order of the polynomial of the bending moment, for the model beam only "
-        f"(default: {ORDER_DEFAULT})",
+        f"(default: {ORDER_DEFAULT}; {HINGE_ORDER_DEFAULT} for a notch without a waist)",
     )
     nodes: (
         Annotated[StrictInt, Field(json_schema_extra={"minimum": 3, "maximum": NODES_MAX})] | None
-    ) = Field(None, description="Number of nodes, for the model beam only (default: order + 3)")
+    ) = Field(
+        None,
+        description="Number of nodes, or of those in a notch or waist, for the model beam only "
+        f"(default: order + 3; at least {NOTCH_NODES} in a notch without a waist)",
+    )
     thickness: Annotated[Quantity, measured(parts.FlexureType, "thickness")] | None = None
     width: Annotated[Quantity, measured(parts.FlexureType, "width")] | None = None
     material: StrictStr | None = Field(
@@ -222,12 +111,26 @@ class Section(Named):
     youngs_modulus: Annotated[Quantity, measured(parts.FlexureType, "youngs_modulus")] | None = None
     density: Annotated[Quantity, measured(parts.FlexureType, "density")] | None = None
     axial: StrictBool = Field(False, description="Whether the flexures can stretch")
+    profile: Profile = Field(LEAF, description="Section along a beam")
+    end_thickness: Annotated[Quantity, measured(parts.FlexureType, "end_thickness")] | None = None
+    end_width: Annotated[Quantity, measured(parts.FlexureType, "end_width")] | None = None
+    notch_radius: Annotated[Quantity, measured(parts.FlexureType, "notch_radius")] | None = None
+    notch_depth: Annotated[Quantity, measured(parts.FlexureType, "notch_depth")] | None = None
+    waist_length: Annotated[Quantity, measured(parts.FlexureType, "waist_length")] | None = None
+    curvature: Annotated[Quantity, measured(parts.FlexureType, "curvature")] | None = None
+    rise: Annotated[Quantity, measured(parts.FlexureType, "rise")] | None = None
+    stress: StrictBool = Field(
+        False, description="Whether the stress of the flexures, and its peak, are outputs"
+    )
     coefficients: dict[StrictStr, Annotated[Quantity, Measured("Coefficient", "")]] = Field(
         {}, description="Values that replace the published coefficients of the model"
     )
 
 
-_OWN = ("model", "n", "order", "nodes", *SECTION, "material", *MATERIAL, "axial", "coefficients")
+_OWN = (
+    "model", "n", "order", "nodes", *SECTION, "material", *MATERIAL, "axial", "stress",
+    "coefficients", *PROFILE,
+)  # fmt: skip
 _NO_MATERIAL_TWICE: list[Any] = [{"not": {"required": ["material", key]}} for key in MATERIAL]
 _MADE_OF: Any = {"anyOf": [{"required": ["material"]}, {"required": [*MATERIAL]}]}
 _OF_A_TYPE: Any = {"required": ["type"]}
@@ -246,7 +149,7 @@ class FlexureTypeTable(Section):
 
 
 class FlexureTable(Section):
-    """A straight flexure between two points, with a type or with its own section."""
+    """A flexure between two points, with a type or with its own section."""
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -264,15 +167,50 @@ class FlexureTable(Section):
         description="Type of both ends, or a pair for start and end; the other end of a free one "
         "must be a clamp",
     )
+    mirror: LineOrLines = MIRROR
+    repeat: RepeatTable | None = REPEAT
+
+
+_GIVEN: Any = {"required": [*GIVEN]}
+_OF_SOMETHING: Any = {"anyOf": [{"required": ["material"]}, {"required": ["density"]}]}
+_CUT: Any = {"allOf": [{"required": ["outline", "thickness"]}, _OF_SOMETHING]}
+_NOT_GIVEN_TWICE: list[Any] = [
+    {"not": {"required": pair}}
+    for pair in (*([one, other] for one in GIVEN for other in PLATE), ["material", "density"])
+]
 
 
 class BodyTable(Named):
-    """A rigid body."""
+    """A rigid body, with mass, inertia and centre, or cut from a plate."""
 
-    mass: Annotated[Quantity, measured(parts.Body, "mass")]
-    inertia: Annotated[Quantity, measured(parts.Body, "inertia")]
-    centre: Point = Field(description="Centre of mass as drawn [m]")
+    model_config = ConfigDict(
+        json_schema_extra={"allOf": [{"anyOf": [_GIVEN, _CUT]}, *_NOT_GIVEN_TWICE]}
+    )
+
+    mass: Annotated[Quantity, measured(parts.Body, "mass")] | None = None
+    inertia: Annotated[Quantity, measured(parts.Body, "inertia")] | None = None
+    centre: Point | None = Field(None, description="Centre of mass as drawn [m]")
     points: dict[PointName, Point] = Field({}, description="Points as drawn, by name [m]")
+    outline: tuple[Corner, ...] = Field(
+        (), description="Corners in order, coordinates as drawn or names of points [m]"
+    )
+    holes: tuple[tuple[Corner, ...], ...] = Field(
+        (), description="Corners of each hole in the outline [m]"
+    )
+    thickness: (
+        Annotated[
+            float,
+            Measured("Thickness of the plate, across the plane of motion", "m", LENGTH_MIN,
+                     LENGTH_MAX, expression=False),
+        ]
+        | None
+    ) = None  # fmt: skip
+    material: StrictStr | None = Field(
+        None, description="Name of the material of the plate, in place of density"
+    )
+    density: Annotated[Quantity, measured(parts.FlexureType, "density")] | None = None
+    mirror: LineOrLines = MIRROR
+    repeat: RepeatTable | None = REPEAT
 
 
 class JointTable(Named):
@@ -280,6 +218,8 @@ class JointTable(Named):
 
     start: Reference = Field(description="First point, body.point or ground.point")
     end: Reference = Field(description="Second point, body.point or ground.point")
+    mirror: LineOrLines = MIRROR
+    repeat: RepeatTable | None = REPEAT
 
 
 class StopTable(Named):
@@ -415,15 +355,39 @@ def mechanism(file: MechanismTable, drawing: str = "") -> Mechanism:
     """
     _check_names(file)
     materials = _materials(file)
+    bodies = copied_bodies(file.bodies, [_body(table, materials) for table in file.bodies])
+    drawn = Drawing(file.ground, bodies)
+    flexures = tuple(drawn.connections(file.flexures, [*map(_flexure, file.flexures)]))
     own = (flexure for flexure in file.flexures if flexure.type is None)
-    points = {body.name: body.points for body in file.bodies}
-    same = ("name", "title", "description", "ground", "gravity", "damping_zeta", "damping_beta")
-    result = Mechanism(
+    types = [_type(table, materials) for table in (*file.flexure_types, *own)]
+    joints = tuple(drawn.connections(file.joints, [*map(_joint, file.joints)]))
+    connected = mirrored_types(file.flexures, flexures, types)
+    try:
+        result = _assembled(file, drawn, connected, joints, drawing)
+        _check_drawn(result)
+    except PrbmError as error:
+        made_by = origins(_with_copies(file)) | drawn.made_by
+        raise type(error)(explained(str(error), made_by)) from None
+    return result
+
+
+def _assembled(
+    file: MechanismTable,
+    drawn: Drawing,
+    connected: tuple[tuple[parts.Flexure, ...], tuple[parts.FlexureType, ...]],
+    joints: tuple[parts.Joint, ...],
+    drawing: str,
+) -> Mechanism:
+    """Return the mechanism of a file, whose bodies, flexures and joints include the copies."""
+    points = {body.name: body.points for body in drawn.bodies}
+    same = ("name", "title", "description", "gravity", "damping_zeta", "damping_beta")
+    return Mechanism(
         **{key: getattr(file, key) for key in same},
-        bodies=tuple(parts.Body(**dict(body)) for body in file.bodies),
-        flexure_types=tuple(_type(t, materials) for t in (*file.flexure_types, *own)),
-        flexures=tuple(map(_flexure, file.flexures)),
-        joints=tuple(parts.Joint(**dict(joint)) for joint in file.joints),
+        ground=drawn.ground,
+        bodies=drawn.bodies,
+        flexures=connected[0],
+        flexure_types=connected[1],
+        joints=joints,
         stops=tuple(parts.Stop(**_attached(stop, points)) for stop in file.stops),
         frictions=tuple(parts.Friction(**_attached(part, points)) for part in file.frictions),
         forces=tuple(parts.Force(**_attached(force, points)) for force in file.forces),
@@ -432,8 +396,6 @@ def mechanism(file: MechanismTable, drawing: str = "") -> Mechanism:
         geometry=tuple(_parameters(file)),
         drawing=drawing,
     )
-    _check_drawn(result)
-    return result
 
 
 def _parameters(file: MechanismTable) -> Iterator[parameters.Parameter]:
@@ -444,19 +406,23 @@ def _parameters(file: MechanismTable) -> Iterator[parameters.Parameter]:
         except MechanismError as error:
             raise MechanismError(f"{table.name} has the unit {table.unit!r}: {error}") from None
         yield parameters.Parameter(**{k: v for k, v in dict(table).items() if v is not None})
-    for material in file.materials:
-        for key in MATERIAL:
-            given = getattr(material, key)
-            if not isinstance(given, str):
-                unit, description, least, most, nominal, _ = FIELDS[parts.FlexureType][key]
-                about = f"{description} of {material.name}"
-                name = f"{material.name}.{key}"
-                yield parameters.Parameter(name, given, unit, about, least, most, nominal)
+    owned: list[tuple[Named, str]] = [(m, key) for m in file.materials for key in MATERIAL]
+    for owner, key in (*owned, *((body, "density") for body in file.bodies)):
+        given = getattr(owner, key)
+        if isinstance(given, float):
+            unit, description, least, most, nominal, _ = FIELDS[parts.FlexureType][key]
+            about = f"{description} of {owner.name}"
+            name = f"{owner.name}.{key}"
+            yield parameters.Parameter(name, given, unit, about, least, most, nominal)
 
 
-def _materials(file: MechanismTable) -> dict[str, dict[str, Quantity]]:
-    """Return Young's modulus and density of each material, as a flexure type refers to them."""
-    return {m.name: {key: _referred(m, key) for key in MATERIAL} for m in file.materials}
+def _materials(file: MechanismTable) -> dict[str, dict[str, Any]]:
+    """Return Young's modulus, density and strengths of each material, as types refer to them."""
+    return {
+        m.name: {key: _referred(m, key) for key in MATERIAL}
+        | {key: getattr(m, key) for key in STRENGTHS}
+        for m in file.materials
+    }
 
 
 def _check_names(file: MechanismTable) -> None:
@@ -473,6 +439,13 @@ def _check_names(file: MechanismTable) -> None:
                 )
             seen.add(name)
         reserved |= {material.name for material in file.materials}
+    others = {part.name for kind in (file.materials, *parts) for part in kind}
+    check_names(_with_copies(file), {*RESERVED, *others}, NAME_LENGTH_MAX)
+
+
+def _with_copies(file: MechanismTable) -> tuple[Copied, ...]:
+    """Return the tables of parts that may have copies."""
+    return (*file.bodies, *file.flexures, *file.joints)
 
 
 def _referred(material: MaterialTable, key: str) -> Quantity:
@@ -481,20 +454,22 @@ def _referred(material: MaterialTable, key: str) -> Quantity:
     return given if isinstance(given, str) else f"{material.name}.{key}"
 
 
-def _type(table: Section, materials: Mapping[str, dict[str, Quantity]]) -> parts.FlexureType:
+def _type(table: Section, materials: Mapping[str, dict[str, Any]]) -> parts.FlexureType:
     """Return the flexure type of a table; the type of a flexure's own section has its name."""
     for key in ("model", *SECTION):
         if getattr(table, key) is None:
             raise MechanismError(
                 f"{table.name}.{key} is missing: add the key, or the type of the flexure"
             )
-    keys = ("name", "model", "order", "nodes", *SECTION, "axial", "coefficients")
+    keys = (
+        "name", "model", "order", "nodes", *SECTION, "axial", "stress", "coefficients", *PROFILE,
+    )  # fmt: skip
     given: dict[str, Any] = {key: getattr(table, key) for key in keys}
     return parts.FlexureType(**given | _material(table, materials), n=table.n or 0)
 
 
-def _material(table: Section, materials: Mapping[str, dict[str, Quantity]]) -> dict[str, Quantity]:
-    """Return Young's modulus and density of a type or flexure."""
+def _material(table: Section, materials: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
+    """Return Young's modulus, density and strengths of a type or flexure."""
     own = {key: getattr(table, key) for key in MATERIAL if key in table.model_fields_set}
     if table.material is None:
         if len(own) < len(MATERIAL):
@@ -507,10 +482,83 @@ def _material(table: Section, materials: Mapping[str, dict[str, Quantity]]) -> d
         raise MechanismError(
             f"{table.name} has material as well as {' and '.join(own)}: remove one of them"
         )
-    if table.material not in materials:
+    return _named_material(table.name, table.material, materials)
+
+
+def _named_material(
+    user: str, name: str, materials: Mapping[str, dict[str, Quantity]]
+) -> dict[str, Quantity]:
+    """Return Young's modulus and density of a material that a part refers to."""
+    if name not in materials:
         known = f"materials are {', '.join(materials)}" if materials else "add it to [[materials]]"
-        raise MechanismError(f"{table.name}.material = {table.material!r} is not defined; {known}")
-    return materials[table.material]
+        raise MechanismError(f"{user}.material = {name!r} is not defined; {known}")
+    return materials[name]
+
+
+def _body(table: BodyTable, materials: Mapping[str, dict[str, Quantity]]) -> parts.Body:
+    """Return the body of a table; mass, inertia and centre are given, or those of a plate."""
+    outline = tuple(_corner(table, corner) for corner in table.outline)
+    holes = tuple(tuple(_corner(table, corner) for corner in hole) for hole in table.holes)
+    shape: dict[str, Any] = {"points": table.points, "outline": outline, "holes": holes}
+    given = {key: getattr(table, key) for key in GIVEN if getattr(table, key) is not None}
+    cut = [key for key in PLATE if getattr(table, key) is not None]
+    if given and cut:
+        raise MechanismError(
+            f"{table.name} has {' and '.join(given)} as well as {' and '.join(cut)}: give mass, "
+            "inertia and centre, or outline, thickness and material (or density)"
+        )
+    if not cut:
+        for key in GIVEN:
+            if key not in given:
+                raise MechanismError(
+                    f"{table.name}.{key} is missing: add the key, or outline, thickness and "
+                    "material (or density)"
+                )
+        if holes and not outline:
+            raise MechanismError(f"{table.name}.holes needs an outline: add the key outline")
+        return parts.Body(table.name, **given, **shape)
+    if not table.outline or table.thickness is None:
+        missing = "outline" if not table.outline else "thickness"
+        raise MechanismError(
+            f"{table.name}.{missing} is missing: add the key, or give mass, inertia and centre in "
+            f"place of {' and '.join(cut)}"
+        )
+    parameters.Parameter(
+        f"{table.name}.thickness", table.thickness, "m", "", LENGTH_MIN, LENGTH_MAX
+    )
+    density = _density(table, materials)
+    computed: Any = plate(table.name, outline, holes, table.thickness, density)
+    return parts.Body(table.name, **computed, **shape)
+
+
+def _corner(table: BodyTable, corner: Point | str) -> parts.Point:
+    """Return a corner of an outline; a point of the body given by name by its coordinates."""
+    if not isinstance(corner, str):
+        return corner
+    if corner not in table.points:
+        listed = f"its points are {', '.join(table.points)}" if table.points else "add [x, y]"
+        raise MechanismError(
+            f"{table.name}.outline: {corner!r} is not a point of the body {table.name}; {listed}"
+        )
+    return table.points[corner]
+
+
+def _density(table: BodyTable, materials: Mapping[str, dict[str, Quantity]]) -> Quantity:
+    """Return the density of a plate as an expression: that of its material, or its own."""
+    if table.material is None:
+        if table.density is None:
+            raise MechanismError(
+                f"{table.name} has no material: add material with the name of one, or density"
+            )
+        return table.density if isinstance(table.density, str) else f"{table.name}.density"
+    if table.density is not None:
+        raise MechanismError(f"{table.name} has material as well as density: remove one of them")
+    return _named_material(table.name, table.material, materials)["density"]
+
+
+def _joint(table: JointTable) -> parts.Joint:
+    """Return the joint of a table."""
+    return parts.Joint(table.name, table.start, table.end)
 
 
 def _flexure(table: FlexureTable) -> parts.Flexure:
@@ -599,6 +647,7 @@ def _places(mechanism: Mechanism) -> Iterator[tuple[str, parts.Point]]:
     for body in mechanism.bodies:
         yield f"{body.name}.centre", body.centre
         yield from ((f"{body.name}.{name}", point) for name, point in body.points.items())
+        yield from ((f"{body.name}.outline", corner) for corner in body.outline)
 
 
 def _distance(

@@ -22,6 +22,7 @@ UNIT_LENGTH_MAX = 100  # characters
 EXPONENT_MAX = 20  # Exponent of a base unit; no quantity of mechanics has a larger one.
 COHERENT = (
     "m", "kg", "s", "rad", "N", "Pa", "kg/m3", "kg.m2", "N/m", "N.m", "m/s", "m/s2", "Hz", "rad/s",
+    "1/m",
 )  # fmt: skip
 COMMON = {
     "m": {"m": 0, "cm": -2, "mm": -3, "um": -6, "µm": -6, "μm": -6, "nm": -9},
@@ -29,6 +30,8 @@ COMMON = {
     "kg/m3": {"kg/m3": 0, "g/cm3": 3},
     "kg.m2": {"kg.m2": 0, "kg m2": 0, "kg.mm2": -6, "kg mm2": -6, "g.mm2": -9, "g mm2": -9},
     "Pa": {"Pa": 0, "kPa": 3, "MPa": 6, "GPa": 9},
+    "m/s": {"m/s": 0, "mm/s": -3},
+    "N": {"N": 0, "mN": -3},
     "s": {"s": 0, "ms": -3, "us": -6, "µs": -6, "μs": -6},
 }
 """Powers of ten by SI unit and written unit.  Without other units, pint is not imported."""

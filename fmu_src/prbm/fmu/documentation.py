@@ -13,20 +13,42 @@ from ..mechanism.description import Mechanism
 from ..mechanism.flexure import BEAM, MODELS
 from ..mechanism.parts import FlexureType
 from ..runs.experiment import Experiment
+from .live.page import LivePart
+from .mathml import block, formula, inline, matrix, row
 
 STYLE = """
-body { font: 16px/1.5 system-ui, sans-serif; color: #222; max-width: 62rem; margin: 2rem auto;
-  padding: 0 1rem; }
-h1 { line-height: 1.2; } h2 { margin-top: 2.2rem; border-bottom: 1px solid #ccc; }
-pre { background: #f5f7fa; padding: .8rem 1rem; overflow-x: auto; line-height: 1.3; }
-code { background: #f5f7fa; padding: 0 .2em; } pre code { padding: 0; }
+:root { color-scheme: light dark; --text: #1d2530; --muted: #566170; --page: #f6f8fa;
+  --card: #ffffff; --line: #d9dfe6; --edge: #b3bcc7; --grid: #e6eaef; --field: #f6f8fa;
+  --code: #eef2f6; --anchor: #1c5f9f; --warn: #fff1e5; --warn-text: #5c2600;
+  --handle-text: #a34100; }
+@media (prefers-color-scheme: dark) { :root { --text: #e4eaf1; --muted: #a3afbd; --page: #10161d;
+  --card: #18202a; --line: #2d3845; --edge: #4b5867; --grid: #263140; --field: #10161d;
+  --code: #1f2935; --anchor: #7fbcf5; --warn: #3a2110; --warn-text: #ffd9bd;
+  --handle-text: #ffab73; } }
+body { font: 16px/1.5 system-ui, sans-serif; color: var(--text); background: var(--page);
+  max-width: 86rem; margin: 2rem auto; padding: 0 1.25rem; }
+body > p, body > ul, body > ol, body > .table { max-width: 64rem; }
+a { color: var(--anchor); }
+h1 { line-height: 1.2; margin-bottom: .5rem; }
+h2 { margin-top: 2.2rem; border-bottom: 1px solid var(--line); }
+pre { background: var(--code); padding: .8rem 1rem; overflow-x: auto; line-height: 1.3;
+  max-width: 62rem; border-radius: 6px; }
+code { background: var(--code); padding: 0 .2em; } pre code { padding: 0; }
 .table { overflow-x: auto; }
 table { border-collapse: collapse; width: 100%; font-size: .88rem; }
-th, td { text-align: left; padding: .25rem .6rem; border-bottom: 1px solid #ddd;
+th, td { text-align: left; padding: .25rem .6rem; border-bottom: 1px solid var(--line);
   vertical-align: top; }
-th { background: #eef3f8; } td.number { text-align: right; white-space: nowrap; }
+th { background: var(--code); } td.number { text-align: right; white-space: nowrap; }
 td:first-child { white-space: nowrap; } caption { text-align: left; font-weight: 600;
   padding: .8rem 0 .3rem; } figure { margin: 1rem 0; }
+math[display=block] { margin: .9rem 0; text-align: left; display: block math; font-size: 1.08em;
+  overflow-x: auto; overflow-y: hidden; max-width: 62rem; }
+mtd { padding: .15em .6em; }
+.matrix { margin: 0 .3em; --c: linear-gradient(currentColor, currentColor); background:
+  var(--c) 0 0/6px 1.5px, var(--c) 0 100%/6px 1.5px, var(--c) 100% 0/6px 1.5px,
+  var(--c) 100% 100%/6px 1.5px; background-repeat: no-repeat;
+  border-left: 1.5px solid currentColor; border-right: 1.5px solid currentColor; }
+figure svg { color: var(--anchor); max-width: 100%; height: auto; }
 """
 
 KINDS = {
@@ -78,6 +100,7 @@ def native_page(
     platforms: Sequence[str],
     experiment: Experiment,
     with_reference: bool,
+    live: LivePart | None = None,
 ) -> str:
     """Return the HTML page of a native FMU.
 
@@ -95,11 +118,13 @@ def native_page(
         The default experiment.
     with_reference : bool
         Whether the FMU contains reference results of the default experiment.
+    live : LivePart or None
+        The part of the page that simulates the mechanism; None: the page is static.
     """
     variables = interface.variables
     return _page(
         mechanism,
-        _summary(mechanism, f"FMI {version}.0 model exchange and co-simulation"),
+        _summary(mechanism, f"FMI {version}.0 model exchange and co-simulation", live),
         _native_use(mechanism, interface, version, platforms, experiment, with_reference),
         _equations(mechanism),
         _exchange(interface, version),
@@ -108,19 +133,52 @@ def native_page(
         _variables(variables),
         _limits(mechanism, variables, INPUTS_OF_BOTH),
         _list("Sources", (escape(source) for source in SOURCES), ordered=True),
-        _native_licenses(platforms),
+        _native_licenses(platforms, live is not None),
+        live=live,
     )
 
 
-def _page(mechanism: Mechanism, *sections: str) -> str:
-    name = escape(mechanism.name)
+def explorer_page(mechanism: Mechanism, variables: tuple[Variable, ...], live: LivePart) -> str:
+    """Return the HTML page that simulates a mechanism without an FMU.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The mechanism.
+    variables : tuple of Variable
+        The variables of its FMUs.
+    live : LivePart
+        The part of the page that simulates the mechanism.
+    """
+    return _page(
+        mechanism,
+        _summary(mechanism, "Simulation in the browser", live),
+        _equations(mechanism),
+        _walls(mechanism),
+        _variables(variables),
+        _limits(mechanism, variables, INPUTS_OF_STEPS),
+        _list("Sources", (escape(source) for source in SOURCES), ordered=True),
+        live=live,
+    )
+
+
+def _page(mechanism: Mechanism, *sections: str, live: LivePart | None = None) -> str:
+    name, own, data = escape(mechanism.name), live.style if live else "", live.data if live else ""
     return (
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{name}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n"
-        + "\n".join(sections)
+        f"<title>{name}</title>\n<style>{STYLE}{own}</style>\n</head>\n<body>\n"
+        + _focusable("\n".join(sections))
+        + f"\n{data}"
         + "\n</body>\n</html>\n"
     )
+
+
+def _focusable(sections: str) -> str:
+    """Let the keyboard scroll code, formulas and tables that are wider than the page."""
+    for scrolled in ("<pre", '<div class="table"', '<math display="block"'):
+        sections = sections.replace(f"{scrolled}>", f'{scrolled} tabindex="0">')
+    return sections
 
 
 def _list(title: str, items: Iterable[str], *, ordered: bool = False) -> str:
@@ -140,13 +198,13 @@ def _flexures(mechanism: Mechanism) -> str:
     return " ".join(sentences[beam] for beam in sorted(beams))
 
 
-def _summary(mechanism: Mechanism, flavour: str) -> str:
+def _summary(mechanism: Mechanism, flavour: str, live: LivePart | None = None) -> str:
     drawing = escape(mechanism.drawing.strip("\n"))
     figure = f"<figure><pre>{drawing}</pre></figure>" if drawing else ""
     return (
         f"<h1>{escape(mechanism.name)}</h1>\n"
         f"<p><strong>{escape(mechanism.title)}.</strong> "
-        f"{escape(mechanism.description.strip())}</p>\n{figure}\n"
+        f"{escape(mechanism.description.strip())}</p>\n{live.markup if live else ''}\n{figure}\n"
         f"<p>{_flexures(mechanism)} Impacts follow the laws of rigid bodies. They are located to "
         "10<sup>-12</sup> s inside a communication step. Decaying bounces end in "
         "resting contact, which releases when the contact force reaches zero.</p>\n"
@@ -219,21 +277,33 @@ def _stretches(mechanism: Mechanism) -> bool:
 
 def _equations(mechanism: Mechanism) -> str:
     flexures = "".join(_flexure_row(mechanism, kind) for kind in mechanism.flexure_types)
+    beams = _beams(mechanism)
+    motion = block(
+        matrix([["M", "Phi_q^T", "-G^T"], ["Phi_q", "0", "0"], ["G", "0", "0"]]),
+        matrix([["a"], ["lambda"], ["force"]]),
+        row("="),
+        matrix([["Q - C v^2"], ["-dot(Phi_q) v"], ["-dot(G) v"]]),
+    )
+    mass = formula("M = Re(bar(e)_i H_{ij} e_j) + diag(J)", "C = -Im(bar(e)_i H_{ij} e_j)")
+    loads = "Q = springs + gravity + damping (2 zeta omega_1 M v + beta K v) + friction + inputs"
+    impact = formula(
+        "M (v^+ - v^-) + Phi_q^T Lambda = G^T P",
+        "Phi_q v^+ = 0",
+        "dot(g)^+ = -restitution dot(g)^-",
+        "P >= 0",
+    )
     return (
         "<h2>Equations</h2>\n"
-        f"<p>{BEAMS if _beams(mechanism) else ''}With the absolute angles q of the links "
-        f"{'and nodes ' if _beams(mechanism) else ''}and e = exp(i q), every point is "
-        f"z = c + A e, {STRETCHING if _stretches(mechanism) else ''}and</p>\n<pre>"
-        "[ M      Phi_q^T  -G^T ] [ a      ]   [ Q - C v^2        ]\n"
-        "[ Phi_q  0         0   ] [ lambda ] = [ -(d/dt Phi_q) v  ]\n"
-        "[ G      0         0   ] [ force  ]   [ -(d/dt G) v      ]   while a stop holds\n\n"
-        "M = Re(conj(e)_i H_ij e_j) + diag(J),   C = -Im(conj(e)_i H_ij e_j)\n"
-        "Q = springs + gravity + damping (2 zeta omega_1 M v + beta K v) + friction + inputs"
-        "</pre>\n<p>Phi(q) = 0 are the loop constraints; positions and velocities are projected "
-        "onto them. The gap g has the rate g' = G v + w, with w the velocity of the wall. At an "
-        "impact,</p>\n<pre>"
-        "M (v+ - v-) + Phi_q^T Lambda = G^T P,   Phi_q v+ = 0,   g'+ = -restitution g'-,   P >= 0"
-        "</pre>\n<p>With friction at the stop, the coefficient of restitution is energetic "
+        f"<p>{BEAMS if beams else ''}With the absolute angles {inline('q')} of the links "
+        f"{'and nodes ' if beams else ''}and {inline('e = exp(i q)')}, every point is "
+        f"{inline('z = c + A e')}, {STRETCHING if _stretches(mechanism) else ''}and</p>\n"
+        f"{motion}\n{mass}\n{formula(loads)}\n"
+        "<p>The last row acts while a stop holds. "
+        f"{inline('Phi(q) = 0')} are the loop constraints; positions and velocities are "
+        "projected onto them. The gap "
+        f"{inline('g')} has the rate {inline('dot(g) = G v + w')}, with {inline('w')} the velocity "
+        f"of the wall. At an impact,</p>\n{impact}\n"
+        "<p>With friction at the stop, the coefficient of restitution is energetic "
         "(Stronge), so that no impact gains energy. Without friction it equals Newton's "
         "coefficient.</p>\n"
         '<div class="table"><table><caption>Flexure models</caption><thead><tr><th>type</th>'
@@ -248,7 +318,7 @@ def _flexure_row(mechanism: Mechanism, kind: FlexureType) -> str:
     model = mechanism.model(kind)
     coefficients = ", ".join(f"{c.name} = {c.value:g}" for c in model.coefficients)
     if model.order:
-        coefficients = f"order = {model.order}, nodes = {model.nodes}"
+        coefficients = f"order = {model.order}, nodes = {model.nodes}, profile = {kind.profile}"
     coefficients = coefficients or f"n = {kind.n}"
     cells = (kind.name, kind.model, coefficients, model.source)
     return "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>"
@@ -311,12 +381,12 @@ STOP_LIMITS = (
 
 WALLS = (
     "In co-simulation the inputs of a wall at a communication point t0 define a line",
-    "r(t) = position + displacement + v (t - t0),",
+    formula("r(t) = position + displacement + v (t - t_0)"),
     "with v the input <code>velocity</code> or, until that has been non-zero, the mean rate of the "
     "<code>displacement</code>. The wall joins the line within T, twice the recent longest "
     "communication step (at most a fifth of the period). With e and u its distance and speed ahead "
     "of the line at t0, and s = (t - t0)/T &le; 1, its position is",
-    "x(t) = r(t) + (1 - s)<sup>2</sup> (e + (2 e + u T) s).",
+    formula("x(t) = r(t) + {(1 - s)}^2 (e + (2 e + u T) s)"),
 )
 WALL_RULES = (
     "A uniform motion that is given with its velocity is exact. Otherwise the error is below "
@@ -339,8 +409,8 @@ def _walls(mechanism: Mechanism) -> str:
     line, position = WALLS[1], WALLS[3]
     rules = "".join(f"<li>{rule}</li>" for rule in WALL_RULES)
     return (
-        f"<h2>Moving walls</h2>\n<p>{WALLS[0]}</p>\n<pre>{line}</pre>\n<p>{WALLS[2]}</p>\n"
-        f"<pre>{position}</pre>\n{_drawn_wall()}\n<ul>{rules}</ul>"
+        f"<h2>Moving walls</h2>\n<p>{WALLS[0]}</p>\n{line}\n<p>{WALLS[2]}</p>\n"
+        f"{position}\n{_drawn_wall()}\n<ul>{rules}</ul>"
     )
 
 
@@ -350,7 +420,7 @@ def _drawn_wall() -> str:
 
     def path(kind: str, points: Iterable[tuple[float, float]]) -> str:
         places = " ".join(f"{80 + width * t:.1f},{140 - rise * x:.1f}" for t, x in points)
-        return f'<polyline points="{places}" fill="none" stroke="#1f4e79" {kind}/>'
+        return f'<polyline points="{places}" fill="none" stroke="currentColor" {kind}/>'
 
     joining = [(k / 20, float(wall.motion(k / 20)[0])) for k in range(21)]
     drawn = [
@@ -360,7 +430,10 @@ def _drawn_wall() -> str:
         path('stroke-width="0.7"', [(1.0, -0.1), (1.0, 1.2)]),
     ]
     labels = ((96, 88, "line r"), (150, 135, "wall x"), (76, 165, "t0"), (262, 165, "t0 + T"))
-    drawn += [f'<text x="{x}" y="{y}" font-size="13">{text}</text>' for x, y, text in labels]
+    drawn += [
+        f'<text x="{x}" y="{y}" font-size="13" fill="currentColor">{text}</text>'
+        for x, y, text in labels
+    ]
     return (
         '<figure><svg viewBox="0 0 380 170" width="380" role="img" '
         f'aria-label="A wall joins the line of its inputs">{"".join(drawn)}</svg></figure>'
@@ -377,9 +450,9 @@ def _limits(mechanism: Mechanism, variables: tuple[Variable, ...], inputs: str) 
     rigid = [
         f"{impact} The duration of a real impact (0.1 ms) is comparable to the period of the axial "
         "vibrations of the flexures (0.5 ms in the steel structure of source 1). This model has no "
-        "axial vibrations, because its links do not stretch.",
+        "axial vibrations, because its flexures do not stretch.",
         planar,
-        "Links that do not stretch keep a body on parallel, straight flexures from turning, so "
+        "Flexures that do not stretch keep a body on parallel, straight flexures from turning, so "
         "that the place of a hit has no effect there. With flexures that stretch, a rigid impact "
         "off the centre of mass loses more energy of the fundamental mode. The loss of a real "
         "impact depends on the duration of the contact.",
@@ -392,6 +465,11 @@ def _limits(mechanism: Mechanism, variables: tuple[Variable, ...], inputs: str) 
                 f"{MODELS[name].end_slope:.3f} times the exact slope. Transverse end forces are "
                 "modelled well."
             )
+    if BEAM in models:
+        items.append(
+            "Beams: the bending moment is a polynomial along each flexure. Vibrations of a flexure "
+            "with more waves than its polynomial are missing."
+        )
     straight = "kilohertz" if _stretches(mechanism) else "infinite stiffness"
     if "2R" in models:
         items.append(
@@ -473,18 +551,23 @@ def _exchange(interface: NativeInterface, version: int) -> str:
     discard = f"fmi{version}Discard"
     return (
         "<h2>Model exchange</h2>\n"
-        "<p>The coordinates q of the mechanism satisfy the loop constraints Phi(q) = 0. The states "
-        "are the independent coordinates q_i, one per degree of freedom, and their rates v_i. "
-        "The dependent coordinates q_d are computed from the constraints at every call, so that "
-        "the solver of the importer needs no treatment of constraints:</p>\n<pre>"
-        "Phi(q_i, q_d) = 0,      v_d = -(dPhi/dq_d)^-1 (dPhi/dq_i) v_i"
-        "</pre>\n"
+        "<p>The coordinates q of the mechanism satisfy the loop constraints "
+        f"{inline('Phi(q) = 0')}. The states "
+        "are the independent coordinates "
+        f"{inline('q_i')}, one per degree of freedom, and their rates {inline('v_i')}. "
+        "The dependent coordinates "
+        f"{inline('q_d')} "
+        "are computed from the constraints at every call, so that "
+        "the solver of the importer needs no treatment of constraints:</p>\n"
+        f"{formula('Phi(q_i, q_d) = 0', 'v_d = -{Phi_{q_d}}^{-1} Phi_{q_i} v_i')}\n"
         '<div class="table"><table><caption>Continuous states, in order</caption><thead><tr>'
         "<th>state</th><th>derivative</th></tr></thead><tbody>"
         f"{rows}</tbody></table></div>\n"
-        "<p>The independent coordinates were chosen at the export. The choice keeps dPhi/dq_d as "
+        "<p>The independent coordinates were chosen at the export. The choice keeps "
+        f"{inline('Phi_{q_d}')} as "
         "far from singular as possible between the straight shape and the release shape of the "
-        "mechanism file; start values do not change it. Far outside these shapes dPhi/dq_d can "
+        "mechanism file; start values do not change it. Far outside these shapes "
+        f"{inline('Phi_{q_d}')} can "
         "become singular. Then the derivatives cannot be computed, the reason is logged, and the "
         f"call returns <code>{discard}</code>. Co-simulation has no such singularity, because it "
         "integrates all coordinates and projects them onto the constraints.</p>\n"
@@ -524,16 +607,22 @@ def _events(mechanism: Mechanism, interface: NativeInterface, version: int) -> s
     return "\n".join(parts)
 
 
-def _native_licenses(platforms: Sequence[str]) -> str:
+def _native_licenses(platforms: Sequence[str], live: bool) -> str:
     windows = (
         ' The libraries for Windows contain start-up code of MinGW-w64, see <a href="licenses/'
         'mingw-w64.txt">licenses/mingw-w64.txt</a>.'
         if any(name.endswith("-windows") for name in platforms)
         else ""
     )
+    module = (
+        " The simulation on this page contains parts of wasi-libc and musl: MIT, see "
+        '<a href="licenses/wasi-libc.txt">licenses/wasi-libc.txt</a>.'
+        if live
+        else ""
+    )
     return (
         "<h2>Licences</h2>\n<p>The model and its engine: MIT, see "
         '<a href="licenses/prbm-impact.txt">licenses/prbm-impact.txt</a>. Libraries that '
         "were compiled with ziglang contain parts of its runtime library: MIT, see "
-        f'<a href="licenses/zig.txt">licenses/zig.txt</a>.{windows}</p>'
+        f'<a href="licenses/zig.txt">licenses/zig.txt</a>.{windows}{module}</p>'
     )

@@ -10,16 +10,18 @@ from ..base.errors import MechanismError
 from ..interface.native import NativeInterface, native_interface
 from ..interface.tables import FILE, tables
 from ..interface.variables import CLOCK
-from ..kernel.compiler import HOST, Platform, libraries
+from ..kernel.compiler import HOST, NoCompilerError, Platform, browser_module, libraries
 from ..kernel.simulation import check_start
 from ..kernel.sources import TABLES, amalgamation, files_digest, kernel, tables_header
 from ..mechanics.independent import independent
 from ..mechanism.description import Mechanism
 from ..runs.engine import PYTHON
-from ..runs.experiment import experiment
+from ..runs.experiment import Experiment, experiment
 from . import documentation
 from .archive import zipped
 from .description import Heading
+from .live.content import content
+from .live.page import LivePart, live_part
 from .native_description import LOG_CATEGORIES, build_description, description, terminals
 from .reference_results import reference
 from .slave.resolved import FILE as MODEL
@@ -28,7 +30,7 @@ from .start import interface, magnitudes, start_sample
 
 NAMESPACE = uuid.UUID("f0b6b5a1-6d5c-5b0e-8c55-1a52a0e6f1d3")
 LICENSES = ("prbm-impact.txt", "zig.txt")
-WINDOWS_LICENSE = "mingw-w64.txt"
+WINDOWS_LICENSE, LIVE_LICENSE = "mingw-w64.txt", "wasi-libc.txt"
 
 
 def build(
@@ -99,12 +101,51 @@ def build(
     png = icon(mechanism, start_sample(mechanism, changes))
     contents["model.png" if fmi == 2 else "terminalsAndIcons/icon.png"] = png
     names = sorted(platform.name for platform in compiled)
+    part = live(mechanism, native, default, table, progress)
     contents["documentation/index.html"] = documentation.native_page(
-        mechanism, native, fmi, names, default, bool(results)
+        mechanism, native, fmi, names, default, bool(results), part
     ).encode()
-    contents |= dict(_licenses(any(platform.system == "windows" for platform in compiled)))
+    windows = any(platform.system == "windows" for platform in compiled)
+    contents |= dict(_licenses(windows, part is not None))
     progress("packing")
     return zipped(contents)
+
+
+def live(
+    mechanism: Mechanism,
+    native: NativeInterface,
+    default: Experiment,
+    table: bytes,
+    progress: Callable[[str], None] = lambda step: None,
+) -> LivePart | None:
+    """Return the part of a page that simulates a mechanism.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The mechanism.
+    native : NativeInterface
+        Its variables, with the start values of the page.
+    default : Experiment
+        The default experiment.
+    table : bytes
+        The tables of the mechanism.
+    progress : callable
+        Called with a description of the stage, and with the reason if there is no such part.
+
+    Returns
+    -------
+    LivePart or None
+        None if no compiler makes the WebAssembly module that the page needs.
+    """
+    try:
+        module = browser_module(progress)
+    except NoCompilerError as error:
+        progress(f"the documentation has no simulation: {error}")
+        return None
+    return live_part(
+        content(mechanism, native.variables, native.independent, default), table, module
+    )
 
 
 def described(
@@ -159,10 +200,10 @@ def _binaries(
         yield f"binaries/{folder}/{name}{platform.suffix}", library
 
 
-def _licenses(windows: bool) -> Iterator[tuple[str, bytes]]:
+def _licenses(windows: bool, live: bool) -> Iterator[tuple[str, bytes]]:
     """Yield the licences of all contents and ``license.txt``, which the standard requires."""
     folder = files(__package__).joinpath("licenses")
-    names = [*LICENSES, *([WINDOWS_LICENSE] if windows else [])]
+    names = [*LICENSES, *([WINDOWS_LICENSE] if windows else []), *([LIVE_LICENSE] if live else [])]
     entry = "The model and its engine are under the MIT licence.  Licences of all contents:\n"
     yield "documentation/licenses/license.txt", "\n".join([entry, *names, ""]).encode()
     for name in names:

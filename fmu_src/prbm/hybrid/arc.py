@@ -7,7 +7,7 @@ the start of the previous step.  If the motion is not smooth there, a step to ha
 computes the third state.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -75,11 +75,9 @@ class Arc:
     n: int
     before: Node | None = None
 
-    def following(self, last: "Arc | None") -> "Arc":
-        """Return the step with the start of the previous step, from which the motion is smooth."""
-        if last is None or last.h < NODE_RATIO_MIN * self.h:
-            return self
-        return replace(self, before=Node(last.start, last.y, last.k[0]))
+    def start_before(self, h: float) -> Node | None:
+        """Return the start of this step for the next step of size h [s], unless it is too near."""
+        return Node(self.start, self.y, self.k[0]) if self.h >= NODE_RATIO_MIN * h else None
 
     @property
     def embedded_error(self) -> Real:

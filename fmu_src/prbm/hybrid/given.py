@@ -1,12 +1,15 @@
 """Checks of the values that a user gives to a simulation, for both engines."""
 
-import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+
+import numpy as np
 
 from ..base.errors import ParameterError
 from ..base.names import unknown
+from ..mechanics.arrays import Real
 from ..mechanics.inputs import check_input, input_names
 from ..mechanism.description import Mechanism
+from ..mechanism.parameters import finite
 
 Values = dict[str, float]
 
@@ -43,10 +46,7 @@ def start_values(
             given[name] = check_input(name, x, given)
         elif name not in parameters:
             raise ParameterError(unknown(name, {**values, **given}))
-    time = float(start_time)
-    if not math.isfinite(time):
-        raise ParameterError(f"start_time = {start_time} s must be a finite number")
-    return values, given, time
+    return values, given, finite("start_time", start_time, "s")
 
 
 def changed_values(
@@ -87,3 +87,20 @@ def changed_values(
         else:
             raise ParameterError(unknown(name, {**parameters, **inputs}))
     return known, inputs
+
+
+def checked_times(times: Sequence[float] | Real) -> Real:
+    """Return times [s] as an array (m,).
+
+    Raises
+    ------
+    ParameterError
+        If they are not a list of numbers.
+    """
+    try:
+        found = np.array(times, float)
+    except (TypeError, ValueError):
+        raise ParameterError(f"times = {times!r} must be a list of numbers in s") from None
+    if found.ndim != 1:
+        raise ParameterError(f"times have the shape {found.shape}: give a list of times in s")
+    return found

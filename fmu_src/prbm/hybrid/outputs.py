@@ -9,9 +9,11 @@ from ..mechanics.arrays import Complex, Real
 from ..mechanics.compliant_stops import Extra
 from ..mechanics.dynamics import Equations, Evaluation, base_reaction
 from ..mechanics.kinetics import kinetic_energy
+from ..mechanics.stress import stresses
 from ..mechanics.system import ANGLE, STRAIN, System
 from ..mechanism.parts import value
 from .front import Latched
+from .peaks import PeakRecord
 
 Outputs = dict[str, float | int | bool]
 
@@ -25,7 +27,12 @@ COMPLIANT = ("peak_force", "indentation", "contact_duration")
 
 
 def all_outputs(
-    equations: Equations, latched: Sequence[Latched], t: float, y: Real, others: Mapping[str, float]
+    equations: Equations,
+    latched: Sequence[Latched],
+    peaks: PeakRecord,
+    t: float,
+    y: Real,
+    others: Mapping[str, float],
 ) -> Outputs:
     """Return all outputs.
 
@@ -35,6 +42,8 @@ def all_outputs(
         Equations of motion at the time.
     latched : (s,) sequence of Latched
         The last impact of each stop.
+    peaks : PeakRecord
+        The peaks of the stress.
     t, y : float, (2 n + 2 + 4 c,)
         Time [s] and state.
     others : mapping
@@ -63,6 +72,7 @@ def all_outputs(
         if stop.compliant:
             out[f"{stop.name}.impulse_sum"] = float(extras[own.index(i, Extra.IMPULSE)])
     out |= _links(system, q, v)
+    out |= _stress(equations, peaks, q, v, evaluation)
     out |= others
     return out
 
@@ -114,4 +124,18 @@ def _links(system: System, q: Real, v: Real) -> dict[str, float]:
         for j in group:
             for name, x in zip(names, (q, v), strict=True):
                 out[f"{system.owners[j]}.{name}"] = float(x[j])
+    return out
+
+
+def _stress(
+    equations: Equations, peaks: PeakRecord, q: Real, v: Real, evaluation: Evaluation
+) -> dict[str, float]:
+    """Return the stress of flexures and its peaks."""
+    out, found = {}, stresses(equations, q, v, evaluation)
+    for (name, one), peak in zip(found.items(), peaks.peaks, strict=True):
+        out[f"{name}.stress_start"], out[f"{name}.stress_end"] = one.start, one.end
+        out[f"{name}.stress"] = one.largest
+        out[f"{name}.peak_stress"] = peak.stress
+        out[f"{name}.peak_stress_time"] = peak.time
+        out[f"{name}.peak_stress_position"] = peak.position
     return out

@@ -66,13 +66,13 @@ class Tableau:
         result: Real = self.a.sum(axis=1)
         return result
 
-    @property
+    @cached_property
     def weights(self) -> Real:
         """Weights of the solution, the last row of a."""
         result: Real = self.a[-1]
         return result
 
-    @property
+    @cached_property
     def coarse_error(self) -> Real:
         """Weights of the difference between the solution and the last stage but one."""
         result: Real = self.a[-1] - self.a[-2]
@@ -158,13 +158,12 @@ def stages(tableau: Tableau, f: Rate, t: float, y: Real, h: float, k1: Real) -> 
     >>> round(y1.item(), 12)
     1.0
     """
-    a, c = tableau.a * h, (tableau.c * h).tolist()
-    k = np.empty((len(c), len(y)))
+    k = np.zeros((len(tableau.c), len(y)))
     k[0] = k1
     y1 = y
-    for i in range(1, len(c)):
-        y1 = y + a[i, :i] @ k[:i]
-        k[i] = f(t + c[i], y1)
+    for i, (a, c) in enumerate(zip(h * tableau.a[1:], tableau.c.tolist()[1:], strict=True), 1):
+        y1 = y + a.dot(k)  # Stages from i on are zero.
+        k[i] = f(t + c * h, y1)
     return k, y1
 
 

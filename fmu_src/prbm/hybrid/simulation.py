@@ -27,18 +27,20 @@ from ..base.tolerances import (
 )
 from ..mechanics.arrays import Real
 from ..mechanics.contact_state import ContactState
-from ..mechanics.dynamics import Equations
+from ..mechanics.dynamics import Equations, Evaluation
 from ..mechanics.inputs import WALL_INPUTS, Inputs, Wall, impulse_names
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
+from ..mechanism.parameters import number
 from . import compliant, contact_modes, events, impacts, snapshot, walls
 from .arc import Arc, Node
 from .configuration import Configuration, Magnitudes
 from .events import Event, EventKind, EventWindow
 from .front import Front, Latched
-from .given import changed_values, start_values
+from .given import changed_values, checked_times, start_values
 from .guards import StepView
 from .outputs import Outputs, all_outputs, motions
+from .peaks import PeakRecord
 from .records import Impact
 from .release import released
 from .stability import FastestMode
@@ -107,6 +109,7 @@ class Simulation:
         self.course, at_start = walls.start(self.configuration, self.given, self.time)
         inputs = Inputs.of(mechanism, self.given, at_start)
         self.front = released(self.configuration, inputs, self.time)
+        self.peaks = PeakRecord.at(self.front)
         self.fastest = FastestMode.at(self.front.equations, self.time, self.front.y)
         # The step that leads to the front, the event at its end, and the rates at its end.
         self.arc: Arc | None = None
@@ -213,10 +216,13 @@ class Simulation:
 
         Raises
         ------
+        ParameterError
+            If the time is not a number.
         SimulationError
             If the target time is invalid, the step size becomes too small, too many events
             occur, or more than ``EFFORT_MAX`` integration steps are needed.
         """
+        time = number("time", time, "s")
         if not math.isfinite(time) or time < self.time:
             raise SimulationError(
                 f"cannot simulate from t = {self.time:.12g} s to t = {time:.12g} s: the target "
@@ -233,7 +239,7 @@ class Simulation:
         before, recorded = dict(vars(self)), len(self.record or ())
         try:
             self._advance(time)
-        except Exception:
+        except BaseException:  # Ctrl-C, too.
             vars(self).update(before)
             if self.record is not None:
                 del self.record[recorded:]
@@ -308,6 +314,7 @@ class Simulation:
 
     def _set_front(self, front: Front, counted: list[Impact]) -> None:
         """Continue from a front without the step that led there."""
+        self.peaks = self.peaks.continued(front, reached=front.time >= self.front.time)
         self.front, self.arc, self.pending, self.k1 = front, None, None, None
         if self.record is not None:
             self.record += counted
@@ -315,9 +322,9 @@ class Simulation:
     def _take_step(self) -> None:
         """Take one step from the front, up to the first event within it."""
         self.step_count += 1
-        front, found = compliant.settled(self.configuration, walls.arrived(self.front), self.arc)
+        front, counted = compliant.settled(self.configuration, walls.arrived(self.front), self.arc)
         if front.equations is not self.front.equations:
-            self._set_front(front, found)
+            self._set_front(front, counted)
         self.front = front
         configuration, equations = self.configuration, front.equations
         last = self.arc
@@ -325,19 +332,21 @@ class Simulation:
             self.k1 = equations.rate(front.time, front.y)
         step, controller = take_step(configuration, front, self.k1, self.controller, self.fastest)
         if step.h > STABLE_STEP_WATCH_FACTOR * self.fastest.longest_step(equations):
-            self.fastest = self.fastest.refined(equations, step.factors)
-        n = equations.n
-        arc = Arc(front.time, step.h, front.time + step.h, front.y, step.k, n).following(last)
+            self.fastest = self.fastest.refined(equations, step.last.factors)
+        n, before = equations.n, last.start_before(step.h) if last else None
+        arc = Arc(front.time, step.h, front.time + step.h, front.y, step.k, n, before)
         view = StepView(configuration.scales, equations, arc, step.forces)
         event = events.first_event(view)
+        found: Evaluation | None = None
         if event is None:
-            y, self.k1 = step.y, step.k[-1]
+            y, self.k1, found = step.y, step.k[-1], step.last
         else:
             # The event does not shorten the next step.
             controller = StepSizeController(step.h, controller.last_error)
             event, arc, y = _cut(configuration, event, view)
             self.k1 = None
         self.front = replace(front, time=arc.end, y=y)
+        self.peaks = self.peaks.stepped(self.front, found)
         self.arc, self.pending, self.controller = arc, event, controller
 
     def check_effort(self, step: float) -> None:
@@ -402,8 +411,11 @@ class Simulation:
         """
         if self._output_cache is None or self._output_cache[0] != self.time:
             constant = {"mode.frequency": self.frequency, **self.configuration.calculated}
+            peaks = self.peaks.passed() if self.time >= self.front.time else self.peaks
             front = compliant.latched_until(self.configuration, self.front, self.arc, self.time)
-            out = all_outputs(self.equations, front.latched, self.time, self.state(), constant)
+            out = all_outputs(
+                self.equations, front.latched, peaks, self.time, self.state(), constant
+            )
             self._output_cache = (self.time, out)
         return dict(self._output_cache[1])
 
@@ -429,18 +441,18 @@ class Simulation:
         Raises
         ------
         ParameterError
-            If there is no such output.
+            If there is no such output, or the times are not a list of numbers.
         SimulationError
             As :meth:`advance`; the simulation has then reached the times before.
         """
-        outputs = self.outputs()
+        times, outputs = checked_times(times), self.outputs()
         for name in names:
             if name not in outputs:
                 raise ParameterError(unknown(name, outputs))
         moving = self.motions().keys() >= set(names)
         rows = np.empty((len(times), len(names)))
         for row, t in zip(rows, times, strict=True):
-            self.advance(float(t))
+            self.advance(t)
             out: Mapping[str, float] = self.motions() if moving else self.outputs()
             row[:] = [out[name] for name in names]
         return rows
@@ -467,6 +479,7 @@ class Simulation:
             "arc": snapshot.plain_arc(self.arc),
             "pending": snapshot.plain_event(self.pending),
             "k1": snapshot.plain_array(self.k1),
+            "peaks": asdict(self.peaks),
         }
 
     def restore(self, saved: Mapping[str, Any]) -> None:
@@ -496,6 +509,7 @@ class Simulation:
         self.arc = snapshot.arc_of(saved["arc"])
         self.pending = snapshot.event_of(saved["pending"])
         self.k1 = snapshot.array_of(saved["k1"])
+        self.peaks = snapshot.peaks_of(saved["peaks"])
         self._output_cache = None
 
 

@@ -13,6 +13,7 @@ from .arc import Arc, Node
 from .configuration import Configuration
 from .events import Event, EventKind
 from .front import Front, Latched, Touch
+from .peaks import Peak, PeakRecord, Sample
 from .stability import FastestMode
 from .walls import Course
 
@@ -141,3 +142,16 @@ def plain_array(x: Real | None) -> list[float] | None:
 def array_of(plain: Any) -> Real | None:
     """Return an array from a list, the inverse of :func:`plain_array`."""
     return None if plain is None else np.array(plain)
+
+
+def peaks_of(plain: Mapping[str, Any]) -> PeakRecord:
+    """Return the peaks of the stress from plain values."""
+    peaks = (
+        Peak(p["stress"], p["time"], p["position"], _samples_of(p["last"])) for p in plain["peaks"]
+    )
+    return PeakRecord(tuple(peaks), _samples_of(plain["ahead"]))
+
+
+def _samples_of(plain: Any) -> tuple[Sample, ...]:
+    """Return samples of the stress from plain values."""
+    return tuple(Sample(**sample) for sample in plain)

@@ -10,6 +10,7 @@ Sources
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,7 +33,6 @@ from ..base.tolerances import (
 )
 from ..mechanics.arrays import Real
 from ..mechanics.compliant_stops import Extra
-from ..mechanics.constraints import Factors
 from ..mechanics.dynamics import Equations, Evaluation
 from .configuration import Configuration, Scales
 from .front import Front
@@ -102,8 +102,7 @@ def rounded_step(h: float) -> float:
     return shifted - (shifted - h)
 
 
-@dataclass(frozen=True)
-class Step:
+class Step(NamedTuple):
     """A computed step, not yet accepted.
 
     Parameters
@@ -118,8 +117,8 @@ class Step:
         Error divided by the allowed error.
     forces : (stages - 1, r)
         Constraint forces of all stages but the first [N].
-    factors : Factors
-        Factors of the equations at the end.
+    last : Evaluation
+        Evaluation at the end, before the projection.
     """
 
     h: float
@@ -127,7 +126,7 @@ class Step:
     y: Real
     error: float
     forces: Real
-    factors: Factors
+    last: Evaluation
 
 
 def take_step(
@@ -176,8 +175,9 @@ def take_step(
         controller = controller.next(step.error)
         if step.error <= 1.0:
             # A step that was shortened by a wall does not shorten the next one.
-            whole = wanted if step.h == h < wanted else 0.0
-            return step, replace(controller, h=max(controller.h, whole))
+            if step.h == h < wanted and controller.h < wanted:
+                controller = replace(controller, h=wanted)
+            return step, controller
 
 
 def fixed_step(configuration: Configuration, front: Front, k1: Real) -> Step:
@@ -256,7 +256,7 @@ def compute_step(
             error = max(error, contact_error(configuration.scales, equations, h, k, y, y1))
     error /= STEP_ERROR_FACTOR * configuration.tolerance
     forces = np.array([evaluation.lam for evaluation in evaluations])
-    return Step(h, k, y1, error, forces, evaluations[-1].factors)
+    return Step(h, k, y1, error, forces, evaluations[-1])
 
 
 def projected(configuration: Configuration, equations: Equations, t: float, step: Step) -> Step:
@@ -267,9 +267,9 @@ def projected(configuration: Configuration, equations: Equations, t: float, step
     SimulationError
         If the loops cannot be closed, or as :func:`check_projection`.
     """
-    y = equations.project_near(t + step.h, step.y, step.factors)
+    y = equations.project_near(t + step.h, step.y, step.last.factors)
     check_projection(configuration, t + step.h, step.y, y)
-    return replace(step, y=y)
+    return step._replace(y=y)
 
 
 def check_projection(configuration: Configuration, t: float, y: Real, projected: Real) -> None:
@@ -317,8 +317,9 @@ def step_error(scales: Scales, h: float, k: Real, y: Real, y1: Real) -> float:
     order 7 does [3].  On linear oscillations it is 0.35 to 1.8 times that error, up to the limit of
     stability.
     """
-    fine = error_norm(scales, h * (PAIR.error @ k), y, y1)
-    coarse = error_norm(scales, h * (PAIR.coarse_error @ k), y, y1)
+    scale = scales.of_state(np.maximum(np.abs(y), np.abs(y1)))
+    fine = root_mean_square(h * PAIR.error.dot(k) / scale)
+    coarse = root_mean_square(h * PAIR.coarse_error.dot(k) / scale)
     size = math.sqrt(fine * fine + coarse * coarse)
     return fine * fine / size if size > 0.0 else size
 
@@ -355,5 +356,9 @@ def contact_error(
 
 def error_norm(scales: Scales, difference: Real, y: Real, y1: Real) -> float:
     """Return the root mean square of an error (2 n + 2,), relative to the larger state."""
-    ratio = difference / scales.of_state(np.maximum(np.abs(y), np.abs(y1)))
-    return math.sqrt(float(ratio @ ratio) / len(ratio))
+    return root_mean_square(difference / scales.of_state(np.maximum(np.abs(y), np.abs(y1))))
+
+
+def root_mean_square(x: Real) -> float:
+    """Return the root of the mean square of the elements of an array."""
+    return math.sqrt(float(x.dot(x)) / len(x))

@@ -9,9 +9,18 @@ from collections.abc import Mapping
 
 from ..base.errors import MechanismError
 from ..mechanics.inputs import MOBILITY, impulse_names, input_names
+from ..mechanics.stress import stressed
 from ..mechanism.description import Mechanism
 from .native import NativeInterface
-from .variables import BASE_OUTPUTS, COMPLIANT_OUTPUTS, INDICATORS, LATCHED, STORED
+from .variables import (
+    BASE_OUTPUTS,
+    COMPLIANT_OUTPUTS,
+    INDICATORS,
+    LATCHED,
+    PEAK_OUTPUTS,
+    STORED,
+    STRESS_OUTPUTS,
+)
 
 Dependencies = Mapping[str, tuple[str, ...]]
 
@@ -55,6 +64,9 @@ def dependencies(mechanism: Mechanism, interface: NativeInterface) -> Dependenci
     for stop in (s.name for s in mechanism.stops if s.compliant):
         found |= {f"{stop}.{output}": everything for output in COMPLIANT_OUTPUTS}
         found[f"{stop}.impulse_sum"] = everything
+    for flexure in (mechanism.flexures[i].name for i in stressed(mechanism)):
+        found |= {f"{flexure}.{output}": everything for output in STRESS_OUTPUTS}
+        found |= {f"{flexure}.{output}": () for output in PEAK_OUTPUTS}
     found |= {name: everything for name in interface.indicators}
     found |= {"energy.kinetic": moving, "energy.elastic": shape, "energy.gravitational": shape}
     found |= {name: everything for name in interface.derivatives}

@@ -15,9 +15,10 @@ import numpy as np
 from ..base.errors import MechanismError
 from ..mechanics.assembly import assemble
 from ..mechanics.inputs import input_names
+from ..mechanics.stress import stressed
 from ..mechanism.description import Mechanism
 from ..mechanism.expressions import Affine, Quantity, affine
-from ..mechanism.flexure import ENDS  # of a chain; also pivots of a flexure
+from ..mechanism.flexure import ENDS, PROFILES
 from ..mechanism.parts import (
     GROUND,
     Flexure,
@@ -29,6 +30,7 @@ from ..mechanism.parts import (
     Point,
     Release,
     body_of,
+    field_of,
     fields_of,
 )
 from .native import counter_of, state_derivatives
@@ -40,14 +42,21 @@ from .variables import (
     ENERGIES,
     INDICATORS,
     LATCHED,
+    PEAK_OUTPUTS,
     PROBE_OUTPUTS,
     STOP_OUTPUTS,
+    STRESS_OUTPUTS,
     Variable,
 )
 
 FILE = "mechanism.bin"
-MAGIC, VERSION = b"PRBM", 5
+MAGIC, VERSION = b"PRBM", 7
 HEAD = 16  # Bytes before those that the checksum covers.
+DIMENSIONS = (
+    "end_thickness", "end_width", "notch_radius", "notch_depth", "waist_length", "curvature",
+    "rise",
+)  # fmt: skip
+"""Fields of a flexure type that are not always given, in the order of its fields."""
 STARTS = ("displacement", "angle", "amplitude")  # The starts of a release.
 TYPES = {"Real": 0, "Integer": 1, "Boolean": 2, CLOCK: 3}
 COORDINATES_MAX = 512  # The mass matrix then has 2 MB.
@@ -59,7 +68,8 @@ GROUND_POINTS_MAX = 4096  # The kernel computes the distance of every pair of po
 GROUND_NUMBER = 0  # Bodies are counted from 1.
 SLOT_GROUPS = (
     "parameters", "inputs", "bodies", "stops", "base", "energies", "latched", "compliant", "links",
-    "stretches", "probes", "frequency", "calculated", "derivatives", "indicators", "time",
+    "stretches", "probes", "stresses", "frequency", "calculated", "derivatives", "indicators",
+    "time",
 )  # fmt: skip
 """The groups of values in the order of the vector of all values."""
 FIXED_NAMES = ("gravity.x", "gravity.y", "solver.tolerance", "damping.zeta", "damping.beta")
@@ -166,6 +176,11 @@ def _groups(mechanism: Mechanism, independent: Sequence[int]) -> dict[str, Itera
         "links": links,
         "stretches": stretches,
         "probes": [f"{p.name}.{output}" for p in mechanism.probes for output in PROBE_OUTPUTS],
+        "stresses": [
+            f"{mechanism.flexures[i].name}.{output}"
+            for i in stressed(mechanism)
+            for output in (*STRESS_OUTPUTS, *PEAK_OUTPUTS)
+        ],
         "frequency": ["mode.frequency"],
         "calculated": [f"{name}.gamma0" for name in several],
         "derivatives": state_derivatives(coordinates, independent),
@@ -175,6 +190,13 @@ def _groups(mechanism: Mechanism, independent: Sequence[int]) -> dict[str, Itera
         ],
         "time": ["time"],
     }
+
+
+def _given(part: Part, name: str) -> Quantity:
+    """Return a field that is given, or the expression of its default."""
+    quantity = field_of(part, name)
+    assert quantity is not None
+    return quantity
 
 
 def _u32(*numbers: int) -> bytes:
@@ -296,7 +318,7 @@ class _Writer:
 
     def _fields(self, part: Part) -> bytes:
         names = fields_of(part)
-        return b"".join(self._field(f"{part.name}.{n}", getattr(part, n)) for n in names)
+        return b"".join(self._field(f"{part.name}.{n}", _given(part, n)) for n in names)
 
     def _point(self, point: Point) -> bytes:
         return b"".join(self._expression(affine(coordinate)) for coordinate in point)
@@ -309,8 +331,10 @@ class _Writer:
             self._field(f"{kind.name}.{c.name}", kind.coefficients.get(c.name, c.value))
             for c in model.coefficients
         )
-        flags = _u32(model.lumped, model.rate_with_gamma, kind.axial)
+        flags = _u32(model.lumped, model.rate_with_gamma, kind.axial, kind.stress)
         numbers = flags + _u32(len(model.gamma), model.links, model.order, model.nodes)
+        given = sum(1 << i for i, n in enumerate(DIMENSIONS) if field_of(kind, n) is not None)
+        numbers += _u32(PROFILES.index(kind.profile), given)
         return _text(kind.name) + numbers + self._fields(kind) + b"".join(coefficients)
 
     def _between(self, part: Flexure | Joint) -> bytes:
@@ -331,7 +355,7 @@ class _Writer:
         parts: tuple[Part, ...] = (*m.flexure_types, *m.bodies, *m.frictions, *m.stops, m.release)
         for part in parts:
             for name, (unit, _, minimum, maximum, *_) in fields_of(part).items():
-                quantity = getattr(part, name)
+                quantity = _given(part, name)
                 if isinstance(quantity, str):
                     head = _text(f"{part.name}.{name}") + _text(unit)
                     yield head + self._field(name, quantity) + _f64(minimum, maximum)

@@ -36,13 +36,14 @@ UNITS = {
     "kg": Unit({"kg": 1}, {"g": 1e3}),
     "kg.m2": Unit({"kg": 1, "m": 2}, {"g.mm2": 1e9}),
     "kg/m3": Unit({"kg": 1, "m": -3}, {"g/cm3": 1e-3}),
-    "Pa": Unit({"kg": 1, "m": -1, "s": -2}, {"GPa": 1e-9}),
+    "Pa": Unit({"kg": 1, "m": -1, "s": -2}, {"GPa": 1e-9, "MPa": 1e-6}),
     "N": Unit({"kg": 1, "m": 1, "s": -2}, {"mN": 1e3}),
     "N/m": Unit({"kg": 1, "s": -2}, {"N/mm": 1e-3}),
     "N.m": Unit({"kg": 1, "m": 2, "s": -2}, {"mN.m": 1e3}),
     "N.s": Unit({"kg": 1, "m": 1, "s": -1}, {"mN.s": 1e3}),
     "N.m.s": Unit({"kg": 1, "m": 2, "s": -1}, {"mN.m.s": 1e3}),
     "1/kg": Unit({"kg": -1}),
+    "1/m": Unit({"m": -1}, {"1/mm": 1e-3}),
     "J": Unit({"kg": 1, "m": 2, "s": -2}, {"mJ": 1e3}),
     "W": Unit({"kg": 1, "m": 2, "s": -3}, {"mW": 1e3}),
 }
@@ -81,6 +82,7 @@ QUANTITIES = {
         Quantity("Impulse", "N.s", "mN.s"),
         Quantity("AngularImpulse", "N.m.s", "mN.m.s"),
         Quantity("Mobility", "1/kg"),
+        Quantity("Curvature", "1/m"),
         Quantity("Energy", "J", "mJ"),
         Quantity("Power", "W", "mW"),
     )

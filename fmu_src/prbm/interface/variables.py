@@ -15,6 +15,7 @@ from ..base.errors import MechanismError, ParameterError
 from ..base.names import unknown
 from ..base.tolerances import WALL_MOBILITY_MAX
 from ..mechanics.inputs import MOBILITY, input_units
+from ..mechanics.stress import stressed
 from ..mechanism.description import Mechanism
 from ..mechanism.expressions import affine
 from ..mechanism.parameters import Parameter
@@ -44,6 +45,9 @@ LINK_OUTPUTS = ("angle", "omega")
 STRETCH_OUTPUTS = ("strain", "strain_rate")
 FLEXURE_ANGLE = re.compile(r"^(link\[\d+\]|\w+\.(bend\[\d+\]|start|end))\.angle$")
 FLEXURE_STRAIN = re.compile(r"^\w+(\[\d+\])?\.strain$")
+STRESS_OUTPUTS = ("stress_start", "stress_end", "stress")
+NOMINAL_STRESS = 1e8  # Pa
+PEAK_OUTPUTS = ("peak_stress", "peak_stress_time", "peak_stress_position")
 INDICATORS = ("impact", "release", "slip")  # Event indicators of a stop.
 
 
@@ -277,6 +281,8 @@ def _variables(
     yield from _base(nominal)
     yield from _energies(nominal)
     yield from _flexures(sample, nominal)
+    for i in stressed(mechanism):
+        yield from _stress(mechanism.flexures[i].name, nominal)
     yield Variable(
         "mode.frequency",
         "Fundamental frequency about the static equilibrium under gravity, without stops",
@@ -606,4 +612,31 @@ def _strain(owner: str) -> Iterator[Variable]:
     yield replace(
         strain, name=f"{owner}.strain_rate", description=f"Rate of the strain of {part}",
         unit="1/s", derivative_of=strain.name,
+    )  # fmt: skip
+
+
+def _stress(flexure: str, nominal: Scales) -> Iterator[Variable]:
+    """Yield the stress of a flexure and its peak."""
+
+    def stress(name: str, description: str, minimum: float = -math.inf) -> Variable:
+        found = _output(f"{flexure}.{name}", "Pa", description, nominal, minimum=minimum)
+        return replace(found, nominal=NOMINAL_STRESS, display="MPa")
+
+    for end in ("start", "end"):
+        yield stress(
+            f"stress_{end}",
+            f"Stress at the {end} of the flexure {flexure}, on its left face, seen from start to "
+            "end; positive in tension",
+        )
+    yield stress("stress", f"Largest magnitude of the stress in the flexure {flexure}", 0.0)
+    yield stress(
+        "peak_stress", f"Largest magnitude of the stress in the flexure {flexure} so far", 0.0
+    )
+    yield replace(
+        _output(f"{flexure}.peak_stress_time", "s", f"Time of {flexure}.peak_stress", nominal),
+        nominal=None,
+    )
+    yield _output(
+        f"{flexure}.peak_stress_position", "m", f"Position of {flexure}.peak_stress along the "
+        "flexure, from its start", nominal, minimum=0.0,
     )  # fmt: skip

@@ -39,12 +39,17 @@ LINK = {
     ),
     "windows": ("-shared", "-s"),
     "darwin": ("-fPIC", "-dynamiclib", "-Wl,-install_name,@rpath/prbm_fmu.dylib"),
+    "wasi": (
+        "-mexec-model=reactor", "-s", "-Wl,--export-dynamic", "-Wl,--export=malloc",
+        "-Wl,--export=free",
+    ),
 }  # fmt: skip
 _loaded: dict[str, bytes] = {}  # Libraries of this process by the names of their cache entries.
 ERROR_LINES_MAX = 6  # Lines of a compiler's output in an error message.
 TEMPORARY = ("TMPDIR", "TMP", "TEMP")  # Variables that name the folder of a compiler's files.
 MAGIC = b"prbm library\n"
 OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
+OTHER_FOLDER = "set the environment variable TMPDIR to a folder that you can write to"
 INSTALL = (
     "install one (on Debian or Ubuntu 'apt install gcc', on macOS 'xcode-select --install'), or "
     "the compiler of the Python package ziglang with 'python -m pip install ziglang'"
@@ -78,6 +83,7 @@ class Product:
 FMU = Product("prbm_fmu")  # The library of native FMUs.
 ENGINE = Product("prbm_engine", ("-DPRBM_ENGINE",))  # The library of the Python package.
 PRODUCTS = (FMU, ENGINE)
+LIVE = Product("prbm_live", ENGINE.flags)  # The module of live pages, for web browsers.
 
 
 @dataclass(frozen=True)
@@ -118,6 +124,8 @@ PLATFORMS = {
         Platform("aarch64-darwin", "aarch64-darwin", ".dylib", "aarch64-macos.11.0"),
     )
 }
+BROWSER = Platform("wasm32-wasi", "wasm32-wasi", ".wasm", "wasm32-wasi")
+"""WebAssembly, the platform of live pages.  FMUs have no libraries for it."""
 SYSTEMS = {"linux": "linux", "win32": "windows", "darwin": "darwin"}
 MACHINES = {"x86_64": "x86_64", "amd64": "x86_64", "aarch64": "aarch64", "arm64": "aarch64"}
 
@@ -156,7 +164,7 @@ def libraries(
     DamagedLibraryError
         If a library of the installed package is damaged.
     """
-    result, files = {}, kernel()
+    result, files = {}, _sources()
     for name in platforms:
         if name == HOST:
             here = _host()
@@ -170,6 +178,41 @@ def libraries(
             chosen, _zig(chosen), product, files, progress
         )
     return result
+
+
+def _sources() -> dict[str, bytes]:
+    """Return the files of the kernel."""
+    try:
+        return kernel()
+    except OSError as error:
+        raise CompilerError(
+            f"{error.filename} cannot be read ({error.strerror}): correct the permissions of the "
+            "installed package, or install it again"
+        ) from None
+
+
+def browser_module(progress: Callable[[str], None] = lambda step: None) -> bytes:
+    """Return the kernel as a WebAssembly module without imports, with the functions of engine.h.
+
+    It is the same for every mechanism: the tables are passed in its memory.
+
+    Raises
+    ------
+    NoCompilerError
+        If the installed package has no module, and ziglang is not installed.
+    CompilerError
+        If ziglang fails.
+    DamagedLibraryError
+        If the module of the installed package is damaged.
+    """
+    files = _sources()
+    found = prebuilt(f"{BROWSER.name}/{LIVE.name}{BROWSER.suffix}", files)
+    if found is None and importlib.util.find_spec("ziglang") is None:
+        raise NoCompilerError(
+            "a page that simulates its mechanism needs the compiler of the Python package "
+            "ziglang: install it with 'python -m pip install ziglang'"
+        )
+    return found or _library(BROWSER, _zig(BROWSER), LIVE, files, progress)
 
 
 def _prebuilt(wanted: Platform, product: Product, files: Mapping[str, bytes]) -> bytes | None:
@@ -337,33 +380,42 @@ def compiled(job: Job) -> bytes:
     Raises
     ------
     CompilerError
-        If the compiler fails.
+        If the compiler fails, or the temporary folder cannot be written.
     """
+    try:
+        with tempfile.TemporaryDirectory(prefix="prbm_") as name:
+            for file, content in job.files.items():
+                path = Path(name, file)
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(content)
+            return _run(job, Path(name))
+    except OSError as error:
+        raise CompilerError(
+            f"the kernel cannot be compiled in a temporary folder ({error.strerror or error}): "
+            f"{OTHER_FOLDER}"
+        ) from None
+
+
+def _run(job: Job, folder: Path) -> bytes:
+    """Return the library that a compiler makes of the sources in a folder."""
     compiler, libraries = job.compiler, () if job.platform.system == "windows" else ("-lm",)
-    with tempfile.TemporaryDirectory(prefix="prbm_") as name:
-        folder = Path(name)
-        for file, content in job.files.items():
-            (folder / file).parent.mkdir(parents=True, exist_ok=True)
-            (folder / file).write_bytes(content)
-        environment = os.environ | {"LC_ALL": "C"} | dict.fromkeys(TEMPORARY, name)
-        if compiler.name == "ziglang":
-            environment |= _zig_folders(folder)
-        try:
-            done = subprocess.run(
-                [*compiler.command, *job.arguments, *libraries], cwd=folder,
-                capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL,
-                errors="replace", env=environment,
-            )  # fmt: skip
-            made = (folder / job.output).read_bytes()
-        except FileNotFoundError:
-            made = b""
-        except OSError as error:
-            raise CompilerError(
-                f"{compiler.name} cannot be run ({error.strerror}); {INSTALL}"
-            ) from None
-    if done.returncode != 0 or not made:
+    environment = os.environ | {"LC_ALL": "C"} | dict.fromkeys(TEMPORARY, str(folder))
+    if compiler.name == "ziglang":
+        environment |= _zig_folders(folder)
+    try:
+        done = subprocess.run(
+            [*compiler.command, *job.arguments, *libraries], cwd=folder,
+            capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL,
+            errors="replace", env=environment,
+        )  # fmt: skip
+    except OSError as error:
+        raise CompilerError(
+            f"{compiler.name} cannot be run ({error.strerror}); {INSTALL}"
+        ) from None
+    made = folder / job.output
+    if done.returncode != 0 or not (made.is_file() and made.stat().st_size):
         raise CompilerError(_failure(job.platform, compiler, done))
-    return made
+    return made.read_bytes()
 
 
 def _zig_folders(folder: Path) -> dict[str, str]:

@@ -1,4 +1,5 @@
 /* Co-simulation: the simulation integrates itself from one communication point to the next. */
+#include <limits.h>
 #include <math.h>
 #include <string.h>
 
@@ -8,6 +9,7 @@
 #include "hybrid/contact_modes.h"
 #include "hybrid/events.h"
 #include "hybrid/impacts.h"
+#include "hybrid/peaks.h"
 #include "hybrid/simulation.h"
 #include "hybrid/snapshot.h"
 #include "hybrid/stepping.h"
@@ -20,6 +22,9 @@
 static bool leave_arc(Simulation *sim, bool shown, Problem *problem) {
     State *state = &sim->state;
     bool within = state->arc.valid && state->time < state->front_time;
+    if (within) {
+        drop_peaks(sim);
+    }
     bool ok = latch_peaks(sim, state->time, problem);
     if (!ok) {
         return false;
@@ -27,7 +32,8 @@ static bool leave_arc(Simulation *sim, bool shown, Problem *problem) {
     if (within && !shown) {
         ok = end_step(sim, state->time, problem);
     } else {
-        ok = arc_state(sim, state->front, &sim->present.reference, &sim->at_front, problem);
+        ok = arc_state(sim, state->front, sim->present.e, &sim->present.reference, &sim->at_front,
+                       problem);
         state->front_time = state->time;
     }
     state->arc.valid = state->has_k1 = false;
@@ -43,7 +49,8 @@ static void take_inputs(Simulation *sim) {
 /* Continue from the front with the inputs that have been set. */
 static bool restart(Simulation *sim, Problem *problem) {
     take_inputs(sim);
-    return reject_unsupported(sim, problem) && receive_impulses(sim, problem) && settle_moved(sim, problem);
+    return reject_unsupported(sim, problem) && receive_impulses(sim, problem) &&
+           settle_moved(sim, problem) && restart_peaks(sim, problem);
 }
 
 static bool event_due(const State *state, double time) {
@@ -57,7 +64,7 @@ static bool apply_pending(Simulation *sim, Problem *problem) {
     }
     sim->state.arc.valid = false;
     sim->state.pending.kind = EVENT_NONE;
-    return apply_event(sim, &event, problem);
+    return apply_event(sim, &event, problem) && restart_peaks(sim, problem);
 }
 
 /* Reject a target time in the past or more than STEPS_MAX steps ahead. */
@@ -78,6 +85,15 @@ static bool check_time(const Simulation *sim, double time, Problem *problem) {
     return true;
 }
 
+/* Whether the motion goes on: nothing has been set, and all walls rest on their references. */
+static bool goes_on(const Simulation *sim) {
+    bool rest = true;
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        rest = rest && sim->state.walls[i].rate == 0.0 && sim->state.walls[i].span == 0.0;
+    }
+    return rest && sim->untouched;
+}
+
 /* Begin a communication step: join the walls to their references, and apply changed inputs and
  * parameters.  A step that was interrupted at an event keeps its references, unless an input of a
  * wall or a parameter has changed. */
@@ -85,7 +101,14 @@ static bool begin_step(Simulation *sim, double time, Problem *problem) {
     State *state = &sim->state;
     size_t bytes = (size_t)system_of(sim)->s * sizeof(Wall);
     Wall joined[STOPS_MAX];
+    if (goes_on(sim)) {
+        if (!state->interrupted) {
+            (void)pass_point(sim, time);
+        }
+        return true;
+    }
     bool set = values_changed(sim);
+    sim->untouched = true;
     if (set || !state->interrupted || walls_changed(sim)) {
         join_walls(sim, time, set, joined);
     } else {
@@ -103,10 +126,13 @@ static bool begin_step(Simulation *sim, double time, Problem *problem) {
     return restart(sim, problem);
 }
 
-/* Whether to return before the end of a communication step: after an internal step, at an event. */
+/* When to return before the end of a communication step. */
 typedef struct {
-    bool steps, events;
+    bool events; /* at an event */
+    int steps;   /* after so many integration steps */
 } Stops;
+
+typedef enum { REACHED, AT_EVENT, AFTER_STEPS } Ending;
 
 /* Reject a target time that has not been reached after the given number of integration steps. */
 static bool check_effort(const State *state, double time, int steps, Problem *problem) {
@@ -120,46 +146,71 @@ static bool check_effort(const State *state, double time, int steps, Problem *pr
                 time, EFFORT_MAX, state->front_time, state->step_size);
 }
 
-static bool advance(Simulation *sim, double time, Stops stops, bool *event, Problem *problem) {
+/* Continue a communication step that has begun.  *effort: integration steps since it began. */
+static bool proceed(Simulation *sim, double time, Stops stops, int *effort, Ending *ending,
+                    Problem *problem) {
     State *state = &sim->state;
-    *event = false;
-    if (!begin_step(sim, time, problem)) {
-        return false;
-    }
-    state->interrupted = false;
-    int effort = 0;
-    for (bool stepped = false;; stepped = true) {
+    for (int steps = 0;; steps++) {
         if (event_due(state, time)) {
+            *ending = AT_EVENT;
             if (stops.events && state->pending.kind != EVENT_SWITCH) {
-                *event = true;
-                state->time = state->pending.time;
-                state->interrupted = state->time < time;
                 return true;
             }
             if (!apply_pending(sim, problem)) {
                 return false;
             }
         }
-        if (state->front_time >= time) {
-            break;
-        }
-        if (stops.steps && stepped) {
-            state->time = state->front_time;
-            state->interrupted = true;
+        *ending = state->front_time >= time ? REACHED : AFTER_STEPS;
+        if (*ending == REACHED || steps >= stops.steps) {
             return true;
         }
-        if (!check_effort(state, time, effort++, problem) || !take_step(sim, problem)) {
+        if (!check_effort(state, time, (*effort)++, problem) || !take_step(sim, problem)) {
             return false;
         }
     }
-    state->time = time;
+}
+
+/* Set the time at which a call ends that has not reached the end of the communication step. */
+static void interrupt(State *state, double now, double time) {
+    state->time = now;
+    state->interrupted = now < time;
+}
+
+static bool advance_some(Simulation *sim, double time, Stops stops, bool *event,
+                         Problem *problem) {
+    State *state = &sim->state;
+    Ending ending;
+    int effort = 0;
+    if (!begin_step(sim, time, problem)) {
+        return false;
+    }
+    state->interrupted = false;
+    if (!proceed(sim, time, stops, &effort, &ending, problem)) {
+        return false;
+    }
+    *event = ending == AT_EVENT;
+    switch (ending) {
+    case AT_EVENT: interrupt(state, state->pending.time, time); break;
+    case AFTER_STEPS: interrupt(state, state->front_time, time); break;
+    default: state->time = time;
+    }
     return true;
+}
+
+/* Prepare a communication step to a time: keep a backup, unless nothing can fail because the time
+ * is within the latest integration step, no event is due and nothing has been set. */
+static void prepare_step(Simulation *sim, double time) {
+    bool known = time <= sim->state.front_time && goes_on(sim) && !event_due(&sim->state, time);
+    sim->present.fresh = NOTHING;
+    if (!known) {
+        keep_backup(sim);
+    }
 }
 
 PRBM bool simulation_advance_some(Simulation *simulation, double time, bool each, bool *event,
                                   Problem *problem) {
     Simulation *sim = simulation;
-    const Stops stops = {each, true};
+    const Stops stops = {true, each ? 1 : INT_MAX};
     *event = false;
     if (!check_time(sim, time, problem)) {
         return false;
@@ -168,24 +219,57 @@ PRBM bool simulation_advance_some(Simulation *simulation, double time, bool each
         *event = event_due(&sim->state, time);
         return true;
     }
-    keep_backup(sim);
-    sim->present.fresh = NOTHING;
-    return attempt(sim, advance(sim, time, stops, event, problem), problem);
+    prepare_step(sim, time);
+    return attempt(sim, advance_some(sim, time, stops, event, problem), problem);
+}
+
+/* Begin a communication step at its first part, and continue it by a number of steps. */
+static bool advance_part(Simulation *sim, double time, int steps, int *effort, bool *reached,
+                         Problem *problem) {
+    State *state = &sim->state;
+    Ending ending;
+    if (*effort == 0) {
+        if (!begin_step(sim, time, problem)) {
+            return false;
+        }
+        state->interrupted = false;
+    }
+    if (!proceed(sim, time, (Stops){false, steps}, effort, &ending, problem)) {
+        return false;
+    }
+    *reached = ending == REACHED;
+    if (*reached) {
+        state->time = time;
+    }
+    return true;
+}
+
+PRBM bool simulation_advance_part(Simulation *simulation, double time, int steps, int *effort,
+                                  bool *reached, Problem *problem) {
+    Simulation *sim = simulation;
+    *reached = false;
+    if (*effort == 0) {
+        if (!check_time(sim, time, problem)) {
+            return false;
+        }
+        if (time == sim->state.time) {
+            *reached = true;
+            return true;
+        }
+        prepare_step(sim, time);
+    }
+    return attempt(sim, advance_part(sim, time, steps, effort, reached, problem), problem);
+}
+
+PRBM void simulation_abandon(Simulation *simulation) {
+    Problem ignored;
+    (void)attempt(simulation, false, &ignored);
 }
 
 PRBM bool simulation_advance(Simulation *simulation, double time, Problem *problem) {
-    Simulation *sim = simulation;
-    const Stops never = {false, false};
-    bool event;
-    if (!check_time(sim, time, problem)) {
-        return false;
-    }
-    if (time == sim->state.time) {
-        return true;
-    }
-    keep_backup(sim);
-    sim->present.fresh = NOTHING;
-    return attempt(sim, advance(sim, time, never, &event, problem), problem);
+    int effort = 0;
+    bool reached;
+    return simulation_advance_part(simulation, time, INT_MAX, &effort, &reached, problem);
 }
 
 /* --- event mode ------------------------------------------------------------------------------- */

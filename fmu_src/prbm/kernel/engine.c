@@ -3,12 +3,14 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/modal.h"
 #include "core/tables.h"
 #include "engine.h"
 #include "hybrid/simulation.h"
 #include "values.h"
 
 enum { FIRST_IMPACTS = 16 }; /* number of impacts for which there is memory at first */
+enum { CALL_STEPS = 50, CALL_COORDINATES = 30 }; /* steps of a call, up to so many coordinates */
 
 struct Engine {
     Simulation *simulation;
@@ -16,6 +18,8 @@ struct Engine {
     double *record;   /* (room, ENGINE_IMPACT + 3 n) */
     int count, room;  /* numbers of impacts */
     bool incomplete;  /* an impact could not be recorded */
+    int effort;       /* integration steps of an advance that is unfinished, 0: none is */
+    int before;       /* number of impacts before it */
 };
 
 static bool succeed(bool ok, const Problem *problem, char *message) {
@@ -141,20 +145,44 @@ EXPORTED bool prbm_check_step(const Engine *engine, double step, char *message) 
     return succeed(simulation_check_step(engine->simulation, step, &problem), &problem, message);
 }
 
+/* Integration steps in one call.  The time of a step grows with n^3. */
+static int steps_of_call(int n) {
+    double ratio = n / (double)CALL_COORDINATES;
+    return ratio > 1.0 ? 1 + (int)(CALL_STEPS / (ratio * ratio * ratio)) : CALL_STEPS;
+}
+
 EXPORTED int prbm_advance(Engine *engine, double time, char *message) {
     Problem problem = {""};
-    int before = engine->count;
-    engine->incomplete = false;
-    bool ok = simulation_advance(engine->simulation, time, &problem);
+    Simulation *sim = engine->simulation;
+    bool reached;
+    if (engine->effort == 0) {
+        engine->before = engine->count;
+        engine->incomplete = false;
+    }
+    bool ok = simulation_advance_part(sim, time, steps_of_call(engine->n), &engine->effort,
+                                      &reached, &problem);
     if (ok && engine->incomplete) {
+        simulation_abandon(sim);
         ok = fail(&problem, "there is not enough memory to record the impacts up to "
                             "t = %.9g s: simulate in shorter parts", time);
     }
+    if (ok && !reached) {
+        return ENGINE_UNFINISHED;
+    }
+    engine->effort = 0;
     if (!succeed(ok, &problem, message)) {
-        engine->count = before;
+        engine->count = engine->before;
         return -1;
     }
     return engine->count;
+}
+
+EXPORTED void prbm_abandon(Engine *engine) {
+    if (engine->effort > 0) {
+        simulation_abandon(engine->simulation);
+        engine->count = engine->before;
+        engine->effort = 0;
+    }
 }
 
 EXPORTED bool prbm_values(Engine *engine, int count, const int *slots, double *values,
@@ -168,13 +196,22 @@ EXPORTED bool prbm_values(Engine *engine, int count, const int *slots, double *v
 }
 
 EXPORTED int prbm_sample(Engine *engine, int samples, const double *times, int count,
-                         const int *slots, double *values, char *message) {
-    for (int i = 0; i < samples; i++) {
-        double *row = values + (size_t)i * (size_t)count;
-        if (prbm_advance(engine, times[i], message) < 0 ||
-            !prbm_values(engine, count, slots, row, message)) {
+                         const int *slots, double *values, int *done, char *message) {
+    double first = simulation_steps(engine->simulation) + *done;
+    int most = steps_of_call(engine->n);
+    while (*done < samples) {
+        if (simulation_steps(engine->simulation) + *done - first >= most) {
+            return ENGINE_UNFINISHED;
+        }
+        int impacts = prbm_advance(engine, times[*done], message);
+        if (impacts < 0) {
+            return impacts;
+        }
+        double *row = values + (size_t)*done * (size_t)count;
+        if (!prbm_values(engine, count, slots, row, message)) {
             return -1;
         }
+        ++*done;
     }
     return engine->count;
 }
@@ -199,6 +236,65 @@ EXPORTED double prbm_steps(const Engine *engine) {
 
 EXPORTED int prbm_coordinates(const Engine *engine) {
     return engine->n;
+}
+
+/* --- drawings --------------------------------------------------------------------------------- */
+
+EXPORTED int prbm_point_count(const Engine *engine) {
+    const System *system = system_of(engine->simulation);
+    return system->corner_count + 2 * system->b;
+}
+
+/* Write the point c + A e, and return the next address. */
+static double *write_point(Complex c, int d, const Complex *A, const Complex *e, double *to) {
+    for (int j = 0; j < d; j++) {
+        c = plus(c, product(A[j], e[j]));
+    }
+    to[0] = c.re;
+    to[1] = c.im;
+    return to + 2;
+}
+
+EXPORTED void prbm_points(Engine *engine, const double *q, double *points) {
+    Simulation *sim = engine->simulation;
+    const System *system = system_of(sim);
+    size_t mark = sim->scratch.used;
+    int d = system->d;
+    Complex *e = take_complex(&sim->scratch, d, 1);
+    directions(system, q, e);
+    for (int i = 0; i < system->corner_count; i++) {
+        points = write_point(system->corners_c[i], d, system->corners + i * d, e, points);
+    }
+    for (int i = 0; i < system->b; i++) {
+        const BodyFrame *frame = &system->bodies[i];
+        points = write_point(frame->c, d, frame->A, e, points);
+        *points++ = e[frame->arm].re;
+        *points++ = e[frame->arm].im;
+    }
+    sim->scratch.used = mark;
+}
+
+EXPORTED int prbm_mode_count(const Engine *engine) {
+    const System *system = system_of(engine->simulation);
+    return system->n - system->r;
+}
+
+EXPORTED int prbm_modes(Engine *engine, double *q, double *frequencies, double *shapes,
+                        char *message) {
+    Problem problem = {""};
+    Simulation *sim = engine->simulation;
+    const System *system = system_of(sim);
+    size_t mark = sim->scratch.used;
+    int n = system->n, count = prbm_mode_count(engine);
+    Equilibrium shape = {q, take(&sim->scratch, (size_t)system->r), 0.0};
+    double *phi = take_matrix(&sim->scratch, n, count);
+    bool ok = equilibrium(system, false, 0.0, &shape, &sim->scratch, &problem) &&
+              modes(system, &shape, frequencies, phi, &sim->scratch, &problem);
+    for (int i = 0; ok && i < n * count; i++) {
+        shapes[i % count * n + i / count] = phi[i];
+    }
+    sim->scratch.used = mark;
+    return succeed(ok, &problem, message) ? count : -1;
 }
 
 /* --- saving and restoring --------------------------------------------------------------------- */

@@ -30,21 +30,40 @@ EXPORTED bool prbm_set(Engine *engine, int first, int count, const double *value
 /* Start the motion.  If the tolerance is 0, solver.tolerance is used. */
 EXPORTED bool prbm_start(Engine *engine, double start_time, double tolerance, char *message);
 EXPORTED bool prbm_check_step(const Engine *engine, double step, char *message);
-/* Simulate to a time.  Return the number of recorded impacts, -1 on failure.  A failure leaves the
- * simulation and the record unchanged. */
+/* Simulate to a time.  Return the number of recorded impacts, -1 on failure.  A failure, also one
+ * of memory for the record, leaves the simulation and the record unchanged.  A call returns after
+ * some milliseconds, so that the caller can be interrupted: after ENGINE_UNFINISHED, call the
+ * function again with the same time, or prbm_abandon. */
 EXPORTED int prbm_advance(Engine *engine, double time, char *message);
+enum { ENGINE_UNFINISHED = -2 };
+/* Restore simulation and record as before an advance that is unfinished, if there is one. */
+EXPORTED void prbm_abandon(Engine *engine);
 /* Get the values of slots (count,) at the present time. */
 EXPORTED bool prbm_values(Engine *engine, int count, const int *slots, double *values,
                           char *message);
 /* Simulate to each of several times, and get the values of slots (samples, count) there.  Return
- * the number of recorded impacts, -1 on failure at a time; the times before have been reached. */
+ * the number of recorded impacts, -1 on failure at a time; the times before have been reached.
+ * *done: number of times that have been reached, 0 at first.  After ENGINE_UNFINISHED, call the
+ * function again with the same arguments, or prbm_abandon. */
 EXPORTED int prbm_sample(Engine *engine, int samples, const double *times, int count,
-                         const int *slots, double *values, char *message);
+                         const int *slots, double *values, int *done, char *message);
 /* Get the present state (2 n + 2,): angles, rates, dissipated energy and work. */
 EXPORTED bool prbm_state(Engine *engine, double *y, char *message);
 EXPORTED double prbm_time(const Engine *engine);  /* present time [s] */
 EXPORTED double prbm_steps(const Engine *engine); /* integration steps so far */
 EXPORTED int prbm_coordinates(const Engine *engine); /* n */
+
+/* The points of a drawing: the corners of the flexures in the order of the assembly, then the
+ * centre and the arm of each body.  A beam has its nodes only as corners. */
+EXPORTED int prbm_point_count(const Engine *engine);
+/* Compute the points (point_count, 2) at coordinates q (n,) for the parameters of the start. */
+EXPORTED void prbm_points(Engine *engine, const double *q, double *points);
+/* Compute the modes about the equilibrium under gravity: its coordinates q (n,), frequencies [Hz]
+ * in ascending order, negative if unstable, and the coordinates of each mode (modes, n).  Return
+ * the number of modes, -1 on failure. */
+EXPORTED int prbm_mode_count(const Engine *engine);
+EXPORTED int prbm_modes(Engine *engine, double *q, double *frequencies, double *shapes,
+                        char *message);
 
 /* Record the impacts from now on, or no longer. */
 EXPORTED void prbm_record(Engine *engine, bool record);

@@ -123,7 +123,10 @@ enum { EFFORT_MAX = 1000000 };
 #define LOWEST_BOUNCE_RTOL 1e-10
 #define INDICATOR_LEAD_RTOL 0.01
 #define DEPENDENT_PIVOT_RTOL 1e-07
+#define NOTCH_PEAK_FACTOR 0.7
+enum { FINE_POINTS = 8 };
 enum { GAUSS_ITERATIONS_MAX = 8 };
+#define STRESS_TIE_RTOL 1e-09
 
 /* --- prbm.mechanics.contact_state --------------------------------------------------------------- */
 
@@ -170,10 +173,17 @@ enum { LINKS_MAX = 200 };
 enum { ORDER_MAX = 12 };
 enum { NODES_EXTRA_MIN = 2 };
 enum { NODES_MAX = 24 };
+enum { THICK_NODES = 2 };
+enum { FILLET_NODES = 4 };
+typedef enum {
+    PROFILE_LEAF = 0,
+    PROFILE_TAPER = 1,
+    PROFILE_NOTCH = 2,
+} Profile;
 
 /* --- prbm.interface.tables ---------------------------------------------------------------------- */
 
-enum { TABLES_VERSION = 5 };
+enum { TABLES_VERSION = 7 };
 enum { TABLES_HEAD = 16 };
 enum { COORDINATES_MAX = 512 };
 enum { DIRECTIONS_MAX = 1024 };
@@ -194,12 +204,13 @@ typedef enum {
     SLOTS_LINKS = 8,
     SLOTS_STRETCHES = 9,
     SLOTS_PROBES = 10,
-    SLOTS_FREQUENCY = 11,
-    SLOTS_CALCULATED = 12,
-    SLOTS_DERIVATIVES = 13,
-    SLOTS_INDICATORS = 14,
-    SLOTS_TIME = 15,
-    SLOTS_GROUPS = 16,
+    SLOTS_STRESSES = 11,
+    SLOTS_FREQUENCY = 12,
+    SLOTS_CALCULATED = 13,
+    SLOTS_DERIVATIVES = 14,
+    SLOTS_INDICATORS = 15,
+    SLOTS_TIME = 16,
+    SLOTS_GROUPS = 17,
 } SlotGroup;
 typedef enum {
     REAL = 0,
@@ -207,6 +218,16 @@ typedef enum {
     BOOLEAN = 2,
     CLOCK = 3,
 } VariableType;
+typedef enum {
+    DIMENSION_END_THICKNESS = 0,
+    DIMENSION_END_WIDTH = 1,
+    DIMENSION_NOTCH_RADIUS = 2,
+    DIMENSION_NOTCH_DEPTH = 3,
+    DIMENSION_WAIST_LENGTH = 4,
+    DIMENSION_CURVATURE = 5,
+    DIMENSION_RISE = 6,
+    DIMENSION_COUNT = 7,
+} Dimension;
 typedef enum {
     START_DISPLACEMENT = 0,
     START_ANGLE = 1,
@@ -283,6 +304,15 @@ typedef enum {
     PROBE_VY = 3,
 } ProbeOutput;
 enum { PER_PROBE = 4 };
+typedef enum {
+    STRESS_STRESS_START = 0,
+    STRESS_STRESS_END = 1,
+    STRESS_STRESS = 2,
+    STRESS_PEAK_STRESS = 3,
+    STRESS_PEAK_STRESS_TIME = 4,
+    STRESS_PEAK_STRESS_POSITION = 5,
+} StressOutput;
+enum { PER_STRESS = 6 };
 typedef enum {
     INDICATOR_IMPACT = 0,
     INDICATOR_RELEASE = 1,

@@ -29,13 +29,24 @@ from ..interface.variables import (
     INDICATORS,
     LATCHED,
     LINK_OUTPUTS,
+    PEAK_OUTPUTS,
     PROBE_OUTPUTS,
     STOP_OUTPUTS,
+    STRESS_OUTPUTS,
     STRETCH_OUTPUTS,
 )
 from ..mechanics.contact_state import ContactMode, Phase
 from ..mechanics.inputs import BASE_AXES, INPUT_GROUPS, LOADS, WALL_INPUTS
-from ..mechanism.flexure import ENDS, LINKS_MAX, NODES_EXTRA_MIN, NODES_MAX, ORDER_MAX
+from ..mechanism.flexure import (
+    ENDS,
+    FILLET_NODES,
+    LINKS_MAX,
+    NODES_EXTRA_MIN,
+    NODES_MAX,
+    ORDER_MAX,
+    PROFILES,
+    THICK_NODES,
+)
 from ..mechanism.parts import LENGTH_MIN
 
 PATH = Path(__file__).with_name("generated.h")
@@ -76,6 +87,9 @@ def header() -> str:
                 _constant("ORDER_MAX", ORDER_MAX),
                 _constant("NODES_EXTRA_MIN", NODES_EXTRA_MIN),
                 _constant("NODES_MAX", NODES_MAX),
+                _constant("THICK_NODES", THICK_NODES),
+                _constant("FILLET_NODES", FILLET_NODES),
+                _enumeration("Profile", "PROFILE", _numbers(PROFILES)),
             ],
         ),
         _section(tables, _tables()),
@@ -147,6 +161,7 @@ def _tables() -> Iterator[str]:
     yield _constant("GROUND", tables.GROUND_NUMBER)
     yield _enumeration("SlotGroup", "SLOTS", _counted(tables.SLOT_GROUPS))
     yield _enumeration("VariableType", "", tables.TYPES)
+    yield _enumeration("Dimension", "DIMENSION", _numbers((*tables.DIMENSIONS, "count")))
     yield _enumeration("ReleaseStart", "START", _numbers((*tables.STARTS, "count")))
 
 
@@ -162,6 +177,7 @@ def _groups() -> Iterator[str]:
         ("LINK", LINK_OUTPUTS),
         ("STRETCH", STRETCH_OUTPUTS),
         ("PROBE", PROBE_OUTPUTS),
+        ("STRESS", (*STRESS_OUTPUTS, *PEAK_OUTPUTS)),
     ):
         yield _enumeration(f"{name.capitalize()}Output", name, _numbers(outputs))
         yield _constant(f"PER_{name}", len(outputs))

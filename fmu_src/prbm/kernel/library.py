@@ -8,13 +8,13 @@ import hashlib
 import logging
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import cache
 from pathlib import Path
 
 from ..base.atomic import write
 from ..base.errors import PrbmError
-from .compiler import ENGINE, HOST, libraries, private_cache, trusted
+from .compiler import ENGINE, HOST, OTHER_FOLDER, libraries, private_cache, trusted
 
 MESSAGE_LENGTH = 640  # Bytes of an error message, PROBLEM_LENGTH in C.
 
@@ -29,14 +29,19 @@ FUNCTIONS = {
     "prbm_start": (_bool, _address, _double, _double, _bytes),
     "prbm_check_step": (_bool, _address, _double, _bytes),
     "prbm_advance": (_int, _address, _double, _bytes),
+    "prbm_abandon": (None, _address),
     "prbm_values": (_bool, _address, _int, _address, _address, _bytes),
     "prbm_sample": (
-        _int, _address, _int, _address, _int, _address, _address, _bytes,
+        _int, _address, _int, _address, _int, _address, _address, _address, _bytes,
     ),
     "prbm_state": (_bool, _address, _address, _bytes),
     "prbm_time": (_double, _address),
     "prbm_steps": (_double, _address),
     "prbm_coordinates": (_int, _address),
+    "prbm_point_count": (_int, _address),
+    "prbm_points": (None, _address, _address, _address),
+    "prbm_mode_count": (_int, _address),
+    "prbm_modes": (_int, _address, _address, _address, _address, _bytes),
     "prbm_record": (None, _address, _bool),
     "prbm_impacts": (None, _address, _address),
     "prbm_saved_count": (_size, _address),
@@ -60,11 +65,18 @@ def library() -> ctypes.CDLL:
     ------
     CompilerError
         If there is no compiler, or it fails.
+    DamagedLibraryError
+        If the library of the installed package is damaged.
     LibraryError
         If the library cannot be loaded.
     """
     ((platform, content),) = libraries([HOST], log.warning, ENGINE).items()
-    with _file(content, platform.suffix) as path:
+    return _loaded(content, platform.suffix)
+
+
+def _loaded(content: bytes, suffix: str) -> ctypes.CDLL:
+    """Return a library from the content of its file, with the types of its functions."""
+    with _file(content, suffix) as path:
         try:
             loaded = ctypes.CDLL(str(path))
         except OSError as error:
@@ -86,10 +98,17 @@ def _file(content: bytes, suffix: str) -> Iterator[Path]:
         if _kept(path, content):
             yield path
             return
-    # A loaded library cannot be removed on Windows; it remains in the temporary folder there.
-    with tempfile.TemporaryDirectory(prefix="prbm_", ignore_cleanup_errors=True) as name:
-        path = Path(name) / f"prbm_engine{suffix}"
-        path.write_bytes(content)
+    with ExitStack() as stack:
+        try:
+            # A loaded library cannot be removed on Windows; it remains in the folder there.
+            temporary = tempfile.TemporaryDirectory(prefix="prbm_", ignore_cleanup_errors=True)
+            path = Path(stack.enter_context(temporary)) / f"prbm_engine{suffix}"
+            path.write_bytes(content)
+        except OSError as error:
+            raise LibraryError(
+                "the compiled kernel cannot be written to a temporary folder "
+                f"({error.strerror or error}): {OTHER_FOLDER}"
+            ) from None
         yield path
 
 

@@ -10,6 +10,7 @@
 #include "hybrid/events.h"
 #include "hybrid/guards.h"
 #include "hybrid/impacts.h"
+#include "hybrid/peaks.h"
 #include "hybrid/present.h"
 #include "hybrid/rest.h"
 #include "hybrid/simulation.h"
@@ -236,6 +237,9 @@ PRBM bool exchange_completed_step(Simulation *simulation, bool *event, Problem *
         return false;
     }
     accept(sim);
+    step_peaks(sim, now.evaluation);
+    pass_peaks(sim);
+    sim->present.fresh &= ~STRESSES;
     *event = drift(sim, &now.at) > DRIFT_RTOL;
     return true;
 }
@@ -359,6 +363,19 @@ static bool apply_due_events(Simulation *sim, Moment *now, Problem *problem) {
     }
 }
 
+/* Count the stress before an event. */
+static bool sample_before(Simulation *sim, Problem *problem) {
+    Moment now;
+    if (!has_peaks(sim)) {
+        return true;
+    }
+    if (!exchange_moment(sim, &now, problem)) {
+        return false;
+    }
+    step_peaks(sim, now.evaluation);
+    return true;
+}
+
 PRBM bool exchange_event(Simulation *simulation, bool *changed, Problem *problem) {
     Simulation *sim = simulation;
     State *state = &sim->state;
@@ -369,8 +386,10 @@ PRBM bool exchange_event(Simulation *simulation, bool *changed, Problem *problem
     copy(nx, state->states, before);
     keep_backup(sim);
     Moment now;
-    bool ok = apply_inputs(sim, problem) && apply_due_events(sim, &now, problem);
+    bool ok = sample_before(sim, problem) && apply_inputs(sim, problem) &&
+              apply_due_events(sim, &now, problem);
     if (ok) {
+        restart_peaks_from(sim, now.evaluation);
         arm(sim, &now.at);
         accept(sim);
         states_of(sim, state->front, state->states);

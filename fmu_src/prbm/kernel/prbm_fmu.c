@@ -19,7 +19,9 @@
 #include "core/kinetics.c"
 #include "core/constraints.c"
 #include "core/collection.c"
+#include "core/profile.c"
 #include "core/beam.c"
+#include "core/free_body.c"
 #include "core/flexures.c"
 #include "core/block_map.c"
 #include "core/assembly.c"
@@ -35,6 +37,7 @@
 #include "core/equations.c"
 #include "core/evaluation.c"
 #include "core/dynamics.c"
+#include "core/sections.c"
 #include "core/projection.c"
 #include "core/runge_kutta.c"
 #include "hybrid/configuration.c"
@@ -47,6 +50,7 @@
 #include "hybrid/rest.c"
 #include "hybrid/contact_modes.c"
 #include "hybrid/stability.c"
+#include "hybrid/peaks.c"
 #include "hybrid/stepping.c"
 #include "hybrid/simulation.c"
 #include "hybrid/snapshot.c"
@@ -59,6 +63,7 @@
 #include "values.c"
 #include "tangent.c"
 #include "tangent_indicators.c"
+#include "tangent_stress.c"
 #ifdef PRBM_ENGINE
 #include "engine.c"
 #else

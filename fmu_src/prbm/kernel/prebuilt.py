@@ -72,7 +72,7 @@ def prebuilt(name: str, sources: Mapping[str, bytes]) -> bytes | None:
         compiled, digests = listed["kernel"], dict(listed["libraries"])
     except (FileNotFoundError, NotADirectoryError):
         return None
-    except (ValueError, TypeError, KeyError):
+    except (OSError, ValueError, TypeError, KeyError):
         raise _damaged(LIST) from None
     if compiled != files_digest(sources):
         return None

@@ -6,7 +6,7 @@
 import ctypes
 import threading
 import weakref
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -18,7 +18,7 @@ from ..base.names import unknown
 from ..base.tolerances import TOLERANCE_USED_MAX
 from ..hybrid.configuration import Configuration, Scales, checked_tolerance
 from ..hybrid.front import Latched
-from ..hybrid.given import changed_values, start_values
+from ..hybrid.given import changed_values, checked_times, start_values
 from ..hybrid.outputs import Outputs
 from ..hybrid.records import Impact
 from ..hybrid.simulation import Simulation
@@ -29,16 +29,18 @@ from ..mechanics.independent import independent
 from ..mechanics.inputs import MOBILITY
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
+from ..mechanism.parameters import number
 from ..mechanism.parts import value
 from .library import MESSAGE_LENGTH, library
 
 Slots = NDArray[np.intc]
+UNFINISHED = -2  # Result of a call that is to be repeated, ENGINE_UNFINISHED in C.
 IMPACT = 12  # Numbers of a recorded impact before its states, ENGINE_IMPACT in C.
 EXTRA_STATES = 2  # States of a compliant stop, EXTRA_STATES in C.
 MOTION_GROUPS = ("bodies", "probes")
 OUTPUT_GROUPS = (
     *MOTION_GROUPS, "stops", "base", "energies", "latched", "compliant", "links", "stretches",
-    "frequency", "calculated",
+    "stresses", "frequency", "calculated",
 )  # fmt: skip
 """The groups of values that are outputs, in the order of the Python engine."""
 
@@ -54,13 +56,13 @@ def check_supported(
         If a compliant stop has friction, or its wall has a mobility.
     """
     for stop in mechanism.stops:
-        for name, number in (
+        for name, x in (
             ("friction", value(stop, "friction", values)),
             (MOBILITY, given[f"{stop.name}.{MOBILITY}"]),
         ):
-            if stop.compliant and number:
+            if stop.compliant and x:
                 raise MechanismError(
-                    f"{stop.name}.{name} = {number:g}: a compliant stop of the kernel has none; "
+                    f"{stop.name}.{name} = {x:g}: a compliant stop of the kernel has none; "
                     "use the Python engine or a Python FMU"
                 )
 
@@ -249,14 +251,27 @@ class KernelSimulation:
 
         Raises
         ------
-        SimulationError
+        ParameterError, SimulationError
             As :meth:`prbm.hybrid.simulation.Simulation.advance`.
         """
+        time = number("time", time, "s")
         with self._lock:
-            count = self._library.prbm_advance(self._address, time, self._message)
-            if count < 0:
-                raise self._error()
-            self._take_impacts(count)
+            self._repeat(lambda: self._library.prbm_advance(self._address, time, self._message))
+
+    def _repeat(self, call: Callable[[], int]) -> None:
+        """Call a function of the kernel until it is finished, and take the impacts.
+
+        A signal of the system, such as Ctrl-C, acts between two calls.
+        """
+        try:
+            while (count := call()) == UNFINISHED:
+                pass
+        except BaseException:
+            self._library.prbm_abandon(self._address)
+            raise
+        if count < 0:
+            raise self._error()
+        self._take_impacts(count)
 
     def check_effort(self, step: float) -> None:
         """Reject a communication step [s] of the default experiment that needs too many steps.
@@ -363,22 +378,20 @@ class KernelSimulation:
 
         Parameters and errors as for :meth:`prbm.hybrid.simulation.Simulation.sample`.
         """
-        t, slots = np.array(times, float), self._slots(names)
-        if t.ndim != 1:
-            raise ParameterError(f"times have the shape {t.shape}: give a list of times in s")
+        t, slots, done = checked_times(times), self._slots(names), ctypes.c_int(0)
         x = np.empty((len(t), len(slots)))
+        arguments = (
+            self._address, len(t), t.ctypes.data, len(slots), slots.ctypes.data, x.ctypes.data,
+            ctypes.byref(done), self._message,
+        )  # fmt: skip
         with self._lock:
-            count = self._library.prbm_sample(
-                self._address, len(t), t.ctypes.data, len(slots), slots.ctypes.data,
-                x.ctypes.data, self._message,
-            )  # fmt: skip
-            if count < 0:
-                error = self._error()
+            try:
+                self._repeat(lambda: self._library.prbm_sample(*arguments))
+            except BaseException:
                 self._take_impacts(
                     self._library.prbm_advance(self._address, self.time, self._message)
                 )
-                raise error
-            self._take_impacts(count)
+                raise
         return x
 
     # -- saving and restoring --

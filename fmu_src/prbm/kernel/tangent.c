@@ -7,6 +7,7 @@
 #include "dependents.h"
 #include "tangent.h"
 #include "tangent_indicators.h"
+#include "tangent_stress.h"
 #include "values.h"
 
 static Complex times_i(Complex z) {
@@ -213,7 +214,7 @@ static Complex inertial_change(const Tangent *t, int j) {
     return scaled(-1.0, times_i(change));
 }
 
-/* Compute the change of the loads on the arms: forces, moments, inertia, mass-proportional damping. */
+/* Compute the change of the loads on the arms: forces, moments, inertia, damping with the mass. */
 static void arm_load_change(const Tangent *t, const Complex *dw, const double *dmoment) {
     const Equations *q = t->q;
     for (int j = 0; j < q->system->d; j++) {
@@ -540,6 +541,7 @@ static void all_changes(const Tangent *t, const double *dx, const Complex *dw,
     stop_changes(t, out + slots->stops);
     base_changes(t, out + slots->base);
     energy_changes(t, dx, out + slots->energies);
+    stress_changes(t, out + slots->stresses);
     for (int k = 0; k < m->independent_count; k++) {
         out[slots->derivatives + k] = t->dx[m->independent[k]];
     }
@@ -562,6 +564,7 @@ static Tangent begin_tangent(Simulation *sim, const Moment *now, const double *d
     t.q = &sim->equations;
     t.e = at->at.e;
     t.factors = &at->factors;
+    t.evaluation = at;
     t.at = &now->at;
     t.y = now->at.q;
     t.v = now->at.v;

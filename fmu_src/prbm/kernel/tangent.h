@@ -11,6 +11,7 @@ typedef struct {
     const Equations *q;
     const Complex *e;
     const Factors *factors;
+    const Evaluation *evaluation;
     const Instant *at;
     const double *y, *v, *a, *lam, *du;
     double *dq, *dv, *dx, *dlam;    /* (n,), (n,), (even,), (r,); dx ends as da */

@@ -35,13 +35,8 @@ static bool load_present(Simulation *sim, Problem *problem) {
         directions(system, present->y, present->e);
         return true;
     }
-    if (!arc_state(sim, present->y, &present->reference, &present->evaluation, problem)) {
-        return false;
-    }
-    pad(system->n, present->y, present->evaluation.at.angle);
-    find_directions(system, &present->reference, &present->evaluation.at);
-    memcpy(present->e, present->evaluation.at.e, (size_t)system->d * sizeof *present->e);
-    return true;
+    return arc_state(sim, present->y, present->e, &present->reference, &present->evaluation,
+                     problem);
 }
 
 PRBM const double *present_outputs(Simulation *sim, int groups, Problem *problem) {

@@ -121,6 +121,7 @@ class _Assembler(Collection):
     def body(self, name: str) -> None:
         body = next(b for b in self.mechanism.bodies if b.name == name)
         centre = self.on(name, self.at(body.centre))
+        self.body_masses[name] = len(self.masses)
         self.mass(centre, value(body, "mass", self.values))
         j = self.index[name]
         assert j is not None
@@ -137,10 +138,12 @@ class _Assembler(Collection):
                 f"{abs(z_end - z_start):.4g} m apart: draw them at the same place"
             )
         place, far = self.on(body_of(start), z_start), body_of(end)
-        if far in self.origin:
+        known = far in self.origin
+        if known:
             self.close(joint.name, place, self.on(far, z_end))
         else:
             self.reach(far, place, z_end, self.turn(far))
+        self.connect(body_of(start), far, known)
         self.lines.append((joint.name, "joint", [place]))
 
     # -- arrays --
@@ -182,6 +185,8 @@ class _Assembler(Collection):
             probes=tuple(self.probe(probe) for probe in mechanism.probes),
             links=tuple(self.links),
             owners=tuple(self.owners),
+            connections=tuple(self.connections),
+            body_masses=dict(self.body_masses),
             outlines=tuple(self.outline(*line) for line in self.lines),
             anchor=self.anchor(),
             length=self.size(),

@@ -10,7 +10,11 @@ from ..mechanism.expressions import affine
 from ..mechanism.parts import GROUND, Flexure, Joint, Point
 from .arrays import Real
 from .direction_map import DirectionMap
+from .free_body import Connection, FreeBody
 from .system import FIXED, BodyFrame, Place
+
+ROD_POINTS = (0.5 - 0.5 / math.sqrt(3), 0.5 + 0.5 / math.sqrt(3))
+"""Places of the two equal point masses of a uniform rod, in units of its length [-]."""
 
 
 class Collection:
@@ -41,6 +45,8 @@ class Collection:
         self.link_count = 0
         self.owners: list[str] = []
         self.lines: list[tuple[str, str, list[Place]]] = []
+        self.connections: list[Connection] = []
+        self.body_masses: dict[str, int] = {}
 
     # -- values and places --
 
@@ -128,6 +134,11 @@ class Collection:
         """Register the place of a drawn point of a body that turns with a direction."""
         self.origin[body], self.drawn[body], self.index[body] = place, drawn, j
 
+    def connect(self, near: str, far: str, known: bool, flexure: FreeBody | None = None) -> None:
+        """Register a flexure or a joint; known: it has just closed a loop."""
+        loop = len(self.loops) - 1 if known else None
+        self.connections.append(Connection(near, far, loop, flexure))
+
     def close(self, name: str, place: Place, other: Place) -> None:
         """Close a loop: require that two places coincide."""
         self.loops.append((name, place.minus(other)))
@@ -138,7 +149,7 @@ class Collection:
 
     def rod(self, mass: float, start: Place, j: int | None, vector: complex) -> None:
         """Add a uniform rod: two equal point masses with its centre and moment of inertia."""
-        for fraction in (0.5 - 0.5 / math.sqrt(3), 0.5 + 0.5 / math.sqrt(3)):
+        for fraction in ROD_POINTS:
             self.mass(start.plus(j, fraction * vector), mass / 2)
 
     def mass(self, place: Place, mass: float) -> None:

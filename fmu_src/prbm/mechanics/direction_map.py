@@ -61,13 +61,6 @@ class DirectionMap:
         result: Row = x @ self.Phi
         return result
 
-    def fold(self, x: Real) -> Real:
-        """Replace the first d rows of x (d + r, ...) by their pull, Phi^T x: (n + r, ...)."""
-        if self.identity:
-            return x
-        d = len(self.Phi)
-        return np.concatenate([self.Phi.T @ x[:d], x[d:]])
-
     def congruence(self, M: Real) -> Real:
         """Return Phi^T M Phi, (n, n), of a matrix M (d, d) of the directions."""
         if self.identity:

@@ -15,6 +15,7 @@ therefore differs from its row in R.  Stops with the compliant law are loads whi
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from ..mechanism.parts import value
 from . import constraints, forces
@@ -93,10 +94,7 @@ class Equations:
         self._number_contacts()
         self._collect_loads()
         self._stack_rows()
-        # One product with e gives loads, inertia and constraints: see _solve.
-        self._stack: Complex = np.vstack([self.w, system.H, 1j * self.rows.spread])
-        self._J_stack = np.zeros((self.d + len(self.rows), self.d))
-        self._J_stack[: self.d] = np.diag(system.J)
+        self._stack_terms()
         # Springs and their damping in one product with (q, v): see torques.
         damping = self.beta * system.K
         self._K_y = np.block([[system.K, damping], [0 * system.K, damping]])
@@ -149,6 +147,20 @@ class Equations:
         self.rows = Rows(system, B, c, z, on)
         self.positions = self.rows.first(self.first_stick)
 
+    def _stack_terms(self) -> None:
+        """Stack inertia, constraints and loads, and extend Phi to the multipliers: see _solve."""
+        d, B, size = self.d, 1j * self.rows.spread, self.d + len(self.rows)
+        self._terms = np.zeros((size, size + 1), complex)
+        self._terms[:d, :d] = self.system.H
+        self._terms[d:, :d] = B
+        self._terms[:d, d:size] = B.conj().T
+        self._terms[:d, size] = 1j * self.w.conj()
+        self._J = np.diag(np.concatenate([self.system.J, np.zeros(len(self.rows))]))
+        self._ones = np.ones(size + 1, complex)
+        self._last = np.zeros(size + 1, complex if len(self.system.stretches) else float)
+        self._last[size] = 1.0
+        self._Phi = block_diag(self.system.Phi.Phi, np.eye(len(self.rows)))
+
     def with_contacts(self, contacts: ContactState) -> "Equations":
         """Return the equations for another state of the contacts."""
         if contacts == self.contacts:
@@ -199,8 +211,7 @@ class Equations:
         (2 n,)
             K (q - q0) + beta K v, then beta K v [N m].
         """
-        result: Real = self._K_y @ y
-        result -= self._straight
+        result: Real = self._K_y.dot(y) - self._straight
         return result
 
     def _solve(
@@ -208,35 +219,33 @@ class Equations:
     ) -> Evaluation:
         """Solve the equations for given torques of the springs.
 
-        One product with e gives all terms that depend on it, row by row:
+        One product gives all terms, with u = (e, 1, ..., 1):
 
-            G = [w e;  diag(e)^H H diag(e);  i B e],
+            X = diag(u)^H [ H    (i B)^H   i w^H ] diag(u).
+                          [ i B     0        0   ]
 
-        whose real parts are the load, M - J and the constraint rows, and whose imaginary parts
-        are -C (:func:`prbm.mechanics.kinetics.inertia`) and the convective terms Re(B e), all of
-        the directions.
+        The real part of the first columns is the matrix of the equations without J, that of the
+        directions.  The imaginary part times (v^2, 0, 1) is the right side: -C v^2
+        (:func:`prbm.mechanics.kinetics.inertia`), the loads and the convective terms Re(B e) v^2.
         """
-        n, d, Phi = self.n, self.d, self.system.Phi
-        e, w = self.system.directions(q), self.system.turning(v)
-        G = self._stack * e
-        G[1 : d + 1] *= e.conj()[:, None]
+        n, d, e, w = self.n, self.d, self.system.directions(q), self.system.turning(v)
+        u, squares = self._ones.copy(), self._last.copy()
+        u[:d] = e
+        squares[:d] = w * w
+        X = self._terms * u
+        X *= u[:-1].conj()[:, None]
+        kkt = X.real[:, :-1] + self._J
+        right: Real = X.imag.dot(squares) if squares.dtype == float else X.dot(squares).imag
         carried = d + self.rows.carried
         if len(carried):
-            G.real[1 + carried] = self.rows.by_direction(e)[self.rows.carried]
-        size = n + len(self.rows)
-        kkt = np.zeros((size, size), order="F")
-        kkt[:, :n] = Phi.fold(Phi.pull(G.real[1:] + self._J_stack))
-        kkt[:n, n:] = kkt[n:, :n].T
-        M = kkt[:n, :n]
-        squares = w * w
-        right: Real = (G[1:] @ squares).imag if np.iscomplexobj(w) else G.imag[1:] @ squares.real
-        if len(carried):
+            kkt[carried, :d] = self.rows.by_direction(e)[self.rows.carried]
+            kkt[:d, carried] = kkt[carried, :d].T
             right[carried] = self.rows.carried_convective(e, w)
-        right[:d] += G.real[0]
-        right = Phi.fold(right)
+        if not self.system.Phi.identity:
+            kkt, right = self._Phi.T @ kkt @ self._Phi, self._Phi.T @ right
         if self.moving_walls:
             right[n + self.first_hold : n + self.first_stick] -= self.held_motions(t)[2]
-        Q = right[:n]
+        M, Q = kkt[:n, :n], right[:n]
         Q -= torques
         if self.driven:
             Q += self.moment
@@ -273,31 +282,21 @@ class Equations:
         q, v, extras = y[:n], y[n : 2 * n], y[2 * n + 2 :]
         torques = self.torques(y[: 2 * n])
         evaluation = self._solve(t, q, v, torques[:n], extras)
+        loss, power = v.dot(torques[n:]), 0.0
+        if self.mass_damping:
+            loss += 2.0 * self.mass_damping * kinetic_energy(evaluation.M, v)
+        if self.slipping_points or self.slipping_stops:
+            loss += friction_power(self, q, v, evaluation)
+        if self.driven or self.moving_walls:
+            power = input_power(self, t, q, v, evaluation.lam)
         result = np.empty(len(y))
         result[:n] = v
         result[n : 2 * n] = evaluation.a
-        result[2 * n] = v @ torques[n:]
-        result[2 * n + 1] = 0.0
-        if self.mass_damping:
-            result[2 * n] += 2.0 * self.mass_damping * kinetic_energy(evaluation.M, v)
-        if self.slipping_points or self.slipping_stops:
-            result[2 * n] += friction_power(self, q, v, evaluation)
-        if self.driven or self.moving_walls:
-            result[2 * n + 1] = self._input_power(t, q, v, evaluation.lam)
+        result[2 * n] = loss
+        result[2 * n + 1] = power
         if len(extras):
             add_compliant_rates(self, t, extras, evaluation, result)
         return result, evaluation
-
-    def _input_power(self, t: float, q: Real, v: Real, lam: Real) -> float:
-        """Return the power of the inputs and of the moving walls of held stops [W]."""
-        power = 0.0
-        if self.driven:
-            e = self.system.directions(q)
-            load = self.system.Phi.pull(forces.generalised(self.w_input, e))
-            power += float((load + self.moment) @ v)
-        if self.moving_walls:
-            power -= float(lam[self.first_hold : self.first_stick] @ self.held_motions(t)[1])
-        return power
 
     # -- constraints --
 
@@ -464,16 +463,35 @@ class Equations:
         return mu * forces.normal_force(lift, preload, stiffness)
 
 
+def sliding_friction(
+    equations: Equations, contact: int, e: Complex, evaluation: Evaluation
+) -> float:
+    """Return the friction force of a slipping contact against its motion [N]."""
+    if contact in equations.held:
+        force = float(evaluation.lam[equations.hold_row(contact)])
+        return equations.stop_friction[contact] * force
+    return equations.friction_limit(contact, e, evaluation.pressure)
+
+
 def friction_power(equations: Equations, q: Real, v: Real, evaluation: Evaluation) -> float:
     """Return the power that friction dissipates [W]."""
     e, modes, power = equations.system.directions(q), equations.contacts.modes, 0.0
-    for c in equations.slipping_points:
-        limit = equations.friction_limit(c, e, evaluation.pressure)
-        power += modes[c].slip * limit * equations.slip_rate(c, e, v)
-    for i in equations.slipping_stops:
-        rate = equations.slip_rate(i, e, v)
-        force = float(evaluation.lam[equations.hold_row(i)])
-        power += equations.stop_friction[i] * force * modes[i].slip * rate
+    for c in (*equations.slipping_points, *equations.slipping_stops):
+        force = sliding_friction(equations, c, e, evaluation)
+        power += modes[c].slip * force * equations.slip_rate(c, e, v)
+    return power
+
+
+def input_power(equations: Equations, t: float, q: Real, v: Real, lam: Real) -> float:
+    """Return the power of the inputs and of the moving walls of held stops [W]."""
+    power, system = 0.0, equations.system
+    if equations.driven:
+        e = system.directions(q)
+        load = system.Phi.pull(forces.generalised(equations.w_input, e))
+        power += float((load + equations.moment) @ v)
+    if equations.moving_walls:
+        held = lam[equations.first_hold : equations.first_stick]
+        power -= float(held @ equations.held_motions(t)[1])
     return power
 
 

@@ -1,21 +1,23 @@
 """Flexures as links or beams: their coordinates, directions, masses, springs and loops."""
 
 import cmath
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from ..base.errors import ParameterError
 from ..mechanism.description import Mechanism
 from ..mechanism.expressions import affine
-from ..mechanism.flexure import PIN, Segments, segments
+from ..mechanism.flexure import NOTCH, PIN, TAPER, Segments, segments
 from ..mechanism.parts import LENGTH_MIN, Flexure, FlexureType, body_of, value
-from .arrays import Real
-from .beam import Beam
-from .collection import Collection
+from .arrays import Complex, Real
+from .beam import Beam, Material
+from .collection import ROD_POINTS, Collection
+from .free_body import of_beam, of_links
+from .profile import Line, Notch, Panel, Straight, notch_panels
 from .system import Place
 
-CURVE_POINTS = 33  # Points of a drawn beam.
+CURVE_POINTS = 33  # Points of each panel of a drawn beam.
 
 
 def add_flexure(parts: Collection, flexure: Flexure) -> None:
@@ -26,18 +28,24 @@ def add_flexure(parts: Collection, flexure: Flexure) -> None:
     Raises
     ------
     ParameterError
-        If the flexure has no length, or its links are longer than the flexure.
+        If the flexure has no length, its links or its notch are longer than the flexure, its notch
+        vanishes, or its ends are impossible for its curvature or rise.
     """
-    kind = next(k for k in parts.mechanism.flexure_types if k.name == flexure.type)
+    kind = _type_of(parts, flexure)
     if parts.length(flexure) < LENGTH_MIN:
         raise ParameterError(
             f"flexure {flexure.name} from {flexure.start} to {flexure.end} has the length "
             f"{parts.length(flexure):g} m: move its ends apart"
         )
     if parts.mechanism.model(kind).order:
-        _add_beam(parts, flexure, _beam(parts, flexure, kind), kind.axial)
+        _add_beam(parts, flexure, _beam(parts, flexure, kind), kind)
     else:
         _add_links(parts, flexure, _segments(parts, flexure, kind))
+
+
+def _type_of(parts: Collection, flexure: Flexure) -> FlexureType:
+    """Return the type of a flexure."""
+    return next(k for k in parts.mechanism.flexure_types if k.name == flexure.type)
 
 
 def _segments(parts: Collection, flexure: Flexure, kind: FlexureType) -> Segments:
@@ -54,6 +62,12 @@ def _section(parts: Collection, kind: FlexureType) -> tuple[float, float, float]
     fields = ("thickness", "width", "youngs_modulus", "density")
     h, b, E, rho = (value(kind, name, parts.values) for name in fields)
     return E * b * h**3 / 12, E * b * h, rho * b * h
+
+
+def _strength(parts: Collection, kind: FlexureType) -> tuple[float, float]:
+    """Return area [m^2] and section modulus [m^3]."""
+    h, b = (value(kind, name, parts.values) for name in ("thickness", "width"))
+    return b * h, b * h**2 / 6
 
 
 def _add_links(parts: Collection, flexure: Flexure, pieces: Segments) -> None:
@@ -73,13 +87,16 @@ def _add_links(parts: Collection, flexure: Flexure, pieces: Segments) -> None:
     ]
     known = far in parts.origin
     owners = [owner, *links, parts.index[far] if known else parts.turn(far)]
+    first, points = len(parts.masses), _Points(pieces)
     for i, (length, j) in enumerate(zip(pieces.lengths[:-1], owners[:-1], strict=True)):
         # In the drawing the angle of a body is 0, that of a link its direction.
         vector = length * (1.0 if j in links else direction)
         parts.rod(pieces.rods[i], place, j, vector)
+        points.rod(i, len(parts.masses) - first)
         place = place.plus(j, vector)
         corners.append(place)
         parts.mass(place, pieces.lumps[i])
+        points.lump(i, len(parts.masses) - first)
         parts.spring(pieces.rates[i], parts.angle(owners[i]), parts.angle(owners[i + 1]))
     last = pieces.lengths[-1] * direction
     if known:
@@ -89,8 +106,38 @@ def _add_links(parts: Collection, flexure: Flexure, pieces: Segments) -> None:
     else:
         parts.reach(far, place, z_end - last, owners[-1])
     parts.rod(pieces.rods[-1], place, owners[-1], last)
+    points.rod(len(links) + 1, len(parts.masses) - first)
+    angles, kind = [parts.angle(j) for j in owners], _type_of(parts, flexure)
+    masses, forwards = slice(first, len(parts.masses)), start == flexure.start
+    free = of_links(
+        flexure.name, forwards, pieces, direction, _strength(parts, kind), owners, angles, masses,
+        points.found,
+    )  # fmt: skip
+    parts.connect(root, far, known, free)
     corners.append(parts.on(far, z_end))
     parts.lines.append((flexure.name, "flexure", corners))
+
+
+class _Points:
+    """The mass points of a flexure of links, as :func:`prbm.mechanics.free_body.of_links` needs."""
+
+    def __init__(self, pieces: Segments) -> None:
+        self.pieces = pieces
+        self.found: list[tuple[int, float, float]] = []
+
+    def rod(self, i: int, count: int) -> None:
+        """Add the points of segment i if there are then as many as the given number."""
+        first, last = self.pieces.lengths[0], self.pieces.lengths[-1]
+        for fraction in ROD_POINTS:
+            near = first * (fraction if i == 0 else 1.0)
+            far = last * (fraction if i == len(self.pieces.lengths) - 1 else 0.0)
+            if len(self.found) < count:
+                self.found.append((2 * i, near, far))
+
+    def lump(self, i: int, count: int) -> None:
+        """Add the point at pivot i if there are then as many as the given number."""
+        if len(self.found) < count:
+            self.found.append((2 * i + 1, self.pieces.lengths[0], 0.0))
 
 
 def _add_link(parts: Collection, direction: complex, length: float, axial: float) -> int:
@@ -107,12 +154,55 @@ def _add_link(parts: Collection, direction: complex, length: float, axial: float
 
 def _beam(parts: Collection, flexure: Flexure, kind: FlexureType) -> Beam:
     """Return the beam of a flexure."""
-    L, model = parts.length(flexure), parts.mechanism.model(kind)
-    EI, EA, mass = _section(parts, kind)
-    return Beam(model.order, model.nodes, L, EI, mass * L, EA if kind.axial else 0.0)
+    model, line = parts.mechanism.model(kind), _line(parts, flexure, kind)
+    panels = _panels(parts, flexure, kind, line.length, model.nodes)
+    material = Material(*(value(kind, n, parts.values) for n in ("youngs_modulus", "density")))
+    return Beam(model.order, panels, line, material)
 
 
-def _add_beam(parts: Collection, flexure: Flexure, beam: Beam, axial: bool) -> None:
+def _line(parts: Collection, flexure: Flexure, kind: FlexureType) -> Line:
+    """Return the line of a beam as drawn."""
+    chord = parts.length(flexure)
+    if kind.curvature is not None:
+        curvature = value(kind, "curvature", parts.values)
+        if not abs(curvature) * chord < 2.0:
+            raise ParameterError(
+                f"flexure {flexure.name}: {kind.name}.curvature = {curvature:g} 1/m is impossible "
+                f"for ends at the distance {chord:g} m: choose one below {2.0 / chord:g} 1/m"
+            )
+        return Line(chord, curvature=curvature)
+    if kind.rise is not None:
+        rise = value(kind, "rise", parts.values)
+        if not abs(rise) < chord:
+            raise ParameterError(
+                f"flexure {flexure.name}: {kind.name}.rise = {rise:g} m is impossible for ends at "
+                f"the distance {chord:g} m: choose a rise below this distance"
+            )
+        return Line(chord, rise=rise)
+    return Line(chord)
+
+
+def _panels(
+    parts: Collection, flexure: Flexure, kind: FlexureType, L: float, nodes: int
+) -> Sequence[Panel]:
+    """Return the panels of a beam with the length L [m]."""
+
+    def given(name: str) -> float:
+        return value(kind, name, parts.values)
+
+    h, b = given("thickness"), given("width")
+    if kind.profile == NOTCH:
+        axes = given("notch_radius"), given("notch_depth")
+        waist = None if kind.hinge else given("waist_length")
+        notch = Notch(h, b, axes, given("end_thickness"), waist)
+        return notch_panels(flexure.name, notch, L, nodes)
+    if kind.profile == TAPER:
+        ends = (h, given("end_thickness")), (b, given("end_width"))
+        return (Straight(nodes, 0.0, L, *ends),)
+    return (Straight(nodes, 0.0, L, (h, h), (b, b)),)
+
+
+def _add_beam(parts: Collection, flexure: Flexure, beam: Beam, kind: FlexureType) -> None:
     """Add a beam: its coordinates, one arm for each node, masses and springs.
 
     The rotation of a clamped or free end is that of the body there, that of a pinned end is a
@@ -125,16 +215,17 @@ def _add_beam(parts: Collection, flexure: Flexure, beam: Beam, axial: bool) -> N
         for name, end in zip(("start", "end"), flexure.ends, strict=True)
     ]
     bends = [parts.angle_of_flexure(f"{flexure.name}.bend[{k}]") for k in range(1, beam.order + 1)]
-    strain = parts.coordinate(flexure.name) if axial else None
+    strain = parts.coordinate(flexure.name) if kind.axial else None
     new = next((body for body in bodies if body not in parts.origin), None)
     turned = None if new is None else parts.coordinate(new)
     ends = [
         pin if end == PIN else turned if body == new else parts.angle(parts.index[body])
         for pin, body, end in zip(pins, bodies, flexure.ends, strict=True)
     ]
-    arms = [_add_node(parts, [*ends, *bends], turns, strain) for turns in beam.turns]
+    known = zip(beam.turns, beam.strains, strict=True)
+    arms = [_add_node(parts, [*ends, *bends], turns, strain, own) for turns, own in known]
     reached = None if turned is None else parts.direction({turned: 1.0})
-    _place_beam(parts, flexure, beam, arms, reached)
+    _place_beam(parts, flexure, beam, arms, reached, (ends, bends), thick=kind.profile == NOTCH)
     rates = beam.rates.tolist()
     parts.spring(rates[0], *ends)
     for j, rate in zip(bends, rates[1:], strict=True):
@@ -144,18 +235,25 @@ def _add_beam(parts: Collection, flexure: Flexure, beam: Beam, axial: bool) -> N
 
 
 def _add_node(
-    parts: Collection, coordinates: list[int | None], turns: Real, strain: int | None
+    parts: Collection, coordinates: list[int | None], turns: Real, strain: int | None, own: float
 ) -> int:
-    """Add the arm of a node, and its stretch; return its direction."""
+    """Add the arm of a node, and its stretch, own times the strain; return its direction."""
     known = zip(coordinates, turns, strict=True)
     arm = parts.direction({j: float(turn) for j, turn in known if j is not None})
     if strain is not None:
-        parts.direction({strain: 1.0}, arm=arm)
+        parts.direction({strain: float(own)}, arm=arm)
     return arm
 
 
 def _place_beam(
-    parts: Collection, flexure: Flexure, beam: Beam, arms: list[int], turned: int | None
+    parts: Collection,
+    flexure: Flexure,
+    beam: Beam,
+    arms: list[int],
+    turned: int | None,
+    coordinates: tuple[list[int | None], list[int]],
+    *,
+    thick: bool,
 ) -> None:
     """Place the masses and the far end of a beam.
 
@@ -171,30 +269,63 @@ def _place_beam(
         Directions of the nodes.
     turned : int or None
         Direction of the body that the beam reaches; None: both bodies have been reached before.
+    coordinates : pair of lists
+        Coordinates of the rotations of its ends (None: the ground), and of its coefficients.
+    thick : bool
+        Whether the sections have rotary inertia.
     """
     z_start, z_end = parts.end(flexure, flexure.start), parts.end(flexure, flexure.end)
     direction = (z_end - z_start) / abs(z_end - z_start)
-    whole = beam.positions(np.array([1.0]))[0]
+    whole = beam.whole
     forwards = body_of(flexure.start) in parts.origin
     near, z_near = (flexure.start, z_start) if forwards else (flexure.end, z_end)
     far, z_far = (flexure.end, z_end) if forwards else (flexure.start, z_start)
     root = parts.on(body_of(near), z_near)
 
-    def at(lengths: Real) -> Place:
+    def at(lengths: Complex) -> Place:
         place = root
         for arm, length in zip(arms, lengths if forwards else lengths - whole, strict=True):
-            place = place.plus(arm, float(length) * direction)
+            place = place.plus(arm, complex(length) * direction)
         return place
 
-    for mass, lengths in zip(beam.masses, beam.node_positions, strict=True):
-        parts.mass(at(lengths), float(mass))
+    first = len(parts.masses)
+    across = 1j * direction if thick else 0j
+    points = _add_masses(parts, beam, arms, [at(row) for row in beam.node_positions], across)
     tip = at(whole if forwards else 0.0 * whole)
     if turned is None:
         parts.close(flexure.name, tip, parts.on(body_of(far), z_far))
     else:
         parts.reach(body_of(far), tip, z_far, turned)
-    curve = beam.positions(np.linspace(-1.0, 1.0, CURVE_POINTS))
+    masses = slice(first, len(parts.masses))
+    free = of_beam(flexure.name, forwards, beam, direction, coordinates, arms, masses, points)
+    parts.connect(body_of(near), body_of(far), turned is None, free)
+    curve_points = np.linspace(-1.0, 1.0, CURVE_POINTS)
+    curve = beam.positions([curve_points, *[curve_points[1:]] * (len(beam.panels) - 1)])
     parts.lines.append((flexure.name, "flexure", [at(lengths) for lengths in curve]))
+
+
+def _add_masses(
+    parts: Collection, beam: Beam, arms: list[int], places: list[Place], across: complex
+) -> list[tuple[int, float]]:
+    """Add the masses of a beam at its nodes.
+
+    Two masses across the flexure, in the given direction, have the moment of inertia of a section.
+    With the direction 0 there is one mass.
+
+    Returns
+    -------
+    list of (int, float)
+        For each mass: the number of its node, and its distance from it to the left [m].
+    """
+    first, points = len(parts.masses), list[tuple[int, float]]()
+    nodes = zip(arms, beam.masses.tolist(), beam.radii.tolist(), places, strict=True)
+    for i, (arm, mass, radius, place) in enumerate(nodes):
+        for left in (-radius, radius) if across else (0.0,):
+            spot = place.plus(arm, left * across) if across else place
+            parts.mass(spot, mass / 2 if across else mass)
+            if len(parts.masses) - first > len(points):
+                points.append((i, left))
+    return points
 
 
 def coefficients(

@@ -34,6 +34,7 @@ import numpy as np
 from ..mechanism.description import Mechanism
 from .arrays import Complex, Real, Whole
 from .direction_map import DirectionMap
+from .free_body import Connection
 from .kinetics import inertia
 
 ANGLE = ("angle", "omega")  # Names of the variables of a coordinate that is an angle.
@@ -269,6 +270,10 @@ class System:
     owners : (n,) tuple of str
         The link, body or other part of the mechanism that each coordinate belongs to, as in the
         names of its variables: link[1], link[2], ...
+    connections : tuple of Connection
+        Flexures and joints, in the order of the assembly.
+    body_masses : dict of int
+        Index of the mass point of each body.
     outlines : tuple of Outline
         Lines to draw.
     anchor : complex
@@ -307,6 +312,8 @@ class System:
     probes: tuple[BodyFrame, ...]
     links: tuple[int, ...]
     owners: tuple[str, ...]
+    connections: tuple[Connection, ...]
+    body_masses: Mapping[str, int]
     outlines: tuple[Outline, ...]
     anchor: complex
     length: float
@@ -400,7 +407,8 @@ class System:
         """
         theta = self.Phi.of(q)
         if not len(self.stretches):
-            turned: Complex = np.exp(1j * theta)
+            turned = np.empty(theta.shape, complex)
+            turned.real, turned.imag = np.cos(theta), np.sin(theta)
             return turned
         w = 1j * theta
         w[..., self.stretched] += theta[..., self.stretches]

@@ -27,14 +27,20 @@ from .flexure import (
     CLAMP,
     ENDS,
     FREE,
+    HINGE_ORDER_DEFAULT,
+    LEAF,
     LINKS_MAX,
     LOCKING_ORDER_MAX,
     MODELS,
     NODES_EXTRA,
     NODES_EXTRA_MIN,
     NODES_MAX,
+    NOTCH,
+    NOTCH_NODES,
     ORDER_DEFAULT,
     ORDER_MAX,
+    PROFILES,
+    TAPER,
     FlexureModel,
 )
 from .parameters import Parameter
@@ -54,9 +60,16 @@ from .parts import (
     Release,
     Stop,
     body_of,
+    field_of,
     fields_of,
 )
 
+DIMENSIONS = {
+    LEAF: ("curvature", "rise"),
+    TAPER: ("end_thickness", "end_width", "curvature", "rise"),
+    NOTCH: ("end_thickness", "notch_radius", "notch_depth", "waist_length"),
+}
+"""Fields of the profiles of beams.  A notch is straight."""
 RESERVED = (GROUND, "base", "damping", "energy", "gravity", "link", "mode", "release", "solver")
 
 
@@ -190,9 +203,10 @@ class Mechanism:
         """Return the flexure model of a type."""
         if kind.model != BEAM:
             return replace(MODELS[kind.model], links=kind.n)
-        order = ORDER_DEFAULT if kind.order is None else kind.order
-        nodes = order + NODES_EXTRA if kind.nodes is None else kind.nodes
-        return replace(MODELS[BEAM], order=order, nodes=nodes)
+        order = HINGE_ORDER_DEFAULT if kind.hinge else ORDER_DEFAULT
+        order = order if kind.order is None else kind.order
+        nodes = max(order + NODES_EXTRA, NOTCH_NODES if kind.hinge else 0)
+        return replace(MODELS[BEAM], order=order, nodes=nodes if kind.nodes is None else kind.nodes)
 
     def values(self, changes: Mapping[str, float] | None = None) -> dict[str, float]:
         """Return the values of all parameters: the defaults, or the given changes.
@@ -210,7 +224,7 @@ class Mechanism:
             result[name] = parameters[name].check(value)
         for part in self._parts():
             for name, meta in fields_of(part).items():
-                quantity = getattr(part, name)
+                quantity = field_of(part, name)
                 if isinstance(quantity, str):  # reject expressions out of bounds
                     Parameter(f"{part.name}.{name}", affine(quantity)(result), *meta)
         return result
@@ -288,6 +302,7 @@ class Mechanism:
                 f"{kind.name}.model = {kind.model!r} is unknown: choose one of {', '.join(MODELS)}"
             )
         self._check_order(kind)
+        _check_profile(kind)
         chain = kind.model == CHAIN
         if chain and not 1 <= kind.n <= LINKS_MAX:
             raise MechanismError(
@@ -352,7 +367,7 @@ class Mechanism:
             )
         if (
             kind.model == BEAM
-            and not kind.axial
+            and not (kind.axial or kind.hinge)
             and ends == (CLAMP, CLAMP)
             and self.model(kind).order <= LOCKING_ORDER_MAX
         ):
@@ -427,6 +442,8 @@ class Mechanism:
             yield from ((f"{GROUND}.{name}", c) for c in point)
         for body in self.bodies:
             yield from ((f"{body.name}.centre", c) for c in body.centre)
+            for corners in (body.outline, *body.holes):
+                yield from ((f"{body.name}.outline", c) for corner in corners for c in corner)
             for name, point in body.points.items():
                 yield from ((f"{body.name}.{name}", c) for c in point)
         points: tuple[Stop | Friction | Force | Release, ...] = (*self.stops, *self.frictions)
@@ -435,7 +452,8 @@ class Mechanism:
         for kind in self.flexure_types:
             yield from ((f"{kind.name}.{n}", c) for n, c in kind.coefficients.items())
         for one in self._parts():
-            yield from ((f"{one.name}.{f}", getattr(one, f)) for f in fields_of(one))
+            given = ((f"{one.name}.{f}", field_of(one, f)) for f in fields_of(one))
+            yield from ((name, c) for name, c in given if c is not None)
 
 
 def _undefined(key: str, name: str, known: Iterable[str]) -> str:
@@ -463,6 +481,43 @@ def _check_law(stop: Stop) -> None:
             )
 
 
+def _check_profile(kind: FlexureType) -> None:
+    """Reject an unknown profile, and dimensions that it lacks or that belong to another one."""
+    if kind.profile not in PROFILES:
+        raise MechanismError(
+            f"{kind.name}.profile = {kind.profile!r} is unknown: choose one of "
+            f"{', '.join(PROFILES)}"
+        )
+    if kind.model != BEAM:
+        given = ["profile"] if kind.profile != LEAF else []
+        given += [name for name in _dimensions() if getattr(kind, name) is not None]
+        if given:
+            raise MechanismError(
+                f"{kind.name}.{given[0]}: only the model beam has it; remove {given[0]}, or choose "
+                'model = "beam"'
+            )
+        return
+    own = DIMENSIONS[kind.profile]
+    for name in _dimensions():
+        if getattr(kind, name) is not None and name not in own:
+            others = [profile for profile in PROFILES if name in DIMENSIONS[profile]]
+            raise MechanismError(
+                f"{kind.name}.{name} is not a dimension of the profile {kind.profile}; remove it, "
+                f"or choose the profile {' or '.join(others)}"
+            )
+    if kind.profile == NOTCH and kind.notch_radius is None:
+        raise MechanismError(
+            f"{kind.name}.notch_radius is missing: add the radius of the notch or its fillets"
+        )
+    if kind.curvature is not None and kind.rise is not None:
+        raise MechanismError(f"{kind.name}.curvature excludes {kind.name}.rise: remove one of them")
+
+
+def _dimensions() -> list[str]:
+    """Return the names of all dimensions of profiles."""
+    return list(dict.fromkeys(name for names in DIMENSIONS.values() for name in names))
+
+
 def _check_release(release: Release) -> None:
     """Reject a release from several shapes, or a mode without an amplitude."""
     starts = [n for n in ("displacement", "angle", "amplitude") if getattr(release, n) is not None]
@@ -483,6 +538,6 @@ def _check_release(release: Release) -> None:
 def _fields(part: Part) -> Iterator[Parameter]:
     """Yield the parameters of a part: its fields that are numbers."""
     for name, meta in fields_of(part).items():
-        quantity = getattr(part, name)
-        if not isinstance(quantity, str):
+        quantity = field_of(part, name)
+        if quantity is not None and not isinstance(quantity, str):
             yield Parameter(f"{part.name}.{name}", quantity, *meta)

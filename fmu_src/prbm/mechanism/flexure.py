@@ -71,8 +71,9 @@ class FlexureModel:
         Number of equal links of a chain, set from the flexure type; 0 in :data:`MODELS`, and for
         the other models.
     order, nodes : int
-        Order of the polynomial of the bending moment of a beam, and number of its nodes, set from
-        the flexure type; 0 in :data:`MODELS`, and for the other models.
+        Order of the polynomial of the bending moment of a beam, and number of its nodes, or of
+        those in its notch or waist, set from the flexure type; 0 in :data:`MODELS`, and for the
+        other models.
     """
 
     name: str
@@ -201,14 +202,20 @@ MODELS = {
     )
 }
 
+LEAF, TAPER, NOTCH = "leaf", "taper", "notch"
+PROFILES = (LEAF, TAPER, NOTCH)
 CLAMP, PIN, FREE = "clamp", "pin", "free"
 ENDS = (CLAMP, PIN, FREE)
 LINKS_MAX = 200  # Links of a chain.
 ORDER_DEFAULT = 3  # Order of a beam.
+HINGE_ORDER_DEFAULT = 1  # Order of a notch without a waist.
 ORDER_MAX = 12
 NODES_EXTRA = 3  # Nodes of a beam beyond its order.
 NODES_EXTRA_MIN = 2  # With fewer nodes a pinned beam has a motion without mass.
+NOTCH_NODES = 8  # Least default number of nodes of a notch.
 NODES_MAX = 24
+THICK_NODES = 2  # Nodes of each thick part beside a notch: the inertia of a rod is exact.
+FILLET_NODES = 4  # Nodes of each fillet of a notch.
 LOCKING_ORDER_MAX = 2  # Up to this order, an inextensible beam between two clamps is too stiff.
 
 

@@ -68,6 +68,23 @@ class Parameter:
         return number
 
 
+def number(name: str, value: float, unit: str = "") -> float:
+    """Return a number as a float, which may be infinite or NaN.
+
+    Raises
+    ------
+    ParameterError
+        If the value is not a number.
+    """
+    try:
+        if isinstance(value, bool | str | bytes | bytearray):
+            raise TypeError
+        return float(value)
+    except (TypeError, ValueError, OverflowError):
+        of_unit = f" in {unit}" if unit else ""
+        raise ParameterError(f"{name} = {value!r} must be a number{of_unit}") from None
+
+
 def finite(name: str, value: float, unit: str = "") -> float:
     """Return a finite number as a float.
 
@@ -76,10 +93,7 @@ def finite(name: str, value: float, unit: str = "") -> float:
     ParameterError
         If the value is not a finite number.
     """
-    unit = f" {unit}" if unit else ""
-    if isinstance(value, bool | str | bytes) or not hasattr(value, "__float__"):
-        raise ParameterError(f"{name} = {value!r} must be a number{unit and ' in'}{unit}")
-    number = float(value)
-    if not math.isfinite(number):
-        raise ParameterError(f"{name} = {number}{unit} must be a finite number")
-    return number
+    x = number(name, value, unit)
+    if not math.isfinite(x):
+        raise ParameterError(f"{name} = {x}{unit and ' '}{unit} must be a finite number")
+    return x

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from .expressions import Quantity, affine
-from .flexure import CLAMP
+from .flexure import CLAMP, LEAF, NOTCH, TAPER
 
 Point = tuple[Quantity, Quantity]
 
@@ -30,6 +30,11 @@ class Body:
         Centre of mass as drawn [m].
     points : mapping
         Points as drawn, by name [m].
+    outline : tuple of Point
+        Corners of the outline as drawn, in order [m]; empty if pictures show the hull of the
+        points.  The outline is drawn only: mass, inertia and contact do not depend on it.
+    holes : tuple of tuples of Point
+        Corners of the holes in the outline as drawn [m].
     """
 
     name: str
@@ -37,6 +42,8 @@ class Body:
     inertia: Quantity
     centre: Point
     points: Mapping[str, Point] = field(default_factory=dict)
+    outline: tuple[Point, ...] = ()
+    holes: tuple[tuple[Point, ...], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -50,7 +57,8 @@ class FlexureType:
     model : str
         Model, a key of :data:`prbm.mechanism.flexure.MODELS`.
     thickness, width : Quantity
-        Dimensions of the section in the plane of motion and across it [m].
+        Dimensions of the section in the plane of motion and across it [m]: of a leaf, at the start
+        of a taper, and at the waist of a notch.
     youngs_modulus : Quantity
         Young's modulus [Pa].
     density : Quantity
@@ -62,9 +70,37 @@ class FlexureType:
     order : int or None
         Order of the polynomial of the bending moment of a beam; None: the default.
     nodes : int or None
-        Number of nodes of a beam; None: its order + 3.
+        Number of nodes of a beam, or of those in its notch or waist; None: the default.
     axial : bool
         Whether the flexures can stretch.
+    profile : str
+        Section along a beam: uniform (leaf), linear (taper), or with a notch in the middle.
+    end_thickness : Quantity or None
+        Thickness at the end of a taper; None: the same as at its start.  Thickness outside a notch;
+        None: thickness + 2 notch_depth [m].
+    end_width : Quantity or None
+        Width at the end of a taper [m]; None: the same as at its start.
+    notch_radius : Quantity or None
+        Radius of a circular notch, or of the fillets of a waist [m].  Half axis along the flexure
+        if they are elliptic.
+    notch_depth : Quantity or None
+        Half axis across the flexure [m]; None: notch_radius.
+    waist_length : Quantity or None
+        Length of the uniform waist of a notch between two fillets [m]; None: no waist.
+    curvature : Quantity or None
+        Curvature of a beam that is drawn as a circular arc [1/m].  A positive one turns left from
+        the start to the end.
+    rise : Quantity or None
+        Distance of the parallel tangents at the ends of a beam that is drawn as half a period of a
+        cosine [m].  It is positive if the end is to the left of the tangent at the start.
+    stress : bool
+        Whether the stress of the flexures, and its peak, are outputs.
+    yield_strength, tensile_strength : float or None
+        Strengths of the material [Pa].
+    fatigue_strength : float or None
+        Amplitude of a fully reversed stress that the material survives for ``fatigue_cycles`` [Pa].
+    fatigue_cycles : float or None
+        This number of cycles [-].
     """
 
     name: str
@@ -78,11 +114,47 @@ class FlexureType:
     order: int | None = None
     nodes: int | None = None
     axial: bool = False
+    profile: str = LEAF
+    end_thickness: Quantity | None = None
+    end_width: Quantity | None = None
+    notch_radius: Quantity | None = None
+    notch_depth: Quantity | None = None
+    waist_length: Quantity | None = None
+    curvature: Quantity | None = None
+    rise: Quantity | None = None
+
+    @property
+    def hinge(self) -> bool:
+        """Whether the flexure is a notch without a waist, which bends like a hinge."""
+        return self.profile == NOTCH and self.waist_length is None
+
+    def default(self, name: str) -> str | None:
+        """Return the expression of a dimension of the profile that is not given; None: unused."""
+        if self.profile == TAPER and name in ("end_thickness", "end_width"):
+            return self._reference(name.removeprefix("end_"))
+        if self.profile == NOTCH and name == "notch_depth":
+            return self._reference("notch_radius")
+        if self.profile == NOTCH and name == "end_thickness":
+            return f"{self._reference('thickness')} + 2*({self._reference('notch_depth')})"
+        return None
+
+    def _reference(self, name: str) -> str:
+        """Return the expression of a dimension, or the name of its parameter."""
+        quantity = getattr(self, name)
+        if quantity is None:
+            quantity = self.default(name)
+        return quantity if isinstance(quantity, str) else f"{self.name}.{name}"
+
+    stress: bool = False
+    yield_strength: float | None = None
+    tensile_strength: float | None = None
+    fatigue_strength: float | None = None
+    fatigue_cycles: float | None = None
 
 
 @dataclass(frozen=True)
 class Flexure:
-    """A straight flexure between two points, each ``body.point``.
+    """A flexure between two points, each ``body.point``.
 
     Each of the ``ends`` has one of these types:
 
@@ -297,6 +369,29 @@ FIELDS: dict[type, dict[str, tuple[str, str, float, float, float | None, bool]]]
         "width": _meta("m", "Width across the plane of motion", LENGTH_MIN, LENGTH_MAX, 1e-2),
         "youngs_modulus": _meta("Pa", "Young's modulus", 1.0, 1e13, 1e11),
         "density": _meta("kg/m3", "Density", 1.0, 1e5, 1e4),
+        "end_thickness": _meta(
+            "m", "Thickness at the end of a taper, or outside a notch", LENGTH_MIN, LENGTH_MAX, 1e-3
+        ),
+        "end_width": _meta("m", "Width at the end of a taper", LENGTH_MIN, LENGTH_MAX, 1e-2),
+        "notch_radius": _meta(
+            "m", "Radius of a notch or its fillets, or half axis along the flexure",
+            LENGTH_MIN, LENGTH_MAX, 1e-3,
+        ),
+        "notch_depth": _meta(
+            "m", "Half axis of an elliptic notch or its fillets across the flexure",
+            LENGTH_MIN, LENGTH_MAX, 1e-3,
+        ),
+        "waist_length": _meta(
+            "m", "Length of the waist between the fillets of a notch", LENGTH_MIN, LENGTH_MAX, 1e-2
+        ),
+        "curvature": _meta(
+            "1/m", "Curvature as drawn, positive if it turns left from the start to the end",
+            -1e9, 1e9, 10.0,
+        ),
+        "rise": _meta(
+            "m", "Distance of the parallel tangents at both ends as drawn, positive to the left",
+            -LENGTH_MAX, LENGTH_MAX, 1e-3,
+        ),
     },
     Body: {
         "mass": _meta("kg", "Mass", MASS_MIN, 1e6, 0.1),
@@ -367,7 +462,7 @@ def fields_of(part: Part) -> dict[str, Meta]:
     >>> [*fields_of(Release("lever", angle=0.1))]
     ['angle', 'velocity']
     """
-    fields = {n: meta for n, meta in FIELDS[type(part)].items() if getattr(part, n) is not None}
+    fields = {n: meta for n, meta in FIELDS[type(part)].items() if field_of(part, n) is not None}
     if isinstance(part, Stop) and part.compliant:
         fields |= _compliant_fields(part)
     return fields
@@ -385,9 +480,25 @@ def _compliant_fields(stop: Stop) -> dict[str, Meta]:
     return {"restitution": restitution, "stiffness": stiffness}
 
 
+def field_of(part: Part, name: str) -> Quantity | None:
+    """Return a field, or the expression of its default; None if it is not given.
+
+    Examples
+    --------
+    >>> kind = FlexureType("hinge", "beam", 1e-3, 1e-2, 2e11, 7800.0, profile="notch",
+    ...                    notch_radius=4e-3)
+    >>> field_of(kind, "end_thickness")
+    'hinge.thickness + 2*(hinge.notch_radius)'
+    """
+    given: Quantity | None = getattr(part, name)
+    if given is None and isinstance(part, FlexureType):
+        return part.default(name)
+    return given
+
+
 def value(part: Part, name: str, values: Mapping[str, float]) -> float:
     """Return the value of a field: of the parameter ``part.field``, or of its expression."""
-    quantity = getattr(part, name)
+    quantity = field_of(part, name)
     if isinstance(quantity, str):
         return affine(quantity)(values)
     return values[f"{part.name}.{name}"]

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Polygon
+from matplotlib.patches import PathPatch
 from matplotlib.patheffects import withStroke
 
 from ..base.errors import ParameterError, PrbmError
@@ -25,6 +25,7 @@ from ..drawing.style import (
     PROBE,
     STRAIGHT,
     WALL,
+    area,
     own_style,
 )
 from ..mechanics.arrays import Complex
@@ -264,13 +265,12 @@ class _Drawing:
             many = len(z) - 2 > CURVED_PIVOTS_MAX
             self.line(z if many else curve(z, line.guided), FLEXURE, 3.6, 2.0)
             self.line(z, LINK, 0.9, 2.5)
-            if pivots:
+            if pivots and line.jointed:
                 self.pivots(z[1:-1], 1.5 if many else 3.4, 4.0)
         for name in self.shapes.bodies:
-            z = self.shapes.body(name, E) * self.factor
             self.axes.add_patch(
-                Polygon(
-                    np.column_stack([z.real, z.imag]), facecolor=BODY, edgecolor=LINK,
+                PathPatch(
+                    area(self.shapes.areas(name, E), self.factor), facecolor=BODY, edgecolor=LINK,
                     linewidth=1.0, alpha=0.9, joinstyle="round", zorder=3.0,
                 )
             )  # fmt: skip

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Polygon
+from matplotlib.patches import PathPatch
 from numpy.typing import NDArray
 
 from ..base.unit_text import length_unit, time_unit
@@ -29,6 +29,7 @@ from ..drawing.style import (
     REST,
     STRAIGHT,
     WALL,
+    area,
     own_style,
 )
 from ..mechanics.arrays import Complex
@@ -139,20 +140,21 @@ class Scene:
         self.curves, self.links = {}, {}
         for line in self.shapes.flexures:
             pivots, name = len(line.outline.c) - 2, line.flexure.name
-            if pivots <= CURVED_PIVOTS_MAX:
+            if pivots <= CURVED_PIVOTS_MAX or not line.jointed:
                 self.curves[name] = self._moving_line(FLEXURE, 5.0, zorder=2.0)
             self.links[name] = self._moving_line(
-                LINK, 1.3, zorder=4.0, marker="o", markerfacecolor="white", markevery=slice(1, -1),
+                LINK, 1.3, zorder=4.0, marker="o" if line.jointed else "", markerfacecolor="white",
+                markevery=slice(1, -1),
                 markersize=4.2 if pivots <= CURVED_PIVOTS_MAX else 2.0,
             )  # fmt: skip
 
     def _set_bodies(self) -> None:
-        self.bodies: dict[str, Polygon] = {}
+        self.bodies: dict[str, PathPatch] = {}
         self.centres: dict[str, Line2D] = {}
         for name in self.system.bodies:
-            patch = Polygon(
-                np.zeros((len(self.shapes.bodies[name]), 2)), facecolor=BODY, edgecolor=LINK,
-                linewidth=1.2, alpha=0.9, joinstyle="round", zorder=3.0,
+            patch = PathPatch(
+                area([self.shapes.bodies[name]]), facecolor=BODY, edgecolor=LINK, linewidth=1.2,
+                alpha=0.9, joinstyle="round", zorder=3.0,
             )  # fmt: skip
             self.stage.add_patch(patch)
             self.moving.append(patch)
@@ -280,10 +282,9 @@ class Scene:
             z, name = corners(line.outline, E), line.flexure.name
             self._move(self.links[name], z)
             if name in self.curves:
-                self._move(self.curves[name], curve(z, line.guided))
+                self._move(self.curves[name], curve(z, line.guided) if line.jointed else z)
         for name, patch in self.bodies.items():
-            z = self.shapes.body(name, E) * self.factor
-            patch.set_xy(np.column_stack([z.real, z.imag]))
+            patch.set_path(area(self.shapes.areas(name, E), self.factor))
             self._move(self.centres[name], np.array([self.shapes.centre(name, E)]))
         self._move(self.pins, self.shapes.pins(E))
         self._move(self.probes, self.shapes.probes(E))

@@ -11,6 +11,10 @@ of the signal.  Step by step the error of the motion therefore falls with h^5, a
 h^4.  The integrals are computed by Gauss' formula with three points.
 
 Walls, impulses and the mobilities of walls have their value at the start of each piece instead.
+A wall joins its reference within two communication steps, which the pieces are.  If a signal
+moves a wall, no step of the simulation is therefore longer than ``Driver.wall_step``.  It is at
+most a hundredth of each interval between breaks in which a wall moves.
+
 The last piece before a row is short and has the value of the signal at this row, because some
 outputs (contact and base forces) depend on the present value of the inputs.
 """
@@ -27,6 +31,7 @@ from .signals import Signal, after
 
 SAMPLING_ERROR_FACTOR = 720.0  # A harmonic oscillation has the relative error (omega h)^4 / 720.
 IMPULSE = "impulse"  # Group of the inputs that are impulses, as in force.impulse.x.
+SAMPLED = (*WALL_INPUTS, MOBILITY, IMPULSE)
 SAMPLING_TOLERANCE_MIN = 1e-12
 LAST_PIECE_RTOL = 1e-6  # Duration of the last piece before a row, relative to the row spacing.
 SAMPLING_STEPS_MAX = 10_000_000  # More steps are a mistake in the unit of a frequency or a time.
@@ -45,16 +50,16 @@ class Driveable(Protocol):
         """Continue the motion to a time [s]."""
 
 
-def _is_sampled(name: str) -> bool:
-    """Return whether an input acts by its values at single times: a wall or an impulse.
+def _kind(name: str) -> str:
+    """Return the kind of an input: the last word of its name, or :data:`IMPULSE`.
 
     Examples
     --------
-    >>> _is_sampled("force.impulse.x"), _is_sampled("stop.velocity"), _is_sampled("force.x")
-    (True, True, False)
+    >>> _kind("force.impulse.x"), _kind("stop.velocity"), _kind("impulse.x")
+    ('impulse', 'velocity', 'x')
     """
-    *_, group, last = ["", *name.split(".")]
-    return last in (*WALL_INPUTS, MOBILITY) or (group == IMPULSE and last in LOADS)
+    *parts, last = name.split(".")
+    return IMPULSE if parts[1:] == [IMPULSE] and last in LOADS else last
 
 
 class Driver:
@@ -72,10 +77,13 @@ class Driver:
         self.signals = dict(signals)
         self.omega, self.share, self.now = 0.0, 1.0, start
         self.breaks = sorted({t for signal in signals.values() for t in signal.breaks if t > start})
-        self.sampled = {name for name in signals if _is_sampled(name)}
-        self.wall_step = math.inf  # Longest step of a wall that is driven by a signal [s].
+        kinds = {name: _kind(name) for name in signals}
+        self.walls = [name for name, kind in kinds.items() if kind in WALL_INPUTS]
+        # Inputs that act by their values at single times.
+        self.sampled = {name for name, kind in kinds.items() if kind in SAMPLED}
+        self.wall_step = math.inf  # Longest step if signals move walls [s].
         for name, signal in signals.items():
-            if name.endswith(".displacement"):
+            if kinds[name] == "displacement":
                 _check_continuity(name, signal, start)
 
     def values(self, t: float) -> dict[str, float]:
@@ -105,7 +113,7 @@ class Driver:
         self.omega = 2.0 * math.pi * frequency
         self.share = (SAMPLING_ERROR_FACTOR * max(tolerance, SAMPLING_TOLERANCE_MIN)) ** 0.25
         points = [self.now, *self._between(self.now, stop_time), stop_time]
-        walls = [s for name, s in self.signals.items() if _is_wall(name)]
+        walls = [self.signals[name] for name in self.walls]
         driven = [
             (a, b) for a, b in pairwise(points) if any(s.rate(a, b) is not None for s in walls)
         ]
@@ -114,7 +122,7 @@ class Driver:
             default=math.inf,
         )
         for name, signal in self.signals.items():
-            longest = self.wall_step if _is_wall(name) else math.inf
+            longest = self.wall_step if name in self.walls else math.inf
             steps = sum(
                 (b - a) / min(self._step((signal,), a, b), longest) for a, b in pairwise(points)
             )
@@ -178,11 +186,6 @@ class Driver:
         simulation.advance(middle)
         simulation.set(second)
         simulation.advance(end)
-
-
-def _is_wall(name: str) -> bool:
-    """Return whether an input moves the wall of a stop."""
-    return name.rpartition(".")[2] in WALL_INPUTS
 
 
 def _check_continuity(name: str, signal: Signal, start: float) -> None:

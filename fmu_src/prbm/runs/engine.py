@@ -122,7 +122,7 @@ def simulation(
     ------
     ParameterError, EquilibriumError, TypeError
         As :class:`prbm.hybrid.simulation.Simulation`; or if the engine is unknown.
-    CompilerError, LibraryError
+    CompilerError, LibraryError, DamagedLibraryError
         If the kernel is chosen and cannot be compiled or loaded.
 
     Examples
@@ -133,8 +133,7 @@ def simulation(
     >>> int(motion.outputs()["stop.impact_count"])
     1
     """
-    if engine not in (None, *ENGINES):
-        raise ParameterError(f"engine = {engine!r} must be one of {', '.join(ENGINES)}")
+    check_engine(engine)
     if engine == KERNEL and step is not None:
         raise ParameterError(f"step = {step} s: fixed steps need engine = {PYTHON!r}")
     if engine == KERNEL or (engine is None and step is None and kernel_available()):
@@ -147,12 +146,24 @@ def simulation(
     return Simulation(mechanism, values, start_time=start_time, tolerance=tolerance, step=step)
 
 
+def check_engine(engine: str | None) -> None:
+    """Reject the name of an unknown engine.
+
+    Raises
+    ------
+    ParameterError
+        If the engine is neither None nor one of :data:`ENGINES`.
+    """
+    if engine not in (None, *ENGINES):
+        raise ParameterError(f"engine = {engine!r} must be one of {', '.join(ENGINES)}")
+
+
 @cache
 def kernel_available() -> bool:
     """Return whether the kernel can be loaded; log the reason if it cannot."""
     try:
         library()
-    except (PrbmError, OSError) as error:
+    except PrbmError as error:
         _warn(f"the Python engine is used, which is slower: {error}")
         return False
     return True

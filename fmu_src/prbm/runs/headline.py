@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from ..base.unit_text import frequency_unit, length_unit, time_unit
 from ..mechanics.assembly import assemble
 from ..mechanics.statics import free_displacement
+from ..mechanics.stress import stressed
 from ..mechanics.system import System, unit
 from ..mechanism.description import Mechanism
 from ..mechanism.expressions import affine
@@ -101,7 +102,28 @@ def headline(columns: Columns, mechanism: Mechanism, values: Mapping[str, float]
                 f"{_place(columns, system)}, pressed with "
                 f"{column(columns, f'{stop}.force')[-1]:.4g} N"
             )
+    lines += _stress(columns, mechanism, system.length)
     return [*lines, _settled(columns, span)] if moving else lines
+
+
+def _stress(columns: Columns, mechanism: Mechanism, size: float) -> list[str]:
+    """Return a line about the largest stress of each flexure whose stress is an output."""
+    kinds = {kind.name: kind for kind in mechanism.flexure_types}
+    time = column(columns, "time")
+    span = float(time[-1] - time[0])
+    lines = []
+    for flexure in (mechanism.flexures[i] for i in stressed(mechanism)):
+        peak, when, place = (
+            float(column(columns, f"{flexure.name}.peak_stress{output}")[-1])
+            for output in ("", "_time", "_position")
+        )
+        strength = kinds[flexure.type].yield_strength
+        factor = f", safety factor {strength / peak:.3g} (yield)" if strength and peak else ""
+        lines.append(
+            f"stress in {flexure.name:10} {1e-6 * peak:.4g} MPa at t = {instant(when, span, 5)}, "
+            f"{length(place, size)} from the start{factor}"
+        )
+    return lines
 
 
 def _settled(columns: Columns, span: float) -> str:

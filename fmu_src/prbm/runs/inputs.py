@@ -11,7 +11,18 @@ from ..base.errors import ParameterError
 from ..base.names import proposal, unknown
 from ..mechanics.inputs import input_units
 from ..mechanism.description import Mechanism
-from .signals import Function, Signal, Slope, Steps, Table, Wave, table
+from .signals import (
+    Function,
+    RowError,
+    Signal,
+    Slope,
+    Steps,
+    Table,
+    Wave,
+    sawtooth,
+    table,
+    trapezoid,
+)
 
 Source = str | float | Signal | Callable[[float], float] | Sequence[Any]
 """A text, a number, a signal, a function of time, or a pair of arrays (times, values)."""
@@ -24,6 +35,8 @@ SHAPES: dict[str, Arguments] = {  # Arguments with their units and default value
     "step": {"height": (SIGNAL, REQUIRED), "start": ("s", 0.0)},
     "pulse": {"height": (SIGNAL, REQUIRED), "duration": ("s", REQUIRED), "start": ("s", 0.0)},
     "half-sine": {"height": (SIGNAL, REQUIRED), "duration": ("s", REQUIRED), "start": ("s", 0.0)},
+    "sawtooth": {"height": (SIGNAL, REQUIRED), "duration": ("s", REQUIRED), "start": ("s", 0.0)},
+    "trapezoid": {"height": (SIGNAL, REQUIRED), "duration": ("s", REQUIRED), "start": ("s", 0.0)},
     "sine": {
         "amplitude": (SIGNAL, REQUIRED), "frequency": ("Hz", REQUIRED), "start": ("s", 0.0),
         "duration": ("s", math.inf), "phase": ("rad", 0.0),
@@ -34,6 +47,7 @@ SHAPES: dict[str, Arguments] = {  # Arguments with their units and default value
     },
 }  # fmt: skip
 FILE = "csv"
+DURATION_MIN = 1e-15  # s: a shorter signal is a mistake in a unit.
 PLACEHOLDER = re.compile(r"\{([\w.]+)\}")
 
 
@@ -135,7 +149,7 @@ def _signal(name: str, source: Source, unit: str) -> Signal:
     if isinstance(source, Signal):
         return source
     if callable(source):
-        return Function(source)
+        return Function(source, name, unit)
     if isinstance(source, bool | bytes):
         raise ParameterError(f"{name} = {source!r}: {_forms(unit)}")
     try:
@@ -171,7 +185,8 @@ def read_signal(name: str, text: str, unit: str) -> Signal:
         Name of the input, for messages.
     text : str
         A quantity; ``step(height, start)``, ``pulse(height, duration, start)``,
-        ``half-sine(height, duration, start)``, ``sine(amplitude, frequency, start, duration,
+        ``half-sine(height, duration, start)``, ``sawtooth(height, duration, start)``,
+        ``trapezoid(height, duration, start)``, ``sine(amplitude, frequency, start, duration,
         phase)``, ``chirp(amplitude, from, to, duration, start, phase)``, where ``start`` is 0 by
         default; or ``csv(FILE, COLUMN)``.  Arguments may be named: ``start=10 ms``.
     unit : str
@@ -203,9 +218,19 @@ def read_signal(name: str, text: str, unit: str) -> Signal:
     if shape not in SHAPES:
         hint = proposal(shape, dict.fromkeys([*SHAPES, FILE]))
         raise ParameterError(f"{where}: unknown shape {shape!r}; {hint}")
-    known = SHAPES[shape]
+    numbers = _numbers(where, shape, words, unit)
+    try:
+        return _shaped(shape, numbers)
+    except ParameterError as error:
+        raise ParameterError(f"{where}: {error}") from None
+
+
+def _numbers(where: str, shape: str, words: Sequence[str], unit: str) -> dict[str, float]:
+    """Return the arguments of a shape by name, in SI and within their bounds."""
+    from ..files.settings import quantity  # imported here: pint takes half a second
+
+    known, numbers = SHAPES[shape], {}
     given = _named(where, words, known)
-    numbers = {}
     for key, (dimension, default) in known.items():
         own = unit if dimension is SIGNAL else dimension
         if key in given:
@@ -218,7 +243,11 @@ def read_signal(name: str, text: str, unit: str) -> Signal:
         if key in numbers and not numbers[key] > 0.0:
             own = known[key][0]
             raise ParameterError(f"{where}: {key} = {numbers[key]:g} {own} must be positive")
-    return _shaped(shape, numbers)
+    if numbers.get("duration", math.inf) < DURATION_MIN:
+        raise ParameterError(
+            f"{where}: duration = {numbers['duration']:g} s must be at least {DURATION_MIN:g} s"
+        )
+    return numbers
 
 
 def _named(where: str, words: Sequence[str], known: Arguments) -> dict[str, str]:
@@ -255,6 +284,10 @@ def _shaped(shape: str, x: Mapping[str, float]) -> Signal:
     if shape == "half-sine":
         f = 0.5 / x["duration"]
         return Wave(x["height"], f, f, start, end)
+    if shape == "sawtooth":
+        return sawtooth(x["height"], start, end)
+    if shape == "trapezoid":
+        return trapezoid(x["height"], start, end)
     if shape == "sine":
         return Wave(x["amplitude"], x["frequency"], x["frequency"], start, end, x["phase"])
     return Wave(x["amplitude"], x["from"], x["to"], start, end, x["phase"])
@@ -278,36 +311,36 @@ def _from_file(where: str, words: Sequence[str], unit: str) -> Table:
         hint = proposal(name, dict.fromkeys(names[1:]))
         raise ParameterError(f"{where}: the file has no column {name!r}; {hint}")
     k = names.index(name, 1)
-    factors = [_factor(where, head[0], "s"), _factor(where, head[k], unit)]
+    factors = {0: _factor(where, head[0], "s"), k: _factor(where, head[k], unit)}
+    for line, row in rows.items():
+        if not _numeric(row, (0, k)):
+            raise ParameterError(
+                f"{where}: line {line} has no number for {names[0]} or {name}; correct it"
+            )
+    times, values = ([float(row[i]) * f for row in rows.values()] for i, f in factors.items())
     try:
-        numbers = [[float(row[0]) * factors[0], float(row[k]) * factors[1]] for row in rows]
-    except (ValueError, IndexError):
-        row = next(n for n, row in enumerate(rows) if not _numeric(row, (0, k)))
-        raise ParameterError(
-            f"{where}: line {row + 2} has no number for {names[0]} or {name}; correct it"
-        ) from None
-    try:
-        times, values = ([row[i] for row in numbers] for i in (0, 1))
         return Table(tuple(times), tuple(values))
-    except ParameterError as error:
-        raise ParameterError(f"{where}: {error}") from None
+    except RowError as error:
+        raise ParameterError(f"{where}: line {[*rows][error.row]}: {error.reason}") from None
 
 
-def _rows(where: str, path: Path) -> tuple[list[str], list[list[str]]]:
-    """Return the head and the rows of a CSV file."""
+def _rows(where: str, path: Path) -> tuple[list[str], dict[int, list[str]]]:
+    """Return the head of a CSV file, and the other rows by the numbers of their last lines."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
-            lines = [line for line in csv.reader(file) if line]
+            reader = csv.reader(file)
+            rows = dict((reader.line_num, row) for row in reader if row)
     except OSError as error:
         raise ParameterError(f"{where}: {path} cannot be read ({error.strerror})") from None
     except (UnicodeDecodeError, csv.Error) as error:
         raise ParameterError(f"{where}: {path} is not a CSV file ({error})") from None
-    if len(lines) < 3 or len(lines[0]) < 2 or _numeric(lines[0], (0,)):
+    head = rows.pop(min(rows, default=0), [])
+    if len(rows) < 2 or len(head) < 2 or _numeric(head, (0,)):
         raise ParameterError(
             f'{where}: {path} must have a head, as in "t [s],a [m/s2]", and at least two rows; '
             "the first column is the time, and the columns are separated by commas"
         )
-    return lines[0], lines[1:]
+    return head, rows
 
 
 def _numeric(row: Sequence[str], columns: Sequence[int]) -> bool:

@@ -114,7 +114,7 @@ def simulate(
     driver = Driver(signals(mechanism, inputs or {}, values))
     values = {**values, **driver.values(0.0)}
     duration, spacing = (
-        None if x is None else _number(name, x, "s")
+        None if x is None else in_unit(name, x, "s")
         for name, x in (("stop_time", stop_time), ("step", step))
     )
     if duration is None or spacing is None:
@@ -123,7 +123,7 @@ def simulate(
         spacing = default.step if spacing is None else spacing
     times = communication_points(duration, spacing)
     if tolerance is not None:
-        tolerance = _number("tolerance", tolerance, "")
+        tolerance = in_unit("tolerance", tolerance, "")
     motion = simulation(mechanism, values, tolerance=tolerance, engine=engine)
     wanted = motion.values["solver.tolerance"] if tolerance is None else tolerance
     if replaced := replaced_tolerance(wanted):
@@ -183,12 +183,12 @@ def in_si(mechanism: Mechanism, changes: Mapping[str, float | str] | None) -> Ma
         if name not in units:
             raise ParameterError(unknown(name, units))
     return {
-        name: _number(name, x, units[name]) if isinstance(x, str) else x
+        name: in_unit(name, x, units[name]) if isinstance(x, str) else x
         for name, x in (changes or {}).items()
     }
 
 
-def _number(name: str, value: Any, unit: str) -> float:
+def in_unit(name: str, value: Any, unit: str) -> float:
     """Return a number in a unit, from a number or a text with a unit."""
     if isinstance(value, str):
         from ..files.settings import quantity  # imported here: pint takes half a second

@@ -8,14 +8,38 @@ import math
 from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from ..base.errors import ParameterError
 from ..mechanics.arrays import Real
+from ..mechanism.parameters import finite
 
+RAMP_SHARE = 0.1  # Of the duration: the rise and the fall of a trapezoid.
 SLOPE_STEP = 1e-6  # Difference for the slope of a function, relative to the time or to 1 s.
+SLOPE_WEIGHTS = (11 / 6, -3.0, 3 / 2, -1 / 3)
+"""Weights of the values at t, t - h, t - 2 h and t - 3 h in h times the slope, of third order."""
+
+
+class RowError(ParameterError):
+    """A row of a table is invalid.
+
+    Parameters
+    ----------
+    row : int
+        Index of the row.
+    reason : str
+        The mistake and the remedy.
+    """
+
+    def __init__(self, row: int, reason: str) -> None:
+        super().__init__(row, reason)
+        self.row, self.reason = row, reason
+
+    def __str__(self) -> str:
+        return f"row {self.row}: {self.reason}"
 
 
 @runtime_checkable
@@ -50,6 +74,12 @@ class Steps:
     levels : (m + 1,) tuple of float
         Values before, between and after them.
 
+    Raises
+    ------
+    ParameterError
+        If the numbers of breaks and levels do not match, the breaks do not increase, or a number is
+        not finite.
+
     Examples
     --------
     >>> step = Steps((0.1,), (0.0, 3.0))
@@ -59,6 +89,22 @@ class Steps:
 
     breaks: tuple[float, ...]
     levels: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.levels) != len(self.breaks) + 1:
+            raise ParameterError(
+                f"{len(self.breaks)} breaks and {len(self.levels)} levels do not match: give one "
+                "level more than breaks"
+            )
+        if not all(map(math.isfinite, (*self.breaks, *self.levels))):
+            raise ParameterError(
+                f"breaks = {self.breaks} s and levels = {self.levels} must be finite"
+            )
+        for first, second in pairwise(self.breaks):
+            if not first < second:
+                raise ParameterError(
+                    f"the breaks must increase, but {second:g} s follows {first:g} s"
+                )
 
     def value(self, t: float, inside: float) -> float:
         """Return the value on an interval."""
@@ -92,6 +138,11 @@ class Wave:
     phase : float
         Phase at the start [rad].
 
+    Raises
+    ------
+    ParameterError
+        If the end is not after the start, or a frequency is not finite.
+
     Examples
     --------
     >>> Wave(2.0, f=250.0, f1=250.0, start=0.0, end=0.002).value(0.001, inside=0.001)
@@ -104,6 +155,18 @@ class Wave:
     start: float
     end: float
     phase: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not self.start < self.end:
+            raise ParameterError(
+                f"the end, t = {self.end:g} s, is not after the start, t = {self.start:g} s: give "
+                "a longer duration"
+            )
+        if not (math.isfinite(self.f) and math.isfinite(self.f1)):
+            raise ParameterError(
+                f"the frequencies {self.f:g} Hz and {self.f1:g} Hz must be finite: check the units "
+                "of times and frequencies"
+            )
 
     @property
     def breaks(self) -> tuple[float, ...]:
@@ -177,16 +240,16 @@ class Table:
             )
         for k, pair in enumerate(zip(self.times, self.values, strict=True)):
             if not all(map(math.isfinite, pair)):
-                raise ParameterError(
-                    f"row {k} has the time {pair[0]:g} s and the value {pair[1]:g}; both must be "
-                    "finite"
+                raise RowError(
+                    k, f"the time {pair[0]:g} s and the value {pair[1]:g} must be finite"
                 )
         for k in range(1, len(self.times)):
             third = k > 1 and self.times[k] == self.times[k - 2]
             if self.times[k] < self.times[k - 1] or third:
-                raise ParameterError(
-                    f"the times must increase, two equal ones are a jump; row {k} has "
-                    f"{self.times[k]:g} s after {self.times[k - 1]:g} s"
+                raise RowError(
+                    k,
+                    f"the times must increase, two equal ones are a jump; {self.times[k]:g} s "
+                    f"follows {self.times[k - 1]:g} s",
                 )
 
     @property
@@ -224,10 +287,14 @@ class Function:
     Parameters
     ----------
     function : callable
-        Returns the value at a time [s].
+        Returns the value at a time [s].  It is not called with times before 0.
+    name, unit : str
+        Name and unit of the input, for messages.
     """
 
     function: Callable[[float], Any]
+    name: str = "the function of time"
+    unit: str = ""
 
     @property
     def breaks(self) -> tuple[float, ...]:
@@ -235,13 +302,21 @@ class Function:
         return ()
 
     def value(self, t: float, inside: float) -> float:
-        """Return the value at time t."""
-        return float(self.function(t))
+        """Return the value at time t.
+
+        Raises
+        ------
+        ParameterError
+            If the function does not return a finite number.
+        """
+        return finite(f"{self.name}({t:g} s)", self.function(t), self.unit)
 
     def slope(self, t: float, inside: float) -> float:
-        """Return a central difference."""
+        """Return a difference to earlier times; at the start, to later ones."""
         h = SLOPE_STEP * max(abs(t), 1.0)
-        return (self.value(t + h, inside) - self.value(t - h, inside)) / (2.0 * h)
+        if 0.0 <= t < len(SLOPE_WEIGHTS) * h:
+            h = -h
+        return sum(w * self.value(t - k * h, inside) for k, w in enumerate(SLOPE_WEIGHTS)) / h
 
     def rate(self, start: float, end: float) -> float:
         """Return 0, since the rate is not known."""
@@ -294,3 +369,27 @@ def after(signal: Signal, t: float) -> float:
 def table(times: Real, values: Real) -> Table:
     """Return a table from arrays (m,) of times [s] and values."""
     return Table(*(tuple(np.asarray(x, float).ravel().tolist()) for x in (times, values)))
+
+
+def sawtooth(height: float, start: float, end: float) -> Table:
+    """Return a pulse that rises from a start to its height at an end [s], where it falls to 0.
+
+    Examples
+    --------
+    >>> pulse = sawtooth(3.0, 0.0, 0.2)
+    >>> pulse.value(0.1, inside=0.1), pulse.value(0.2, inside=0.19), pulse.value(0.2, inside=0.21)
+    (1.5, 3.0, 0.0)
+    """
+    return Table((start, end, end), (0.0, height, 0.0))
+
+
+def trapezoid(height: float, start: float, end: float) -> Table:
+    """Return a pulse that rises and falls in a tenth of its duration each.
+
+    Examples
+    --------
+    >>> trapezoid(3.0, 0.0, 0.2).value(0.1, inside=0.1)
+    3.0
+    """
+    ramp = RAMP_SHARE * (end - start)
+    return Table((start, start + ramp, end - ramp, end), (0.0, height, height, 0.0))

@@ -24,15 +24,18 @@ from scipy.optimize import minimize, minimize_scalar
 from ..base.errors import ParameterError, PrbmError
 from ..base.names import proposal
 from ..base.progress import Progress
+from ..hybrid.configuration import checked_tolerance
+from ..hybrid.given import start_values
 from ..hybrid.simulation import Simulation
 from ..interface.variables import variables
 from ..mechanics.arrays import Real
 from ..mechanism.description import Mechanism
+from ..runs.engine import check_engine
 from ..runs.experiment import experiment
 from ..runs.inputs import Source, filled, placeholders, signals
 from ..runs.quantities import QUANTITIES
 from ..runs.result import names
-from ..runs.run import in_si, simulate
+from ..runs.run import communication_points, in_si, in_unit, simulate
 from ..runs.signals import Signal
 from .outputs import FAILED, OK, QUANTITY, Outcome, Output, SpecificationError, evaluate
 from .outputs import parse_output as parse
@@ -66,12 +69,12 @@ class Setup:
     inputs : mapping
         Inputs over time of all simulations.
     options : mapping
-        Further arguments of :func:`prbm.runs.run.simulate`: stop_time, step, tolerance.
+        Further arguments of :func:`prbm.runs.run.simulate`: stop_time, step, tolerance, engine.
     """
 
     mechanism: Mechanism
     outputs: tuple[Output, ...]
-    values: Mapping[str, float | str]
+    values: Mapping[str, float]
     inputs: Mapping[str, Source]
     options: Mapping[str, Any]
 
@@ -174,6 +177,7 @@ def study(
     step: float | str | None = None,
     tolerance: float | None = None,
     workers: int | None = None,
+    engine: str | None = None,
     progress: Progress | None = None,
 ) -> Study:
     """Simulate a mechanism on a grid of parameters, and find the optimum of an output.
@@ -195,7 +199,7 @@ def study(
         Outputs as of :func:`prbm.sweeps.sweep.sweep`: ``settling``, ``max(abs(shuttle.vx))``.
     minimise, maximise : str or None
         The output whose optimum is searched, at most one of them.
-    values, inputs, stop_time, tolerance
+    values, inputs, stop_time, tolerance, engine
         As for :func:`prbm.simulate`.
     step : float, str or None
         Communication step, the resolution of the outputs in time [s]; None: 1/4000 of the duration.
@@ -208,6 +212,8 @@ def study(
     ------
     ParameterError
         If an argument is invalid, or no simulation has a value of the output to be optimised.
+    UserMistake
+        If a text is not a quantity of the right dimension.
     """
     within = placeholders(inputs or {})
     samples = _checked(mechanism, vary, within)
@@ -216,15 +222,14 @@ def study(
     wanted = minimise if maximise is None else maximise
     texts = list(dict.fromkeys([*outputs, *([] if wanted is None else [wanted])]))
     units = _units(mechanism)
-    given = dict(values or {})
-    end = _duration(mechanism, given, stop_time)
+    given = dict(in_si(mechanism, values))
     setup = Setup(
         mechanism, _outputs(texts, units), given, dict(inputs or {}),
-        {"stop_time": end, "step": end / STEPS if step is None else step, "tolerance": tolerance},
+        _options(mechanism, given, stop_time, step, tolerance, engine),
     )  # fmt: skip
     first = {name: float(x[0]) for name, x in samples.items()}
-    signals(mechanism, filled(setup.inputs, first), {**setup.values, **first})  # Report mistakes.
-    for name in setup.values.keys() & samples.keys():
+    signals(mechanism, filled(setup.inputs, first), {**given, **first})  # Report mistakes.
+    for name in given.keys() & samples.keys():
         raise ParameterError(f"{name} is varied and has a fixed value; remove one of them")
     points = np.array(list(itertools.product(*samples.values())))
     with _pool(setup, workers, len(points)) as run:
@@ -244,17 +249,32 @@ def study(
     return Study(found.varied, points, found.outputs, found.units, found.messages, optimum)
 
 
-def _duration(
-    mechanism: Mechanism, values: Mapping[str, Any], stop_time: float | str | None
-) -> float:
-    """Return the duration of the simulations [s]."""
-    if isinstance(stop_time, str):
-        from ..files.settings import quantity  # imported here: pint takes half a second
+def _options(
+    mechanism: Mechanism,
+    values: Mapping[str, float],
+    stop_time: float | str | None,
+    step: float | str | None,
+    tolerance: float | None,
+    engine: str | None,
+) -> dict[str, Any]:
+    """Return the further arguments of all simulations.
 
-        return quantity(stop_time, "s", "stop_time =")
+    Raises
+    ------
+    ParameterError
+        If one of the values or arguments is invalid, so that every simulation would fail.
+    """
+    check_engine(engine)
+    start_values(mechanism, values, 0.0)
     if stop_time is None:
-        return experiment(mechanism, in_si(mechanism, values)).stop_time
-    return float(stop_time)
+        end = experiment(mechanism, values, engine).stop_time
+    else:
+        end = in_unit("stop_time", stop_time, "s")
+    spacing = end / STEPS if step is None else in_unit("step", step, "s")
+    communication_points(end, spacing)
+    if tolerance is not None:
+        tolerance = checked_tolerance(in_unit("tolerance", tolerance, ""))
+    return {"stop_time": end, "step": spacing, "tolerance": tolerance, "engine": engine}
 
 
 # --- checks ---------------------------------------------------------------------------------------

@@ -1,9 +1,10 @@
 /* A small importer of FMUs for the tests: FMI 2.0 and 3.0, co-simulation with and without event
  * mode, model exchange.
  *
- * It reads no XML.  A job file, written by tests/support/c_importer.py, lists the library, the values
- * to set, the communication points and the variables to record.  Numbers are read and written as the
- * 16 hexadecimal digits of their bits, so that runs of all platforms can be compared bit by bit.
+ * It reads no XML.  A job file, written by tests/support/c_importer.py, lists the library, the
+ * values to set, the communication points and the variables to record.  Numbers are read and
+ * written as the 16 hexadecimal digits of their bits, so that runs of all platforms can be compared
+ * bit by bit.
  */
 #ifndef IMPORTER_H
 #define IMPORTER_H
@@ -111,7 +112,7 @@ typedef struct {
     Functions3 f3;
 } Library;
 
-/* Load a library and all functions of a version of FMI.  Missing functions are printed to stderr. */
+/* Load a library and all functions of a version of FMI.  Print missing functions to stderr. */
 bool library_open(Library *library, const char *path, int version);
 void library_close(Library *library);
 

@@ -41,7 +41,7 @@ static bool fine(Instance *instance, int status, const char *call) {
     return status <= 1;
 }
 
-/* Call the function of the version of the FMU.  SAME is for functions with the same name in both. */
+/* Call the function of the FMU's version.  SAME is for functions with the same name in both. */
 #define CALL(instance, name2, arguments2, name3, arguments3)                                       \
     ((instance)->library->version == 2                                                             \
          ? fine((instance), (int)(instance)->library->f2.name2 arguments2, "fmi2" #name2)          \

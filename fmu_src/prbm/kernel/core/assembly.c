@@ -70,6 +70,9 @@ static void add_body(System *system, int body, Scratch *scratch) {
     Complex drawn = at_point(system, part->centre);
     Place centre = new_place(system, scratch);
     on_body(system, body, drawn, &centre);
+    if (system->mechanism->stressed_count > 0) {
+        system->body_masses[body - 1] = system->p;
+    }
     add_mass(system, &centre, evaluate(part->mass, system->values));
     add_frame(system, body, drawn, frame, scratch);
     system->J[frame->arm] += evaluate(part->inertia, system->values);
@@ -150,8 +153,8 @@ static void add_frictions(System *system, const Complex *e0, Scratch *scratch) {
     scratch->used = mark;
 }
 
-/* Return the end of the block of a symmetric matrix (size, size) that begins at start.  linked marks
- * the elements that are not zero.  The columns from the end on share none with the block. */
+/* Return the end of the block of a symmetric matrix (size, size) that begins at start.  linked
+ * marks the elements that are not zero.  The columns from the end on share none with the block. */
 static int end_of_block(int size, const bool *linked, int start) {
     int end = start + 1;
     for (int j = start; j < end; j++) {
@@ -162,11 +165,28 @@ static int end_of_block(int size, const bool *linked, int start) {
     return end;
 }
 
+/* Return the row of a block between start and end, counted in the block, that leaves most elements
+ * zero: those of later rows in earlier columns. */
+static int row_apart(int size, const bool *linked, int start, int end) {
+    int apart = 0, most = 0;
+    for (int row = start + 1; row < end - 1; row++) {
+        int zeros = (row - start) * (end - 1 - row);
+        for (int i = row + 1; i < end; i++) {
+            for (int j = start; j < row; j++) {
+                zeros = linked[i * size + j] ? 0 : zeros;
+            }
+        }
+        apart = zeros > most ? row - start : apart;
+        most = zeros > most ? zeros : most;
+    }
+    return apart;
+}
+
 static int find_blocks(int size, const bool *linked, Block *blocks) {
     int count = 0;
     for (int start = 0; start < size;) {
         int end = end_of_block(size, linked, start);
-        Block block = {start, end - start};
+        Block block = {start, end - start, row_apart(size, linked, start, end)};
         blocks[count++] = block;
         start = end;
     }
@@ -242,8 +262,8 @@ static void add_moments(System *system, Scratch *scratch) {
         add_moments_of(system, system->m[k], system->A + (size_t)k * d);
     }
     find_all_blocks(system, scratch);
-    set_block_maps(system, scratch);
     pack_blocks(system);
+    set_block_maps(system, scratch);
 }
 
 /* Return the size of the drawn mechanism [m]: the largest distance between points of the ground and
@@ -456,7 +476,7 @@ static bool stubs(System *system, Scratch *scratch, Problem *problem) {
 
 static void clear(System *system) {
     size_t n = (size_t)system->n, d = (size_t)system->d, b = (size_t)system->b;
-    system->p = system->spring_count = 0;
+    system->p = system->spring_count = system->corner_count = 0;
     memset(system->q0, 0, n * sizeof *system->q0);
     memset(system->J, 0, d * sizeof *system->J);
     for (int k = 0; k < system->mechanism->map.count; k++) {

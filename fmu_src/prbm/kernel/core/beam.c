@@ -4,8 +4,6 @@
 #include "core/beam.h"
 #include "core/matrix.h"
 
-#define HALF_TURN 3.141592653589793 /* rad */
-
 /* Compute the Legendre polynomials P_0 to P_order at x. */
 static void legendre(int order, double x, double *P) {
     P[0] = 1.0;
@@ -44,42 +42,292 @@ PRBM void integrals(int order, double x, double *S) {
     }
 }
 
-PRBM Beam take_beam(int order, int nodes, Scratch *scratch) {
-    size_t n = (size_t)order + 1, N = (size_t)nodes;
-    Beam beam = {order, nodes, take(scratch, N * n), take(scratch, N * N), take(scratch, N),
-                 take(scratch, N), take(scratch, n)};
-    return beam;
-}
-
-/* Compute the integrals (N,) of the interpolated directions from the start to x. */
-static void set_positions(const Beam *beam, double L, double x, const double *nodes,
-                          const double *weights, double *lengths) {
-    double S[NODES_MAX + 1], P[NODES_MAX + 1];
-    int N = beam->nodes;
-    integrals(N - 1, x, S);
-    for (int m = 0; m < N; m++) {
-        legendre(N - 1, nodes[m], P);
+PRBM void interpolation(int nodes, double x, double *result) {
+    double S[NODES_MAX + 1], P[NODES_MAX + 1], points[NODES_MAX], weights[NODES_MAX];
+    gauss(nodes, points, weights);
+    integrals(nodes - 1, x, S);
+    for (int m = 0; m < nodes; m++) {
+        legendre(nodes - 1, points[m], P);
         double sum = 0.0;
-        for (int k = 0; k < N; k++) {
+        for (int k = 0; k < nodes; k++) {
             sum += (2 * k + 1) * S[k] * P[k];
         }
-        lengths[m] = 0.5 * L * weights[m] * sum;
+        result[m] = weights[m] * sum;
     }
 }
 
-PRBM void set_beam(Beam *beam, double L, double EI, double mass, Scratch *scratch) {
+/* The recurrence u p_k = b_(k+1) p_(k+1) + a_k p_k + b_k p_(k-1) is that of Stieltjes. */
+PRBM void orthogonal(int m, int order, const double *u, const double *weights, double *P,
+                     Scratch *scratch) {
     size_t mark = scratch->used;
-    int N = beam->nodes;
-    double *nodes = take(scratch, (size_t)N), *weights = take(scratch, (size_t)N);
-    gauss(N, nodes, weights);
+    double *before = take(scratch, (size_t)m), *p = take(scratch, (size_t)m), b = 0.0;
+    for (int i = 0; i < m; i++) {
+        before[i] = 0.0;
+        p[i] = 1.0;
+    }
+    for (int k = 0; k <= order; k++) {
+        double a = 0.0, square = 0.0;
+        for (int i = 0; i < m; i++) {
+            P[i * (order + 1) + k] = p[i] / sqrt(2 * k + 1);
+            a += weights[i] * (u[i] * p[i] * p[i]);
+        }
+        for (int i = 0; i < m; i++) {
+            before[i] = (u[i] - a) * p[i] - b * before[i];
+            square += weights[i] * (before[i] * before[i]);
+        }
+        b = sqrt(square);
+        for (int i = 0; i < m; i++) {
+            double following = before[i] / b;
+            before[i] = p[i];
+            p[i] = following;
+        }
+    }
+    scratch->used = mark;
+}
+
+/* --- sections --------------------------------------------------------------------------------- */
+
+/* Points between all nodes: FINE_POINTS in each interval. */
+typedef struct {
+    int count;
+    double *ds;        /* (count,) weights times the arc length per x [m] */
+    Section *sections; /* (count,) */
+} Fine;
+
+enum {
+    SECTION_DOUBLES = sizeof(Section) / sizeof(double),
+    CUT_DOUBLES = sizeof(Cut) / sizeof(double)
+};
+
+PRBM size_t beam_size(int order, int nodes, int panels) {
+    size_t n = (size_t)order + 1, N = (size_t)nodes;
+    size_t Q = (N + (size_t)panels) * FINE_POINTS;
+    size_t cuts = N + CUTS_BESIDE_NODES;
+    size_t arrays = N * (n + 2 * N + 5) + n + cuts * (CUT_DOUBLES + n);
+    return arrays + N * (SECTION_DOUBLES + 6) + Q * (SECTION_DOUBLES + n + 5) + n +
+           cuts * (SECTION_DOUBLES + n + 5);
+}
+
+static Section *take_sections(Scratch *scratch, int count) {
+    return (Section *)(void *)take(scratch, (size_t)count * SECTION_DOUBLES);
+}
+
+/* Return the arc length per x at a section [m]. */
+static double arc(const Beam *beam, Section section) {
+    return section.dv * modulus(tangent(beam->line, section.v));
+}
+
+static double area_of(Section section) {
+    return section.width * section.thickness;
+}
+
+static Fine fine_points(const Beam *beam, Scratch *scratch) {
+    double points[FINE_POINTS], parts[FINE_POINTS], nodes[NODES_MAX], weights[NODES_MAX];
+    int intervals = beam->nodes + beam->panel_count;
+    Fine fine = {0, take(scratch, (size_t)(intervals * FINE_POINTS)), NULL};
+    fine.sections = take_sections(scratch, intervals * FINE_POINTS);
+    gauss(FINE_POINTS, points, parts);
+    for (int p = 0; p < beam->panel_count; p++) {
+        const Panel *panel = &beam->panels[p];
+        gauss(panel->nodes, nodes, weights);
+        for (int k = 0; k <= panel->nodes; k++) {
+            double start = k == 0 ? -1.0 : nodes[k - 1], end = k == panel->nodes ? 1.0 : nodes[k];
+            double middle = 0.5 * (end + start), half = 0.5 * (end - start);
+            for (int i = 0; i < FINE_POINTS; i++) {
+                Section section = section_at(panel, middle + half * points[i]);
+                fine.sections[fine.count] = section;
+                fine.ds[fine.count++] = half * parts[i] * arc(beam, section);
+            }
+        }
+    }
+    return fine;
+}
+
+/* --- bending and stretch ---------------------------------------------------------------------- */
+
+/* Set the integrals of the polynomials up to the nodes, the polynomials at the cuts, and the rates.
+ * The cuts follow the fine points, with the weight 0. */
+static void set_bending(Beam *beam, const Fine *fine, const Section *cuts, Scratch *scratch) {
+    int n = beam->order + 1, Q = fine->count, all = Q + beam->cut_count, node = 0, interval = 0;
+    double *u = take(scratch, (size_t)all), *shares = take(scratch, (size_t)all), total = 0.0;
+    double *P = take_matrix(scratch, all, n), *sums = take(scratch, (size_t)n);
+    for (int i = 0; i < Q; i++) {
+        const Section *s = &fine->sections[i];
+        u[i] = 2.0 * s->v / line_length(beam->line) - 1.0;
+        shares[i] = fine->ds[i] / (s->width * (s->thickness * s->thickness * s->thickness) / 12);
+        total += shares[i];
+    }
+    for (int i = 0; i < Q; i++) {
+        shares[i] /= total;
+    }
+    for (int i = Q; i < all; i++) {
+        u[i] = 2.0 * cuts[i - Q].v / line_length(beam->line) - 1.0;
+        shares[i] = 0.0;
+    }
+    orthogonal(all, beam->order, u, shares, P, scratch);
+    copy(beam->cut_count * n, P + Q * n, beam->moments);
+    zeros(n, sums);
+    for (int p = 0; p < beam->panel_count; p++) {
+        for (int k = 0; k <= beam->panels[p].nodes; k++, interval++) {
+            for (int i = interval * FINE_POINTS; i < (interval + 1) * FINE_POINTS; i++) {
+                add_scaled(n, shares[i], P + i * n, sums);
+            }
+            if (k < beam->panels[p].nodes) { /* The last interval of a panel ends at its end. */
+                copy(n, sums, beam->S + node++ * n);
+            }
+        }
+    }
+    for (int k = 0; k < n; k++) {
+        beam->rates[k] = 1.0 / (total / beam->youngs_modulus * (2 * k + 1));
+    }
+}
+
+static void set_stretch(Beam *beam, const Fine *fine, const Section *sections) {
+    double length = 0.0, flexibility = 0.0;
+    for (int i = 0; i < fine->count; i++) {
+        length += fine->ds[i];
+        flexibility += fine->ds[i] / area_of(fine->sections[i]);
+    }
+    flexibility /= beam->youngs_modulus;
+    for (int i = 0; i < beam->nodes; i++) {
+        double area = area_of(sections[i]);
+        beam->strains[i] = length / (beam->youngs_modulus * area * flexibility);
+    }
+    beam->axial_rate = length * length / flexibility;
+}
+
+/* --- masses and positions --------------------------------------------------------------------- */
+
+/* Set the masses, the radii of gyration, and the lengths for the end and for the nodes.  The
+ * quadrature of the line ends exactly at the end that is drawn: return its factor on tangents. */
+static Complex set_nodes(Beam *beam, const Section *sections, const double *x,
+                         const double *weights, Scratch *scratch) {
+    int N = beam->nodes, first = 0;
+    Complex *steps = take_complex(scratch, N, 1), sum = {0.0, 0.0};
+    double *lengths = take(scratch, (size_t)N);
     for (int i = 0; i < N; i++) {
-        integrals(beam->order, nodes[i], beam->S + i * (beam->order + 1));
-        set_positions(beam, L, nodes[i], nodes, weights, beam->A + i * N);
-        beam->masses[i] = weights[i] * (mass / 2);
+        double area = area_of(sections[i]);
+        beam->masses[i] = beam->density * area * (weights[i] * arc(beam, sections[i]));
+        beam->radii[i] = 0.5 * sections[i].thickness / sqrt(3.0);
+        steps[i] = scaled(sections[i].dv, tangent(beam->line, sections[i].v));
+        sum = plus(sum, scaled(weights[i], steps[i]));
     }
-    set_positions(beam, L, 1.0, nodes, weights, beam->whole);
-    for (int k = 0; k <= beam->order; k++) {
-        beam->rates[k] = EI / L / (2 * k + 1);
+    Complex factor = scaled(beam->line.chord / (sum.re * sum.re + sum.im * sum.im), conjugate(sum));
+    for (int i = 0; i < N; i++) {
+        steps[i] = product(steps[i], factor);
+        beam->whole[i] = scaled(weights[i], steps[i]);
     }
+    for (int p = 0; p < beam->panel_count; p++) {
+        int nodes = beam->panels[p].nodes;
+        for (int i = first; i < first + nodes; i++) {
+            interpolation(nodes, x[i], lengths);
+            for (int m = 0; m < N; m++) {
+                double length = m < first || m >= first + nodes ? 0.0 : lengths[m - first];
+                Complex own = scaled(length, steps[m]);
+                beam->A[i * N + m] = m < first ? beam->whole[m] : own;
+            }
+        }
+        first += nodes;
+    }
+    return factor;
+}
+
+/* --- cuts ------------------------------------------------------------------------------------- */
+
+static void add_cut(Beam *beam, Section *sections, const Panel *panel, double x, double rank) {
+    sections[beam->cut_count] = section_at(panel, x);
+    beam->cuts[beam->cut_count++].rank = rank;
+}
+
+/* Set the ranks of the cuts and their sections.  x (N,) are the nodes. */
+static void collect_cuts(Beam *beam, const double *x, Section *sections) {
+    int i = 0, last = beam->panel_count - 1;
+    beam->cut_count = 0;
+    add_cut(beam, sections, &beam->panels[0], -1.0, -1.0);
+    for (int p = 0; p <= last; p++) {
+        const Panel *panel = &beam->panels[p];
+        double waist = 2.0; /* beyond the panel */
+        bool ahead = waist_at(panel, &waist);
+        for (int k = 0; k <= panel->nodes; k++) {
+            if (ahead && (k == panel->nodes || x[i] > waist)) {
+                add_cut(beam, sections, panel, waist, i - 0.5);
+                ahead = false;
+            }
+            if (k < panel->nodes) {
+                add_cut(beam, sections, panel, x[i], i);
+                i++;
+            }
+        }
+    }
+    add_cut(beam, sections, &beam->panels[last], 1.0, i);
+}
+
+/* Compute the arc lengths (N,) from the start to the nodes; return that to the end [m]. */
+static double arc_lengths(const Beam *beam, const Fine *fine, double *places) {
+    double length = 0.0;
+    int i = 0, node = 0;
+    for (int p = 0; p < beam->panel_count; p++) {
+        for (int k = 0; k <= beam->panels[p].nodes; k++) {
+            for (int q = 0; q < FINE_POINTS; q++) {
+                length += fine->ds[i++];
+            }
+            if (k < beam->panels[p].nodes) {
+                places[node++] = length;
+            }
+        }
+    }
+    return length;
+}
+
+/* Set the cuts.  A beam with waists is straight: v is the arc length. */
+static void set_cuts(Beam *beam, const Fine *fine, const Section *sections, Complex factor,
+                     Scratch *scratch) {
+    double *places = take(scratch, (size_t)beam->nodes);
+    double length = arc_lengths(beam, fine, places);
+    for (int k = 0; k < beam->cut_count; k++) {
+        Cut *cut = &beam->cuts[k];
+        int node = (int)cut->rank;
+        Complex along = product(tangent(beam->line, sections[k].v), factor);
+        bool at_node = cut->rank == node && node >= 0 && node < beam->nodes;
+        cut->position = at_node ? places[node] : sections[k].v;
+        cut->tangent = scaled(1.0 / modulus(along), along);
+        cut->area = area_of(sections[k]);
+        cut->modulus = cut->area * sections[k].thickness / 6;
+    }
+    beam->cuts[beam->cut_count - 1].position = length;
+}
+
+static void take_arrays(Beam *beam, Scratch *scratch) {
+    size_t N = (size_t)beam->nodes;
+    beam->S = take_matrix(scratch, beam->nodes, beam->order + 1);
+    beam->A = take_complex(scratch, beam->nodes, beam->nodes);
+    beam->whole = take_complex(scratch, beam->nodes, 1);
+    beam->masses = take(scratch, N);
+    beam->radii = take(scratch, N);
+    beam->strains = take(scratch, N);
+    beam->rates = take(scratch, (size_t)beam->order + 1);
+    beam->cuts = (Cut *)(void *)take(scratch, (N + CUTS_BESIDE_NODES) * CUT_DOUBLES);
+    beam->moments = take_matrix(scratch, beam->nodes + CUTS_BESIDE_NODES, beam->order + 1);
+}
+
+PRBM void set_beam(Beam *beam, Scratch *scratch) {
+    take_arrays(beam, scratch);
+    size_t mark = scratch->used;
+    int N = beam->nodes, i = 0;
+    double *x = take(scratch, (size_t)N), *weights = take(scratch, (size_t)N);
+    Section *sections = take_sections(scratch, N);
+    for (int p = 0; p < beam->panel_count; p++) {
+        gauss(beam->panels[p].nodes, x + i, weights + i);
+        for (int k = 0; k < beam->panels[p].nodes; k++, i++) {
+            sections[i] = section_at(&beam->panels[p], x[i]);
+        }
+    }
+    Fine fine = fine_points(beam, scratch);
+    set_stretch(beam, &fine, sections);
+    Complex factor = set_nodes(beam, sections, x, weights, scratch);
+    Section *cuts = take_sections(scratch, N + CUTS_BESIDE_NODES);
+    collect_cuts(beam, x, cuts);
+    set_cuts(beam, &fine, cuts, factor, scratch);
+    set_bending(beam, &fine, cuts, scratch);
     scratch->used = mark;
 }

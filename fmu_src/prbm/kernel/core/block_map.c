@@ -1,13 +1,29 @@
-/* The map from coordinates to directions, block by block. */
+/* Blocks of directions: their map from the coordinates, and their mass. */
 #include <string.h>
 
 #include "core/block_map.h"
 #include "core/matrix.h"
 #include "core/vectors.h"
 
+/* --- set-up ----------------------------------------------------------------------------------- */
+
+PRBM void place_maps(System *system, Memory *memory) {
+    const Mechanism *m = system->mechanism;
+    size_t n = (size_t)system->n, d = system->mapped ? (size_t)system->d : 0;
+    BlockMap first = {0};
+    system->maps = place(memory, d, sizeof *system->maps);
+    first.coordinate = place(memory, d > 0 ? (size_t)m->map.count : 0, sizeof(int));
+    first.change = place(memory, 2 * d * n, sizeof(double));
+    first.H.re = place(memory, d * (d + 1), sizeof(double));
+    first.H.im = place(memory, d * (d + 1), sizeof(double));
+    first.products = place(memory, BEAM_DIRECTIONS_MAX * BEAM_ENTRIES * d / 2, sizeof(double));
+    if (memory->base && d > 0) {
+        system->maps[0] = first;
+    }
+}
+
 /* Set the coordinates that the directions of a block depend on; return their number. */
-static int collect_coordinates(const System *system, const Block *block, bool *used,
-                               int *coordinate) {
+static int collect_coordinates(const System *system, const BlockMap *block, bool *used) {
     const DirectionMap *map = &system->mechanism->map;
     int count = 0;
     memset(used, 0, (size_t)system->n * sizeof *used);
@@ -16,16 +32,16 @@ static int collect_coordinates(const System *system, const Block *block, bool *u
     }
     for (int j = 0; j < system->n; j++) {
         if (used[j]) {
-            coordinate[count++] = j;
+            block->coordinate[count++] = j;
         }
     }
     return count;
 }
 
 /* Set the changes of the directions of a block with its coordinates. */
-static void set_changes(const System *system, BlockMap *block) {
+static void set_changes(const System *system, const BlockMap *block) {
     const DirectionMap *map = &system->mechanism->map;
-    zeros(block->size * block->even, block->change);
+    zeros(block->count * block->even, block->change);
     for (int i = 0; i < block->size; i++) {
         int j = block->start + i;
         for (int k = map->first[j]; k < map->first[j + 1]; k++) {
@@ -33,7 +49,91 @@ static void set_changes(const System *system, BlockMap *block) {
             while (block->coordinate[c] != map->coordinate[k]) {
                 c++;
             }
-            block->change[i * block->even + c] = system->factors[k];
+            block->change[c * block->even + i] = system->factors[k];
+        }
+    }
+}
+
+/* Set the coupling of a block below its diagonal. */
+static void set_coupling(const System *system, const BlockMap *block) {
+    int even = block->even;
+    zeros(block->size * even, block->H.re);
+    zeros(block->size * even, block->H.im);
+    for (int i = 0; i < block->size; i++) {
+        for (int j = 0; j < i; j++) {
+            Complex h = system->H[(block->start + i) * system->d + block->start + j];
+            block->H.re[i * even + j] = h.re;
+            block->H.im[i * even + j] = h.im;
+        }
+    }
+}
+
+/* Set the place of the mass matrix of the coordinates of a block in those of all mass blocks. */
+static void find_mass_block(const System *system, BlockMap *block) {
+    int k = 0, offset = 0;
+    const Block *mass = system->mass_blocks;
+    while (mass[k].start + mass[k].size <= block->coordinate[0]) {
+        offset += mass[k].size * mass[k].size;
+        k++;
+    }
+    block->mass_size = mass[k].size;
+    block->mass_first = offset - mass[k].start * (mass[k].size + 1);
+}
+
+/* Return the index of the mass of the coordinates a and b <= a of a block. */
+static int mass_index(const BlockMap *block, int a, int b) {
+    return block->mass_first + block->coordinate[a] * block->mass_size + block->coordinate[b];
+}
+
+/* Whether the coupling of a direction of a beam with those before it is real.  Only the last
+ * direction may belong to a body. */
+static inline bool real_row(int size, int i) {
+    return i < size - 1;
+}
+
+/* Whether a block is that of a beam of the order 3 with 5 or 6 nodes between two clamps, with or
+ * without a body.  Its code is compiled separately for each size. */
+static bool is_beam(const System *system, const BlockMap *block) {
+    for (int k = 0; k < system->stretch_count; k++) {
+        int j = system->stretches[k] - block->start;
+        if (j >= 0 && j < block->size) {
+            return false;
+        }
+    }
+    for (int k = 0; k < block->size * block->even; k++) {
+        if (real_row(block->size, k / block->even) && block->H.im[k] != 0.0) {
+            return false;
+        }
+    }
+    return block->count == BEAM_COORDINATES && block->size >= BEAM_DIRECTIONS_MIN &&
+           block->size <= BEAM_DIRECTIONS_MAX;
+}
+
+/* Set the mass matrices of the coordinates for each pair of directions, and that of the
+ * diagonal. */
+static void set_products(const System *system, BlockMap *block) {
+    double *next = block->products;
+    zeros(BEAM_ENTRIES, block->constant);
+    for (int i = 0; i < block->size; i++) {
+        for (int a = 0; a < BEAM_COORDINATES; a++) {
+            block->rows[i * BEAM_COORDINATES + a] = block->change[a * block->even + i];
+        }
+        for (int j = 0; j <= i; j++) {
+            int entry = 0;
+            double mass = real_row(block->size, i) ? block->H.re[i * block->even + j] : 1.0;
+            for (int a = 0; a < BEAM_COORDINATES; a++) {
+                const double *x = block->change + a * block->even;
+                for (int b = 0; b <= a; b++) {
+                    const double *y = block->change + b * block->even;
+                    if (j < i) {
+                        next[entry++] = mass * (x[i] * y[j] + x[j] * y[i]);
+                    } else {
+                        block->constant[entry++] += system->own[block->start + i] * x[i] * y[i];
+                    }
+                    block->place[entry - 1] = mass_index(block, a, b);
+                }
+            }
+            next += j < i ? BEAM_ENTRIES : 0;
         }
     }
 }
@@ -41,141 +141,287 @@ static void set_changes(const System *system, BlockMap *block) {
 PRBM void set_block_maps(System *system, Scratch *scratch) {
     size_t mark = scratch->used;
     bool *used = (bool *)take(scratch, (size_t)system->n);
-    int *coordinate = system->maps[0].coordinate;
-    double *change = system->maps[0].change;
     for (int k = 0; system->mapped && k < system->block_count; k++) {
-        BlockMap map = {system->blocks[k].start, system->blocks[k].size, 0, 0, coordinate, change};
-        map.count = collect_coordinates(system, &system->blocks[k], used, coordinate);
-        map.even = even_length(map.count);
-        set_changes(system, &map);
-        system->maps[k] = map;
-        coordinate += map.count;
-        change += map.size * map.even;
+        BlockMap *map = &system->maps[k], next;
+        map->start = system->blocks[k].start;
+        map->size = system->blocks[k].size;
+        map->even = even_length(map->size);
+        map->count = collect_coordinates(system, map, used);
+        set_changes(system, map);
+        set_coupling(system, map);
+        find_mass_block(system, map);
+        map->beam = is_beam(system, map);
+        if (map->beam) {
+            set_products(system, map);
+        }
+        next = *map;
+        next.coordinate += map->count;
+        next.change += map->count * map->even;
+        next.H.re += map->size * map->even;
+        next.H.im += map->size * map->even;
+        next.products += map->beam ? map->size * (map->size - 1) / 2 * BEAM_ENTRIES : 0;
+        if (k + 1 < system->block_count) {
+            system->maps[k + 1] = next;
+        }
     }
     scratch->used = mark;
 }
 
-/* Copy the coordinates of a block from x to local, padded by zeros. */
-SIZED void gather(int even, const BlockMap *map, const double *x, double *local) {
-    local[even - 1] = 0.0;
-    for (int c = 0; c < map->count; c++) {
-        local[c] = x[map->coordinate[c]];
-    }
-}
+/* --- directions and derivatives --------------------------------------------------------------- */
 
-SIZED void map_block(int even, int size, const BlockMap *map, const double *x,
-                     double *ALONE local, double *ALONE out) {
-    gather(even, map, x, local);
+/* Compute the directions out of coordinates x for a beam.  The last lane may belong to the next
+ * block, and is then not stored. */
+SIZED void map_beam(int size, const BlockMap *map, const double *ALONE x, double *ALONE out) {
+    const int even = even_length(size);
+    const double *change = map->change;
+    Lanes sum[BEAM_DIRECTIONS_MAX + 1], each = all_lanes(x[map->coordinate[0]]);
     UNROLLED
-    for (int i = 0; i < size; i++) {
-        const double *change = map->change + i * even;
-        Lanes sum[SUMS] = {NO_LANES};
-        UNROLLED_BY_LANES
-        for (int c = 0; c < even; c += LANES) {
-            sum[SUM_OF(c)] += lanes_at(change + c) * lanes_at(local + c);
-        }
-        out[map->start + i] = total(sum);
+    for (int i = 0; i < even; i += LANES) {
+        sum[i] = each * aligned_lanes(change + i);
     }
-}
-
-/* Return the size of a block of up to four coordinates whose code is compiled separately: that of a beam
- * of the order 3 with 5 or 6 nodes, with or without a body; 0 for other blocks. */
-static int kind_of_block(const BlockMap *map) {
-    return map->even == 4 && map->size >= 5 && map->size <= 7 ? map->size : 0;
-}
-
-PRBM void map_directions(const System *system, const double *x, double *local, double *out) {
-    for (int k = 0; k < system->block_count; k++) {
-        const BlockMap *map = &system->maps[k];
-        switch (kind_of_block(map)) {
-        case 5: map_block(4, 5, map, x, local, out); break;
-        case 6: map_block(4, 6, map, x, local, out); break;
-        case 7: map_block(4, 7, map, x, local, out); break;
-        default: map_block(map->even, map->size, map, x, local, out);
-        }
-    }
-}
-
-/* Set out to the sum of x_i times row i of the changes. */
-SIZED void sum_changes(int even, int size, const double *change, const double *ALONE x,
-                   double *ALONE out) {
-    UNROLLED_BY_LANES
-    for (int c = 0; c < even; c += LANES) {
-        Lanes sum = NO_LANES;
+    UNROLLED
+    for (int c = 1; c < BEAM_COORDINATES; c++) {
+        each = all_lanes(x[map->coordinate[c]]);
         UNROLLED
-        for (int i = 0; i < size; i++) {
-            sum += x[i] * lanes_at(change + i * even + c);
+        for (int i = 0; i < even; i += LANES) {
+            sum[i] += each * aligned_lanes(change + c * even + i);
         }
-        set_lanes(out + c, sum);
+    }
+    const int pairs = size - size % PAIR;
+    UNROLLED
+    for (int i = 0; i < pairs; i += LANES) {
+        set_lanes(out + map->start + i, sum[i]);
+    }
+    if (pairs < size) {
+        out[map->start + size - 1] = LANE(sum[size - 1], 0);
     }
 }
 
-SIZED void pull_block(int even, int size, const BlockMap *map, const double *x, double *local,
-                      double *out) {
-    sum_changes(even, size, map->change, x + map->start, local);
+RARE void map_block(const BlockMap *map, const double *x, double *out) {
+    for (int i = 0; i < map->size; i += LANES) {
+        Lanes sum = NO_LANES;
+        for (int c = 0; c < map->count; c++) {
+            sum += x[map->coordinate[c]] * aligned_lanes(map->change + c * map->even + i);
+        }
+        if (i + LANES <= map->size) {
+            set_lanes(out + map->start + i, sum);
+        } else {
+            out[map->start + i] = LANE(sum, 0);
+        }
+    }
+}
+
+SIZED void map_one(const BlockMap *map, const double *x, double *out) {
+    switch (map->beam ? map->size : 0) {
+    case 5: map_beam(5, map, x, out); break;
+    case 6: map_beam(6, map, x, out); break;
+    case 7: map_beam(7, map, x, out); break;
+    default: map_block(map, x, out);
+    }
+}
+
+PRBM void map_directions(const System *system, const double *x, double *out) {
+    for (int k = 0; k < system->block_count; k++) {
+        map_one(&system->maps[k], x, out);
+    }
+}
+
+PRBM void map_motion(const System *system, Kinematics *at) {
+    for (int k = 0; k < system->block_count; k++) {
+        map_one(&system->maps[k], at->angle, at->theta);
+        map_one(&system->maps[k], at->speed, at->turn);
+    }
+}
+
+RARE void pull_block(const BlockMap *map, const double *x, double *out) {
+    const int paired = map->size - map->size % PAIR;
+    x += map->start;
     for (int c = 0; c < map->count; c++) {
-        out[map->coordinate[c]] += local[c];
+        const double *change = map->change + c * map->even;
+        Lanes sum[SUMS] = {NO_LANES};
+        for (int i = 0; i < paired; i += LANES) {
+            sum[SUM_OF(i)] += lanes_at(x + i) * aligned_lanes(change + i);
+        }
+        double last = paired < map->size ? x[paired] * change[paired] : 0.0;
+        out[map->coordinate[c]] += total(sum) + last;
     }
 }
 
-PRBM void pull_directions(const System *system, const double *x, double *local, double *out) {
+SIZED void pull_beam(int size, const BlockMap *map, const double *ALONE x, double *ALONE out) {
+    Lanes sum[BEAM_COORDINATES / LANES];
+    double entries[BEAM_COORDINATES];
+    UNROLLED
+    for (int c = 0; c < BEAM_COORDINATES; c += LANES) {
+        sum[c / LANES] = x[map->start] * lanes_at(map->rows + c);
+    }
+    UNROLLED
+    for (int i = 1; i < size; i++) {
+        Lanes each = all_lanes(x[map->start + i]);
+        UNROLLED
+        for (int c = 0; c < BEAM_COORDINATES; c += LANES) {
+            sum[c / LANES] += each * lanes_at(map->rows + i * BEAM_COORDINATES + c);
+        }
+    }
+    UNROLLED
+    for (int c = 0; c < BEAM_COORDINATES; c += LANES) {
+        set_lanes(entries + c, sum[c / LANES]);
+    }
+    UNROLLED
+    for (int c = 0; c < BEAM_COORDINATES; c++) {
+        out[map->coordinate[c]] += entries[c];
+    }
+}
+
+PRBM void pull_directions(const System *system, int r, const double *x, double *out) {
+    const int wide = system->wide, even = system->even;
     for (int k = 0; k < system->block_count; k++) {
         const BlockMap *map = &system->maps[k];
-        switch (kind_of_block(map)) {
-        case 5: pull_block(4, 5, map, x, local, out); break;
-        case 6: pull_block(4, 6, map, x, local, out); break;
-        case 7: pull_block(4, 7, map, x, local, out); break;
-        default: pull_block(map->even, map->size, map, x, local, out);
+        for (int row = 0; row < r; row++) {
+            switch (map->beam ? map->size : 0) {
+            case 5: pull_beam(5, map, x + row * wide, out + row * even); break;
+            case 6: pull_beam(6, map, x + row * wide, out + row * even); break;
+            case 7: pull_beam(7, map, x + row * wide, out + row * even); break;
+            default: pull_block(map, x + row * wide, out + row * even);
+            }
         }
     }
 }
 
-/* Set turned (size, even) to the mass matrix of a block times the changes. */
-SIZED void turn_mass(int even, int size, const double *change, const double *ALONE block,
-                     double *ALONE turned) {
+/* --- mass ------------------------------------------------------------------------------------- */
+
+/* Compute the mass matrix M (size, even) of the directions of a block below its diagonal, and
+ * add the quadratic velocity terms to the loads x.  The real rows of a beam are not multiplied
+ * by H, which its products contain. */
+SIZED void couple_block(int size, bool beam, Parts H, Parts e, const double *ALONE squares,
+                        double *ALONE M, double *ALONE x) {
+    const int even = even_length(size);
     UNROLLED
-    for (int i = 0; i < size; i++) {
-        UNROLLED_BY_LANES
-        for (int c = 0; c < even; c += LANES) {
-            Lanes own = lanes_at(change + i * even + c), sum = block[i * size + i] * own;
-            for (int j = 0; j < i; j++) {
-                double mass = block[i * size + j];
-                sum += mass * lanes_at(change + j * even + c);
-                double *other = turned + j * even + c;
-                set_lanes(other, lanes_at(other) + mass * own);
+    for (int i = 1; i < size; i++) {
+        Lanes own_re = all_lanes(e.re[i]), own_im = all_lanes(e.im[i]);
+        Lanes square = all_lanes(squares[i]), sum[SUMS] = {NO_LANES};
+        const int columns = beam ? even : even_length(i);
+        const bool real = beam && real_row(size, i);
+        UNROLLED
+        for (int j = 0; j < columns; j += LANES) {
+            if (j < even_length(i)) {
+                Lanes e_re = lanes_at(e.re + j), e_im = lanes_at(e.im + j);
+                Lanes re = own_re * e_re + own_im * e_im, im = own_re * e_im - own_im * e_re;
+                Lanes h_re = aligned_lanes(H.re + i * even + j), mass = re, turned = h_re * im;
+                if (!real) {
+                    Lanes h_im = aligned_lanes(H.im + i * even + j);
+                    mass = h_re * re - h_im * im;
+                    turned += h_im * re;
+                }
+                set_lanes(M + i * even + j, mass);
+                sum[SUM_OF(j)] += turned * lanes_at(squares + j);
+                set_lanes(x + j, lanes_at(x + j) - turned * square);
             }
-            set_lanes(turned + i * even + c, sum);
+        }
+        x[i] += total(sum);
+    }
+}
+
+/* Add the mass matrix of a beam, M below its diagonal, to that of the coordinates. */
+SIZED void pull_beam_mass(int size, const BlockMap *map, const double *ALONE M,
+                          double *ALONE mass) {
+    const int even = even_length(size);
+    const double *product = map->products;
+    Lanes sum[BEAM_ENTRIES / LANES];
+    double entries[BEAM_ENTRIES];
+    UNROLLED
+    for (int k = 0; k < BEAM_ENTRIES; k += LANES) {
+        sum[k / LANES] = lanes_at(map->constant + k);
+    }
+    UNROLLED
+    for (int i = 1; i < size; i++) {
+        UNROLLED
+        for (int j = 0; j < size; j++) {
+            if (j < i) {
+                Lanes each = all_lanes(M[i * even + j]);
+                UNROLLED
+                for (int k = 0; k < BEAM_ENTRIES; k += LANES) {
+                    sum[k / LANES] += each * aligned_lanes(product + k);
+                }
+                product += BEAM_ENTRIES;
+            }
+        }
+    }
+    UNROLLED
+    for (int k = 0; k < BEAM_ENTRIES; k += LANES) {
+        set_lanes(entries + k, sum[k / LANES]);
+    }
+    UNROLLED
+    for (int k = 0; k < BEAM_ENTRIES; k++) {
+        mass[map->place[k]] += entries[k];
+    }
+}
+
+SIZED void beam_mass(int size, const BlockMap *map, Parts e, const double *squares, double *M,
+                     double *x, double *mass) {
+    couple_block(size, true, map->H, e, squares, M, x);
+    pull_beam_mass(size, map, M, mass);
+}
+
+/* Complete the mass matrix M (size, even) of the directions of a block. */
+static void complete_mass(const BlockMap *map, const double *own, double *M) {
+    for (int i = 0; i < map->size; i++) {
+        M[i * map->even + i] = own[i];
+        for (int j = 0; j < i; j++) {
+            M[j * map->even + i] = M[i * map->even + j];
         }
     }
 }
 
-SIZED void pull_mass_of_size(int even, int size, int n, const BlockMap *map, const double *block,
-                             double *ALONE local, double *ALONE M) {
-    double *turned = local + even;
-    turn_mass(even, size, map->change, block, turned);
+/* Add the loads of the shift of the rates of a block. */
+static void pull_shift(const BlockMap *map, const double *M, const double *shift, double *x) {
+    for (int i = 0; i < map->size; i++) {
+        for (int j = 0; j < map->size; j++) {
+            x[i] += M[i * map->even + j] * shift[j];
+        }
+    }
+}
+
+/* Add the mass matrix M of the directions of a block to that of the coordinates.  turned (even,) is
+ * working memory. */
+static void pull_any_mass(const BlockMap *map, const double *M, double *turned, double *mass) {
+    int even = map->even;
+    turned[even - 1] = 0.0;
     for (int a = 0; a < map->count; a++) {
-        UNROLLED_BY_LANES
-        for (int c = 0; c < even; c += LANES) {
-            Lanes sum = NO_LANES;
-            UNROLLED
-            for (int i = 0; i < size; i++) {
-                sum += map->change[i * even + a] * lanes_at(turned + i * even + c);
-            }
-            set_lanes(local + c, sum);
+        for (int i = 0; i < map->size; i++) {
+            turned[i] = even_dot(even, M + i * even, map->change + a * even);
         }
-        for (int c = 0; c <= a; c++) {
-            M[map->coordinate[a] * n + map->coordinate[c]] += local[c];
+        for (int b = 0; b <= a; b++) {
+            mass[mass_index(map, a, b)] += even_dot(even, map->change + b * even, turned);
         }
     }
 }
 
-PRBM void pull_mass(const System *system, const BlockMap *map, const double *block, double *local,
-                    double *M) {
-    int n = system->n;
-    switch (kind_of_block(map)) {
-    case 5: pull_mass_of_size(4, 5, n, map, block, local, M); break;
-    case 6: pull_mass_of_size(4, 6, n, map, block, local, M); break;
-    case 7: pull_mass_of_size(4, 7, n, map, block, local, M); break;
-    default: pull_mass_of_size(map->even, map->size, n, map, block, local, M);
+/* Add the mass of a block that is not a beam; own (d,) and shift (wide,) are those of all
+ * blocks. */
+RARE void add_any_mass(const System *system, const BlockMap *map, const double *own,
+                       Evaluation *result) {
+    const Kinematics *at = &result->at;
+    const int start = map->start;
+    double *M = result->block, *x = result->load + start;
+    couple_block(map->size, false, map->H, parts_from(at->e_parts, start), at->squares + start, M,
+                 x);
+    complete_mass(map, own + start, M);
+    if (system->stretch_count > 0) {
+        pull_shift(map, M, result->shift + start, x);
+    }
+    pull_any_mass(map, M, result->turned, result->mass);
+}
+
+PRBM void add_block_mass(const System *system, const BlockMap *map, const double *own,
+                         Evaluation *result) {
+    const Kinematics *at = &result->at;
+    const double *squares = at->squares + map->start;
+    double *M = result->block, *x = result->load + map->start, *mass = result->mass;
+    Parts e = parts_from(at->e_parts, map->start);
+    switch (map->beam ? map->size : 0) {
+    case 5: beam_mass(5, map, e, squares, M, x, mass); break;
+    case 6: beam_mass(6, map, e, squares, M, x, mass); break;
+    case 7: beam_mass(7, map, e, squares, M, x, mass); break;
+    default: add_any_mass(system, map, own, result);
     }
 }

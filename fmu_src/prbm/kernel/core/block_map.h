@@ -1,20 +1,25 @@
-/* The map from coordinates to directions, block by block. */
+/* Blocks of directions: their map from the coordinates, and their mass. */
 #ifndef PRBM_BLOCK_MAP_H
 #define PRBM_BLOCK_MAP_H
 
-#include "core/system.h"
+#include "core/evaluation.h"
 
-/* Set the maps of all blocks of directions from the factors of the system. */
+/* Place the memory for the maps of all blocks, which belongs to the first map until it is
+ * divided. */
+PRBM void place_maps(System *system, Memory *memory);
+/* Set the maps of all blocks of directions from the factors and masses of the system. */
 PRBM void set_block_maps(System *system, Scratch *scratch);
-/* Compute the directions, or their rates, out (d,) of coordinates or rates x (n,).  local (even,) is
- * working memory. */
-PRBM void map_directions(const System *system, const double *x, double *local, double *out);
-/* Add the derivatives by directions x (d,), pulled back to the coordinates, to out (n,). */
-PRBM void pull_directions(const System *system, const double *x, double *local, double *out);
-/* Add the symmetric mass matrix of a block of directions, of which the lower triangle is given, pulled
- * back to the coordinates, to the lower triangle of M (n, n).  local (size + 1, even) is working
- * memory. */
-PRBM void pull_mass(const System *system, const BlockMap *map, const double *block, double *local,
-                    double *M);
+/* Compute the directions, or their rates, out (d,) of coordinates or rates x (n,). */
+PRBM void map_directions(const System *system, const double *x, double *out);
+/* Compute the directions and their rates from the coordinates and their rates. */
+PRBM void map_motion(const System *system, Kinematics *at);
+/* Add the derivatives by directions x (r, wide), pulled back to the coordinates, to out
+ * (r, even). */
+PRBM void pull_directions(const System *system, int r, const double *x, double *out);
+/* Add the mass matrix of a block of directions to that of the coordinates, below its diagonal,
+ * and the quadratic velocity terms of the block to the loads of the directions.  own (d,) is the
+ * diagonal of the mass matrix of the directions. */
+PRBM void add_block_mass(const System *system, const BlockMap *map, const double *own,
+                         Evaluation *result);
 
 #endif

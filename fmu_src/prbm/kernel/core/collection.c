@@ -43,13 +43,24 @@ PRBM void add_mass(System *system, const Place *spot, double mass) {
     }
 }
 
+/* Add a corner of the drawn line of a flexure. */
+PRBM void add_corner(System *system, const Place *spot) {
+    int d = system->d, i = system->corner_count++;
+    memcpy(system->corners + i * d, spot->A, (size_t)d * sizeof *spot->A);
+    system->corners_c[i] = spot->c;
+}
+
+/* Return the place of point i of a rod, in units of its length: 1/2 -+ 1/(2 sqrt 3). */
+PRBM double rod_point(int i) {
+    return i == 0 ? 0.21132486540518708 : 0.7886751345948129;
+}
+
 /* Add a uniform rod that turns with direction j, as two points with the same moments of mass. */
 PRBM void add_rod(System *system, double mass, const Place *start, int j, Complex vector,
                     Place *spare) {
-    static const double FRACTIONS[2] = {0.21132486540518708, 0.7886751345948129};
-    for (int i = 0; i < 2; i++) { /* At the fractions 1/2 -+ 1/(2 sqrt 3). */
+    for (int i = 0; i < 2; i++) {
         copy_place(system->d, spare, start);
-        extend(spare, j, scaled(FRACTIONS[i], vector));
+        extend(spare, j, scaled(rod_point(i), vector));
         add_mass(system, spare, mass / 2);
     }
 }

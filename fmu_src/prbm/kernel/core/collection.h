@@ -17,6 +17,9 @@ PRBM void copy_place(int d, Place *to, const Place *from);
 /* Set the place of a point of a body, given by its drawn position. */
 PRBM void on_body(const System *system, int body, Complex drawn, Place *result);
 PRBM void add_mass(System *system, const Place *spot, double mass);
+/* Add a corner of the drawn line of a flexure. */
+PRBM void add_corner(System *system, const Place *spot);
+PRBM double rod_point(int i);
 PRBM void add_rod(System *system, double mass, const Place *start, int j, Complex vector,
                   Place *spare);
 /* Add a spring between two coordinates, or a coordinate and the ground, FIXED. */

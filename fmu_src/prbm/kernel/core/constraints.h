@@ -12,7 +12,7 @@ typedef struct {
     const Complex *B;       /* (count, d) */
     const double *c;        /* (count,) */
     const Complex *z;       /* (count,), or NULL if on is NULL */
-    const int *on;          /* (count,) directions of the bodies; FIXED: the ground; NULL: all FIXED */
+    const int *on;          /* (count,) directions of the bodies, FIXED: ground; NULL: all FIXED */
 } Rows;
 
 /* The message for equations without a unique solution. */

@@ -137,8 +137,8 @@ PRBM double gap_acceleration(const Equations *equations, int i, double t, const 
 
 /* Compute the second derivatives E (i w' - w^2) of the arms.  The acceleration of a point is its
  * row A times these derivatives. */
-static void arm_accelerations(const System *system, const Complex *e, const double *v,
-                              const double *a, Complex *result, Scratch *scratch) {
+PRBM void arm_accelerations(const System *system, const Complex *e, const double *v,
+                            const double *a, Complex *result, Scratch *scratch) {
     size_t mark = scratch->used;
     int d = system->d;
     Complex *w = take_complex(scratch, d, 1), *dw = take_complex(scratch, d, 1);

@@ -20,6 +20,9 @@ PRBM double gap_rate(const Equations *equations, int i, double t, const Complex 
                      const double *v);
 PRBM void base_reaction(const Equations *equations, const Complex *e, const double *v,
                         const double *a, Complex *force, double *moment, Scratch *scratch);
+/* Compute the second derivatives (d,) of the arms. */
+PRBM void arm_accelerations(const System *system, const Complex *e, const double *v,
+                            const double *a, Complex *result, Scratch *scratch);
 PRBM Complex along_arms(int n, const Complex *A, const Complex *e);
 
 #endif

@@ -30,7 +30,6 @@ PRBM Kinematics place_kinematics(const System *system, Memory *memory) {
     at.turn = system->mapped ? place(memory, wide, sizeof(double)) : at.speed;
     at.squares = place(memory, wide, sizeof(double));
     at.own = place(memory, (size_t)system->d, sizeof(double));
-    at.local = place(memory, system->mapped ? (wide + 1) * even : 0, sizeof(double));
     at.e = place(memory, wide, sizeof(Complex));
     at.e_parts = place_parts(memory, wide);
     return at;
@@ -68,6 +67,7 @@ PRBM void evaluation_place(Evaluation *evaluation, const System *system, Memory 
     result.rows = system->mapped ? place(memory, r * wide, sizeof(double)) : result.factors.Z;
     result.mass = place(memory, system->mapped ? n * n : 0, sizeof(double));
     result.shift = place(memory, system->mapped ? wide : 0, sizeof(double));
+    result.turned = place(memory, system->mapped ? wide : 0, sizeof(double));
     zero_placed(memory, begin);
     *evaluation = result;
 }
@@ -76,8 +76,10 @@ PRBM void evaluation_place(Evaluation *evaluation, const System *system, Memory 
 
 PRBM void set_reference(Reference *reference, const System *system, const double *angle) {
     int wide = system->wide;
-    for (int j = 0; j < system->d; j++) {
-        reference->theta[j] = direction_of(system, angle, j);
+    if (system->mapped) {
+        map_directions(system, angle, reference->theta);
+    } else {
+        copy(system->d, angle, reference->theta);
     }
     reference->theta[wide - 1] = system->d < wide ? 0.0 : reference->theta[wide - 1];
     unit_vectors(wide, reference->theta, reference->e);
@@ -116,7 +118,7 @@ SHARED void directions_of(int even, const System *system, const Reference *near,
 
 /* Compute the directions and the arms, if the coordinates are not the directions. */
 RARE void mapped_directions(const System *system, const Reference *near, Kinematics *at) {
-    map_directions(system, at->angle, at->local, at->theta);
+    map_motion(system, at);
     directions_of(system->wide, system, near, at);
 }
 
@@ -308,28 +310,29 @@ SIZED void block_mass(const Equations *q, Evaluation *result, int size, int star
     }
 }
 
-/* Factor the block of M in result->block into L, and apply L^-1 to loads and rows. */
-SIZED bool factor_any_block(const Equations *q, Evaluation *result, int size, int start,
-                            double *L) {
-    const Factors *factors = &result->factors;
-    if (!factor_any(size, result->block, L, factors->inverse + start)) {
+/* Factor a block of M into L, and apply L^-1 to loads and rows. */
+SIZED bool factor_any_block(const Equations *q, Evaluation *result, int size, int apart, int start,
+                            const double *M, double *L) {
+    double *inverse = result->factors.inverse + start;
+    if (KNOWN(size) && size <= UNROLLED_MAX ? !factor_known(size, apart, M, L, inverse)
+                                            : !factor_any(size, apart, M, L, inverse)) {
         return false;
     }
-    block_forward(size, L, result->a + start);
+    block_forward(size, apart, L, result->a + start);
     for (int k = 0; k < q->r; k++) {
-        block_forward(size, L, factors->Z + k * q->system->even + start);
+        block_forward(size, apart, L, result->factors.Z + k * q->system->even + start);
     }
     return true;
 }
 
 RARE bool factor_block(const Equations *q, Evaluation *result, int size, int start, double *L) {
-    return factor_any_block(q, result, size, start, L);
+    return factor_any_block(q, result, size, 0, start, result->block, L);
 }
 
 SIZED bool block_motion(const Equations *q, Evaluation *result, int size, int start,
                         const Complex *H, double *L) {
     block_mass(q, result, size, start, H, result->block);
-    return factor_any_block(q, result, size, start, L);
+    return factor_any_block(q, result, size, 0, start, result->block, L);
 }
 
 /* Compute and factor a small block of M.  Blocks of tiny or huge numbers take the general path. */
@@ -354,31 +357,31 @@ SIZED bool small_block_motion(const Equations *q, Evaluation *result, int size, 
 }
 
 /* Factor a block of the mass matrix in result->mass. */
-SIZED bool mapped_block_motion(const Equations *q, Evaluation *result, int size, int start,
-                               double *L) {
-    const int n = q->system->n;
-    for (int i = 0; i < size; i++) {
-        copy(i + 1, result->mass + (start + i) * n + start, result->block + i * size);
-    }
+SIZED bool mapped_block_motion(const Equations *q, Evaluation *result, int size, int apart,
+                               int start, const double *M, double *L) {
     if (q->mass_damping != 0.0) {
-        damp_mass(size, q->mass_damping, result->block, result->at.speed + start,
-                  result->a + start);
+        damp_mass(size, q->mass_damping, M, result->at.speed + start, result->a + start);
     }
-    return factor_any_block(q, result, size, start, L);
+    return factor_any_block(q, result, size, apart, start, M, L);
 }
 
-/* Factor the blocks of the mass matrix in result->mass.  The sizes of guides on two beams of the
+/* Factor the blocks of the mass matrix in result->mass.  Those of guides on two beams of the
  * orders 3 and 5 are compiled separately. */
 RARE bool mapped_blocks_motion(const Equations *q, Evaluation *result) {
     bool regular = true;
+    const double *M = result->mass;
     double *L = result->factors.L;
     for (int k = 0; k < result->factors.block_count; k++) {
-        int start = result->factors.blocks[k].start, size = result->factors.blocks[k].size;
-        switch (size) {
-        case 7: regular = mapped_block_motion(q, result, 7, start, L) && regular; break;
-        case 11: regular = mapped_block_motion(q, result, 11, start, L) && regular; break;
-        default: regular = mapped_block_motion(q, result, size, start, L) && regular;
+        const Block *block = &result->factors.blocks[k];
+        int start = block->start, size = block->size, apart = block->apart;
+        if (size == 7 && apart == 3) {
+            regular = mapped_block_motion(q, result, 7, 3, start, M, L) && regular;
+        } else if (size == 11 && apart == 5) {
+            regular = mapped_block_motion(q, result, 11, 5, start, M, L) && regular;
+        } else {
+            regular = mapped_block_motion(q, result, size, apart, start, M, L) && regular;
         }
+        M += size * size;
         L += size * size;
     }
     return regular;
@@ -406,19 +409,7 @@ static bool blocks_motion(const Equations *q, Evaluation *result) {
     return regular;
 }
 
-/* --- directions that are not coordinates ------------------------------------------------------- */
-
-/* Add the loads of the shift, Im(w^2) of the arms that stretch, to those of a block of directions:
- * the mass matrix of the block, of which the lower triangle is given, times the shift. */
-static void pull_shift(int size, const double *block, const double *shift, double *load) {
-    for (int i = 0; i < size; i++) {
-        load[i] += block[i * size + i] * shift[i];
-        for (int j = 0; j < i; j++) {
-            load[i] += block[i * size + j] * shift[j];
-            load[j] += block[i * size + j] * shift[i];
-        }
-    }
-}
+/* --- directions that are not coordinates ------------------------------------------------------ */
 
 /* Compute Im(w^2) of all arms. */
 static void find_shift(const System *system, const Kinematics *at, double *shift) {
@@ -429,61 +420,48 @@ static void find_shift(const System *system, const Kinematics *at, double *shift
     }
 }
 
-/* Compute the mass matrix of a block of directions, and add its quadratic velocity terms to the loads.
- * The sizes of beams of the order 3 with 5 or 6 nodes are compiled separately. */
-static void mapped_block_inertia(const System *system, int size, int start, const Complex *H,
-                                 Evaluation *result) {
-    const Kinematics *at = &result->at;
-    const double *own = own_inertia(system, at) + start, *squares = at->squares + start;
-    Parts e = parts_from(at->e_parts, start);
-    double *load = result->load + start;
-    switch (size) {
-    case 5: block_inertia(5, H, own, e, squares, result->block, load); break;
-    case 6: block_inertia(6, H, own, e, squares, result->block, load); break;
-    case 7: block_inertia(7, H, own, e, squares, result->block, load); break;
-    default: block_inertia(size, H, own, e, squares, result->block, load);
-    }
-}
-
 /* Compute M, and add the quadratic velocity terms to the loads of the directions. */
 static void mapped_mass(const Equations *q, Evaluation *result) {
     const System *system = q->system;
-    const Kinematics *at = &result->at;
-    const Complex *H = system->coupling;
+    const double *own = own_inertia(system, &result->at);
     if (system->stretch_count > 0) {
-        find_shift(system, at, result->shift);
+        find_shift(system, &result->at, result->shift);
     }
     zeros(system->n * system->n, result->mass);
     for (int k = 0; k < system->block_count; k++) {
-        int start = system->blocks[k].start, size = system->blocks[k].size;
-        mapped_block_inertia(system, size, start, H, result);
-        if (system->stretch_count > 0) {
-            pull_shift(size, result->block, result->shift + start, result->load + start);
-        }
-        pull_mass(system, &system->maps[k], result->block, at->local, result->mass);
-        H += size * size;
+        add_block_mass(system, &system->maps[k], own, result);
     }
 }
 
-/* Compute loads, rows and mass matrix of the directions, and pull them back to the coordinates. */
+/* Compute directions, loads and rows. */
+SIZED void direction_terms(int wide, const Equations *q, const Reference *near,
+                           Evaluation *result) {
+    directions_of(wide, q->system, near, &result->at);
+    find_loads(wide, q, result);
+    rows_padded(wide, q, &result->at, result->rows, result->lam);
+}
+
+/* Compute loads, rows and mass matrix of the directions, and pull them back to the coordinates.
+ * The lengths for guides on two beams with 5 or 6 nodes are compiled separately. */
 RARE void mapped_terms(const Equations *q, const Reference *near, Evaluation *result) {
     const System *system = q->system;
     const int even = system->even, wide = system->wide;
-    Kinematics *at = &result->at;
     double *Z = result->factors.Z;
-    map_directions(system, at->speed, at->local, at->turn);
-    mapped_directions(system, near, at);
-    find_loads(wide, q, result);
-    rows_and_convection(q, at, result->rows, result->lam);
+    map_motion(system, &result->at);
+    switch (wide) {
+    case 12: direction_terms(12, q, near, result); break;
+    case 14: direction_terms(14, q, near, result); break;
+    default: direction_terms(wide, q, near, result);
+    }
     mapped_mass(q, result);
-    zeros(even, result->a);
+    for (int j = 0; j < even; j += LANES) {
+        set_lanes(result->a + j, all_lanes(0.0));
+    }
     zeros(q->r * even, Z);
-    pull_directions(system, result->load, at->local, result->a);
-    for (int k = 0; k < q->r; k++) {
-        pull_directions(system, result->rows + k * wide, at->local, Z + k * even);
-        if (system->stretch_count > 0) {
-            result->lam[k] += even_dot(wide, result->rows + k * wide, result->shift);
-        }
+    pull_directions(system, 1, result->load, result->a);
+    pull_directions(system, q->r, result->rows, Z);
+    for (int k = 0; system->stretch_count > 0 && k < q->r; k++) {
+        result->lam[k] += even_dot(wide, result->rows + k * wide, result->shift);
     }
 }
 
@@ -641,7 +619,8 @@ SHARED bool motion_of_length(int even, const Equations *q, const Reference *near
 }
 
 PRBM bool evaluate_equations(const Equations *equations, double t, const double *q,
-                             const double *v, const Reference *near, Evaluation *result, Problem *problem) {
+                             const double *v, const Reference *near, Evaluation *result,
+                             Problem *problem) {
     int n = equations->system->n;
     pad(n, q, result->at.angle);
     pad(n, v, result->at.speed);

@@ -21,7 +21,6 @@ typedef struct {
     double *squares;         /* (wide,): turn^2 */
     Complex *e;              /* (wide,) */
     Parts e_parts;           /* (wide,) */
-    double *local;           /* (wide + 1, even) working memory, if mapped */
     double *own;             /* (d,) the diagonal of the mass of the directions, if arms stretch */
 } Kinematics;
 
@@ -31,8 +30,9 @@ typedef struct {
     double *turns;                   /* (even + 2,) deflections and damping of the springs */
     double *row, *columns;           /* (even,), (r, even) */
     double *a, *lam;                 /* (even + 2,) accelerations; (r,) */
-    double *load, *rows;             /* (wide,), (r, wide) of the directions: a and Z, unless mapped */
-    double *mass, *shift;            /* (n, n), (wide,) M and Im(w^2), if mapped */
+    double *load, *rows;             /* (wide,), (r, wide) by direction: a and Z, unless mapped */
+    double *mass, *shift;            /* (n, n), (wide,) blocks of M and Im(w^2), if mapped */
+    double *turned;                  /* (wide,) working memory, if mapped */
     double *block;                   /* of M, below its diagonal */
     double spring_loss;              /* the power that the springs dissipate */
     double *pressure, *contact_loss; /* (s,) forces and dissipated powers of pressed stops */
@@ -45,7 +45,8 @@ PRBM void set_reference(Reference *reference, const System *system, const double
 /* Compute the accelerations a (n,) and the multipliers lam (r,): forces of loops, of closed stops
  * (> 0 pushes), of sticking contacts.  near: a reference near q, or NULL. */
 PRBM bool evaluate_equations(const Equations *equations, double t, const double *q,
-                             const double *v, const Reference *near, Evaluation *result, Problem *problem);
+                             const double *v, const Reference *near, Evaluation *result,
+                             Problem *problem);
 /* Compute only the factors of the equations at a state. */
 PRBM bool factor_equations(const Equations *equations, const double *q, const double *v,
                            const Reference *near, Evaluation *result, Problem *problem);

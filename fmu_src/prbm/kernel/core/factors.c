@@ -3,21 +3,28 @@
 #include "core/matrix.h"
 #include "core/vectors.h"
 
+/* Return the first column of a row of a block that may not be zero. */
+static inline int first_column(int apart, int row) {
+    return row > apart ? apart : 0;
+}
+
 /* Factor M = L D L^T from its lower triangle, with ones on the diagonal of L; inverse is 1/D.
  * Return false if M is not positive definite. */
-SHARED bool factor_any(int size, const double *ALONE M, double *ALONE L, double *ALONE inverse) {
+SHARED bool factor_any(int size, int apart, const double *ALONE M, double *ALONE L,
+                       double *ALONE inverse) {
     for (int i = 0; i < size; i++) {
+        const int first = first_column(apart, i);
         double pivot = M[i * size + i];
-        for (int j = 0; j < i; j++) {
+        for (int j = first; j < i; j++) {
             double sum = M[i * size + j];
             UNROLLED
-            for (int k = 0; k < j; k++) {
+            for (int k = first; k < j; k++) {
                 sum -= L[i * size + k] * L[j * size + k];
             }
             L[i * size + j] = sum; /* L_ij D_j so far */
         }
         UNROLLED
-        for (int j = 0; j < i; j++) {
+        for (int j = first; j < i; j++) {
             double share = L[i * size + j] * inverse[j];
             pivot -= share * L[i * size + j];
             L[i * size + j] = share;
@@ -30,8 +37,42 @@ SHARED bool factor_any(int size, const double *ALONE M, double *ALONE L, double 
     return true;
 }
 
+/* The same for numbers that the compiler knows, with a size up to UNROLLED_MAX. */
+SHARED bool factor_known(int size, int apart, const double *ALONE M, double *ALONE L,
+                         double *ALONE inverse) {
+    UNROLLED
+    for (int i = 0; i < size; i++) {
+        const int first = first_column(apart, i);
+        double pivot = M[i * size + i];
+        UNROLLED
+        for (int j = 0; j < size; j++) {
+            if (first <= j && j < i) {
+                double sum = M[i * size + j];
+                UNROLLED
+                for (int k = 0; k < size; k++) {
+                    sum = first <= k && k < j ? sum - L[i * size + k] * L[j * size + k] : sum;
+                }
+                L[i * size + j] = sum; /* L_ij D_j so far */
+            }
+        }
+        UNROLLED
+        for (int j = 0; j < size; j++) {
+            if (first <= j && j < i) {
+                double share = L[i * size + j] * inverse[j];
+                pivot -= share * L[i * size + j];
+                L[i * size + j] = share;
+            }
+        }
+        if (!(pivot > 0.0)) {
+            return false;
+        }
+        inverse[i] = 1.0 / pivot;
+    }
+    return true;
+}
+
 RARE bool factor(int size, const double *M, double *L, double *inverse) {
-    return factor_any(size, M, L, inverse);
+    return factor_any(size, 0, M, L, inverse);
 }
 
 /* Limits of the products of pivots in small_factor, beyond which they may underflow or overflow. */
@@ -102,38 +143,41 @@ SHARED void put_block(int size, int start, const double *from, double *to) {
 }
 
 /* block_forward: b := L^-1 b; block_backward: b := L^-T b, within a block. */
-SHARED void block_forward(int size, const double *ALONE L, double *ALONE b) {
+SHARED void block_forward(int size, int apart, const double *ALONE L, double *ALONE b) {
     UNROLLED
     for (int i = 1; i < size; i++) {
         double sum = b[i];
-        const int columns = size <= SMALL ? size : i;
+        const int first = first_column(apart, i);
+        const int from = size <= UNROLLED_MAX ? 0 : first, to = size <= UNROLLED_MAX ? size : i;
         UNROLLED
-        for (int j = 0; j < columns; j++) {
-            sum = j < i ? sum - L[i * size + j] * b[j] : sum;
+        for (int j = from; j < to; j++) {
+            sum = first <= j && j < i ? sum - L[i * size + j] * b[j] : sum;
         }
         b[i] = sum;
     }
 }
 
-SIZED void block_backward(int size, const double *ALONE L, double *ALONE b) {
+SIZED void block_backward(int size, int apart, const double *ALONE L, double *ALONE b) {
     UNROLLED
     for (int k = 1; k < size; k++) {
         int i = size - 1 - k;
         double sum = b[i];
-        const int from = size <= SMALL ? 0 : i + 1;
+        const int last = i < apart ? apart + 1 : size;
+        const int from = size <= UNROLLED_MAX ? 0 : i + 1, to = size <= UNROLLED_MAX ? size : last;
         UNROLLED
-        for (int j = from; j < size; j++) {
-            sum = j > i ? sum - L[j * size + i] * b[j] : sum;
+        for (int j = from; j < to; j++) {
+            sum = i < j && j < last ? sum - L[j * size + i] * b[j] : sum;
         }
         b[i] = sum;
     }
 }
 
-SIZED void block_solve(int size, const double *ALONE L, double *ALONE b, Substitution way) {
+SIZED void block_solve(int size, int apart, const double *ALONE L, double *ALONE b,
+                       Substitution way) {
     if (way == FORWARD) {
-        block_forward(size, L, b);
+        block_forward(size, apart, L, b);
     } else {
-        block_backward(size, L, b);
+        block_backward(size, apart, L, b);
     }
 }
 
@@ -146,8 +190,18 @@ SHARED void solve_small(int size, int start, const double *ALONE L, double *ALON
     for (int i = 0; i < size; i++) {
         b[i] = x[start + i];
     }
-    block_solve(size, L, b, way);
+    block_solve(size, 0, L, b, way);
     put_block(size, start, b, x);
+}
+
+/* Apply block_solve to a block; that of a guide on two beams of the order 3 is compiled
+ * separately. */
+static void solve_block(int size, int apart, const double *L, double *b, Substitution way) {
+    if (size == 7 && apart == 3) {
+        block_solve(7, 3, L, b, way);
+    } else {
+        block_solve(size, apart, L, b, way);
+    }
 }
 
 SIZED void solve_blocks(const Factors *factors, double *x, Substitution way) {
@@ -159,7 +213,7 @@ SIZED void solve_blocks(const Factors *factors, double *x, Substitution way) {
         case 2: solve_small(2, start, L, x, way); break;
         case 3: solve_small(3, start, L, x, way); break;
         case 4: solve_small(4, start, L, x, way); break;
-        default: block_solve(size, L, x + start, way);
+        default: solve_block(size, factors->blocks[k].apart, L, x + start, way);
         }
         L += size * size;
     }
@@ -244,12 +298,12 @@ SHARED bool schur_dispatch(int even, Factors *factors) {
 /* Solve S lam = b with the factors of a symmetric S.  On entry lam contains b. */
 SIZED void multipliers_of_size(int r, const double *S, double *lam) {
     const double *L = S + r * r, *inverse = L + r * r;
-    block_forward(r, L, lam);
+    block_forward(r, 0, L, lam);
     UNROLLED
     for (int k = 0; k < r; k++) {
         lam[k] *= inverse[k];
     }
-    block_backward(r, L, lam);
+    block_backward(r, 0, L, lam);
 }
 
 /* Subtract Z D^-1 x from lam, the right side of the constraint rows. */

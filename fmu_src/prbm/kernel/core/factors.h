@@ -25,10 +25,13 @@ PRBM bool factor_schur(Factors *factors);
  * and the multipliers. */
 PRBM void solve_again(const Factors *factors, double *x, double *lam);
 /* Functions that are compiled for each small size of a block or of the system. */
-SHARED bool factor_any(int size, const double *ALONE M, double *ALONE L, double *ALONE inverse);
+SHARED bool factor_known(int size, int apart, const double *ALONE M, double *ALONE L,
+                         double *ALONE inverse);
+SHARED bool factor_any(int size, int apart, const double *ALONE M, double *ALONE L,
+                       double *ALONE inverse);
 SHARED bool small_factor(int size, const double *ALONE M, double *ALONE L, double *ALONE inverse);
 SHARED void put_block(int size, int start, const double *from, double *to);
-SHARED void block_forward(int size, const double *ALONE L, double *ALONE b);
+SHARED void block_forward(int size, int apart, const double *ALONE L, double *ALONE b);
 SHARED void solve_small(int size, int start, const double *ALONE L, double *ALONE x,
                         Substitution way);
 SHARED bool schur_dispatch(int even, Factors *factors);

@@ -5,6 +5,7 @@
 #include "core/beam.h"
 #include "core/flexure.h"
 #include "core/flexures.h"
+#include "core/free_body.h"
 #include "core/matrix.h"
 
 static double length_of(const System *system, const Flexure *flexure) {
@@ -16,14 +17,14 @@ static double length_of(const System *system, const Flexure *flexure) {
 /* Bending stiffness [N m^2], axial stiffness [N] and mass per length [kg/m] of a flexure. */
 typedef struct {
     double EI, EA, mass;
-} Section;
+} Uniform;
 
-static Section section_of(const System *system, const FlexureType *kind) {
+static Uniform section_of(const System *system, const FlexureType *kind) {
     double h = evaluate(kind->thickness, system->values);
     double b = evaluate(kind->width, system->values);
     double E = evaluate(kind->youngs_modulus, system->values);
     double rho = evaluate(kind->density, system->values);
-    Section result = {E * b * (h * h * h) / 12, E * b * h, rho * b * h};
+    Uniform result = {E * b * (h * h * h) / 12, E * b * h, rho * b * h};
     return result;
 }
 
@@ -53,7 +54,7 @@ static bool cut_flexure(const System *system, const Flexure *flexure, Segments *
         gamma[i] = evaluate(kind->gamma[i], system->values);
         K_theta[i] = evaluate(kind->K_theta[i], system->values);
     }
-    Section section = section_of(system, kind);
+    Uniform section = section_of(system, kind);
     take_segments(pieces, system->mechanism->longest, scratch);
     return segments(kind, gamma, K_theta, flexure->type_at_start, flexure->type_at_end, L,
                     section.EI, section.mass * L, section.EA, pieces, problem);
@@ -86,7 +87,9 @@ static bool walk_links(System *system, const Step *step, Scratch *scratch, Probl
     Complex direction = scaled(1.0 / modulus(along_it), along_it);
     Place spot = new_place(system, scratch), spare = new_place(system, scratch);
     on_body(system, span.root, span.z_start, &spot);
+    add_corner(system, &spot);
     int *owners = take_integers(scratch, pieces.n + 2), next = step->first_direction;
+    FreeBody *free_body = begin_free_body(system, step);
     owners[0] = system->origins[span.root].j;
     for (int i = 1; i <= pieces.n; i++) {
         owners[i] = next;
@@ -99,8 +102,11 @@ static bool walk_links(System *system, const Step *step, Scratch *scratch, Probl
         Complex vector = i == 0 ? scaled(pieces.lengths[i], direction)
                                 : complex_of(pieces.lengths[i], 0.0);
         add_rod(system, pieces.rods[i], &spot, owners[i], vector, &spare);
+        rank_points(free_body, system, 2 * i);
         extend(&spot, owners[i], vector);
+        add_corner(system, &spot);
         add_mass(system, &spot, pieces.lumps[i]);
+        rank_points(free_body, system, 2 * i + 1);
         add_spring(system, pieces.rates[i], coordinate_of(system, owners[i]),
                    coordinate_of(system, owners[i + 1]));
     }
@@ -113,6 +119,10 @@ static bool walk_links(System *system, const Step *step, Scratch *scratch, Probl
         reach(system, span.far, &spot, minus(span.z_end, last), last_one);
     }
     add_rod(system, pieces.rods[pieces.n + 1], &spot, last_one, last, &spare);
+    extend(&spot, last_one, last);
+    add_corner(system, &spot);
+    rank_points(free_body, system, 2 * (pieces.n + 1));
+    keep_links(system, step, &pieces, direction, owners);
     return true;
 }
 
@@ -162,35 +172,55 @@ static void turn_nodes(System *system, const Step *step, const Beam *beam,
             system->factors[k++] = S[l];
         }
         if (axial) {
-            system->factors[map->first[j++]] = 1.0;
+            system->factors[map->first[j++]] = beam->strains[i];
         }
     }
 }
 
 /* Set the place at the end of lengths (nodes,) along the nodes, from a root. */
 static void beam_place(const System *system, const Step *step, const Beam *beam, int stride,
-                       const Place *root, Complex direction, const double *lengths, Place *spot) {
+                       const Place *root, Complex direction, const Complex *lengths, Place *spot) {
     copy_place(system->d, spot, root);
     for (int i = 0; i < beam->nodes; i++) {
-        double length = lengths[i] - (step->backwards ? beam->whole[i] : 0.0);
-        extend(spot, step->first_direction + i * stride, scaled(length, direction));
+        Complex length = step->backwards ? minus(lengths[i], beam->whole[i]) : lengths[i];
+        extend(spot, step->first_direction + i * stride, product(length, direction));
     }
 }
 
-static void place_beam(System *system, const Step *step, const Beam *beam, bool axial,
-                       Scratch *scratch) {
+/* Add two masses across the flexure with the moment of inertia of the section of a node. */
+static void add_section(System *system, const Place *spot, int arm, double mass, double radius,
+                        Complex direction, Place *spare) {
+    for (int side = -1; side <= 1; side += 2) {
+        copy_place(system->d, spare, spot);
+        extend(spare, arm, product(complex_of(0.0, side * radius), direction));
+        add_mass(system, spare, mass / 2);
+    }
+}
+
+/* Place the masses and the far end of a beam; return its direction as drawn. */
+static Complex place_beam(System *system, const Step *step, const Beam *beam,
+                          const FlexureType *kind, Scratch *scratch) {
+    FreeBody *free_body = begin_free_body(system, step);
     Place root = new_place(system, scratch), spot = new_place(system, scratch);
+    Place spare = new_place(system, scratch);
     Span span = span_of(system, step);
-    int stride = axial ? 2 : 1, nodes = beam->nodes;
+    int stride = kind->axial ? 2 : 1, nodes = beam->nodes;
     Complex along_it = minus(span.z_end, span.z_start);
     Complex direction = scaled((step->backwards ? -1.0 : 1.0) / modulus(along_it), along_it);
     on_body(system, span.root, span.z_start, &root);
     for (int i = 0; i < nodes; i++) {
         beam_place(system, step, beam, stride, &root, direction, beam->A + i * nodes, &spot);
-        add_mass(system, &spot, beam->masses[i]);
+        if (kind->profile == PROFILE_NOTCH) {
+            add_section(system, &spot, step->first_direction + i * stride, beam->masses[i],
+                        beam->radii[i], direction, &spare);
+        } else {
+            add_mass(system, &spot, beam->masses[i]);
+        }
+        rank_points(free_body, system, i);
+        add_corner(system, &spot);
     }
-    double *none = take(scratch, (size_t)nodes);
-    zeros(nodes, none);
+    Complex *none = take_complex(scratch, nodes, 1);
+    zeros(2 * nodes, (double *)none);
     beam_place(system, step, beam, stride, &root, direction,
                step->backwards ? none : beam->whole, &spot);
     if (step->closes) {
@@ -199,25 +229,86 @@ static void place_beam(System *system, const Step *step, const Beam *beam, bool 
     } else {
         reach(system, span.far, &spot, span.z_end, step->first_direction + nodes * stride);
     }
+    return direction;
 }
 
-static void walk_beam(System *system, const Step *step, Scratch *scratch) {
+static double dimension(const System *system, const FlexureType *kind, int which) {
+    return has_dimension(kind, which) ? evaluate(kind->dimensions[which], system->values) : 0.0;
+}
+
+/* Set the line of a beam as drawn; fail if its ends are impossible. */
+static bool set_line(const System *system, const Flexure *flexure, const FlexureType *kind,
+                     Line *line, Problem *problem) {
+    double chord = length_of(system, flexure);
+    double curvature = dimension(system, kind, DIMENSION_CURVATURE);
+    double rise = dimension(system, kind, DIMENSION_RISE);
+    if (!(fabs(curvature) * chord < 2.0)) {
+        return fail(problem,
+                    "flexure %s: %s.curvature = %g 1/m is impossible for ends at the distance %g "
+                    "m: choose one below %g 1/m",
+                    flexure->name, kind->name, curvature, chord, 2.0 / chord);
+    }
+    if (!(fabs(rise) < chord)) {
+        return fail(problem,
+                    "flexure %s: %s.rise = %g m is impossible for ends at the distance %g m: "
+                    "choose a rise below this distance",
+                    flexure->name, kind->name, rise, chord);
+    }
+    line->chord = chord;
+    line->curvature = curvature;
+    line->rise = rise;
+    return true;
+}
+
+/* Set the panels of a beam of the length L [m]. */
+static bool set_panels(const System *system, const Flexure *flexure, const FlexureType *kind,
+                       double L, Panel *panels, Problem *problem) {
+    double h = evaluate(kind->thickness, system->values);
+    double b = evaluate(kind->width, system->values);
+    double end_thickness = dimension(system, kind, DIMENSION_END_THICKNESS);
+    if (kind->profile == PROFILE_NOTCH) {
+        Notch notch = {h, b, dimension(system, kind, DIMENSION_NOTCH_RADIUS),
+                       dimension(system, kind, DIMENSION_NOTCH_DEPTH), end_thickness,
+                       dimension(system, kind, DIMENSION_WAIST_LENGTH), !is_hinge(kind)};
+        return notch_panels(flexure->name, &notch, L, kind->nodes, panels, problem);
+    }
+    panels[0] = straight_panel(kind->nodes, 0.0, L, h, b);
+    if (kind->profile == PROFILE_TAPER) {
+        panels[0].thickness[1] = end_thickness;
+        panels[0].width[1] = dimension(system, kind, DIMENSION_END_WIDTH);
+    }
+    return true;
+}
+
+static bool walk_beam(System *system, const Step *step, Scratch *scratch, Problem *problem) {
     const Flexure *flexure = step->flexure;
     const FlexureType *kind = &system->mechanism->types[flexure->type];
-    Section section = section_of(system, kind);
-    double L = length_of(system, flexure);
-    Beam beam = take_beam(kind->order, kind->nodes, scratch);
-    set_beam(&beam, L, section.EI, section.mass * L, scratch);
+    bool notched = kind->profile == PROFILE_NOTCH, waisted = !is_hinge(kind);
+    Panel panels[PANELS_MAX];
+    Beam beam = {.order = kind->order,
+                 .nodes = node_count(notched, waisted, kind->nodes),
+                 .panel_count = panel_count(notched, waisted),
+                 .panels = panels,
+                 .youngs_modulus = evaluate(kind->youngs_modulus, system->values),
+                 .density = evaluate(kind->density, system->values)};
+    if (!set_line(system, flexure, kind, &beam.line, problem) ||
+        !set_panels(system, flexure, kind, line_length(beam.line), panels, problem)) {
+        return false;
+    }
+    set_beam(&beam, scratch);
     BeamCoordinates at = beam_coordinates(system, step);
     turn_nodes(system, step, &beam, &at, kind->axial);
-    place_beam(system, step, &beam, kind->axial, scratch);
+    Complex direction = place_beam(system, step, &beam, kind, scratch);
+    const int ends[2] = {at.start, at.end};
+    keep_beam(system, step, &beam, direction, ends, at.first);
     add_spring(system, beam.rates[0], at.start, at.end);
     for (int k = 0; k < kind->order; k++) {
         add_spring(system, beam.rates[k + 1], FIXED, at.first + k);
     }
     if (kind->axial) {
-        add_spring(system, section.EA * L, FIXED, at.strain);
+        add_spring(system, beam.axial_rate, FIXED, at.strain);
     }
+    return true;
 }
 
 PRBM bool walk_flexure(System *system, const Step *step, Scratch *scratch, Problem *problem) {
@@ -230,6 +321,5 @@ PRBM bool walk_flexure(System *system, const Step *step, Scratch *scratch, Probl
     if (system->mechanism->types[flexure->type].order == 0) {
         return walk_links(system, step, scratch, problem);
     }
-    walk_beam(system, step, scratch);
-    return true;
+    return walk_beam(system, step, scratch, problem);
 }

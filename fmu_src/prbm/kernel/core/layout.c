@@ -1,6 +1,7 @@
 /* The order of the assembly, the coordinates, and the positions of inputs and values. */
 #include <string.h>
 
+#include "core/beam.h"
 #include "core/flexure.h"
 #include "core/layout.h"
 #include "core/system.h"
@@ -25,10 +26,25 @@ static int pin_count(const Flexure *flexure) {
     return (flexure->type_at_start == PIN) + (flexure->type_at_end == PIN);
 }
 
+/* The largest number of corners of a flexure in addition to its links or nodes. */
+enum { CORNERS_BESIDE_ARMS = 3 };
+
+/* Return the number of nodes in all panels of a beam. */
+static int all_nodes(const FlexureType *kind) {
+    return node_count(kind->profile == PROFILE_NOTCH, !is_hinge(kind), kind->nodes);
+}
+
+static size_t size_of_beam(const FlexureType *kind) {
+    bool notched = kind->profile == PROFILE_NOTCH;
+    return beam_size(kind->order, all_nodes(kind), panel_count(notched, !is_hinge(kind)));
+}
+
 static Addition beam_addition(const FlexureType *kind, const Flexure *flexure) {
-    int nodes = kind->nodes, stretches = kind->axial ? nodes : 0;
+    int nodes = all_nodes(kind), stretches = kind->axial ? nodes : 0;
+    int masses = kind->profile == PROFILE_NOTCH ? 2 * nodes : nodes;
     Addition result = {kind->order + pin_count(flexure), kind->axial, nodes, stretches,
-                       1 + kind->order + kind->axial, nodes, nodes * (kind->order + 2) + stretches};
+                       1 + kind->order + kind->axial, masses,
+                       nodes * (kind->order + 2) + stretches};
     return result;
 }
 
@@ -49,7 +65,7 @@ static Addition addition_of(const Mechanism *m, const Flexure *flexure) {
 
 PRBM void count_coordinates(Reader *reader, Mechanism *m) {
     long long b = m->body_count, links = 0, strains = 0, springs = 0;
-    long long arms = b, stretching = 0, masses = b, map = b;
+    long long arms = b, stretching = 0, masses = b, map = b, corners = 0;
     for (int i = 0; i < m->flexure_count && !reader->wrong; i++) {
         Addition more = addition_of(m, &m->flexures[i]);
         links += more.links;
@@ -59,7 +75,13 @@ PRBM void count_coordinates(Reader *reader, Mechanism *m) {
         springs += more.springs;
         masses += more.masses;
         map += more.map;
+        corners += more.arms + CORNERS_BESIDE_ARMS;
+        m->stressed_count += kind_of(m, &m->flexures[i])->stress;
         m->longest = more.arms > m->longest ? more.arms : m->longest;
+        size_t size = kind_of(m, &m->flexures[i])->order > 0
+                          ? size_of_beam(kind_of(m, &m->flexures[i]))
+                          : 0;
+        m->beam_size = size > m->beam_size ? size : m->beam_size;
     }
     long long parts = (long long)m->flexure_count + m->joint_count;
     long long n = links + strains + b, r = 2 * (parts - b);
@@ -83,6 +105,7 @@ PRBM void count_coordinates(Reader *reader, Mechanism *m) {
         m->loop_count = (int)r;
         m->spring_count = (int)springs;
         m->mass_count = (int)masses;
+        m->corner_count = (int)corners;
     }
 }
 
@@ -162,7 +185,7 @@ static int end_angle(const Walk *walk, int type, int pin, int body) {
     return type == PIN ? pin : body == GROUND ? FIXED : walk->body[body];
 }
 
-/* Add a beam: pins, coefficients, strain, the body at its far end, and the directions of its nodes. */
+/* Add a beam: pins, coefficients, strain, the body at its far end, and the directions of nodes. */
 static void add_beam(const FlexureType *kind, const Flexure *flexure, Walk *walk, int reached) {
     int start_pin = flexure->type_at_start == PIN ? add_angle(walk) : FIXED;
     int end_pin = flexure->type_at_end == PIN ? add_angle(walk) : FIXED;
@@ -174,7 +197,7 @@ static void add_beam(const FlexureType *kind, const Flexure *flexure, Walk *walk
     int body = reached != GROUND ? add_body_angle(walk, reached) : FIXED;
     int start = end_angle(walk, flexure->type_at_start, start_pin, flexure->between.start);
     int end = end_angle(walk, flexure->type_at_end, end_pin, flexure->between.end);
-    for (int i = 0; i < kind->nodes; i++) {
+    for (int i = 0; i < all_nodes(kind); i++) {
         int arm = add_direction(walk, FIXED);
         depend(walk, start);
         depend(walk, end);
@@ -323,6 +346,7 @@ PRBM void lay_out_slots(Mechanism *m) {
         [SLOTS_LINKS] = PER_LINK * m->link_count,
         [SLOTS_STRETCHES] = PER_STRETCH * m->strain_count,
         [SLOTS_PROBES] = PER_PROBE * m->probe_count,
+        [SLOTS_STRESSES] = PER_STRESS * m->stressed_count,
         [SLOTS_FREQUENCY] = 1,
         [SLOTS_CALCULATED] = calculated_count(m),
         [SLOTS_DERIVATIVES] = m->independent_count + 2,
@@ -343,6 +367,7 @@ PRBM void lay_out_slots(Mechanism *m) {
         .links = at[SLOTS_LINKS],
         .stretches = at[SLOTS_STRETCHES],
         .probes = at[SLOTS_PROBES],
+        .stresses = at[SLOTS_STRESSES],
         .frequency = at[SLOTS_FREQUENCY],
         .calculated = at[SLOTS_CALCULATED],
         .derivatives = at[SLOTS_DERIVATIVES],

@@ -1,6 +1,14 @@
 /* Values of expressions and parameters, and the list of variables. */
 #include "core/mechanism.h"
 
+PRBM bool has_dimension(const FlexureType *kind, int dimension) {
+    return (kind->given >> dimension & 1u) != 0u;
+}
+
+PRBM bool is_hinge(const FlexureType *kind) {
+    return kind->profile == PROFILE_NOTCH && !has_dimension(kind, DIMENSION_WAIST_LENGTH);
+}
+
 PRBM double evaluate(Expression quantity, const double *values) {
     double result = 0.0;
     for (int i = 0; i < quantity.count; i++) {

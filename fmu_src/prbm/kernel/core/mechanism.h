@@ -31,11 +31,15 @@ typedef struct {
 typedef struct {
     const char *name;
     bool lumped, rate_with_gamma, axial;
+    bool stress; /* Whether the stress of the flexures is an output. */
     int pivots; /* Pivots of a cantilever; 0 for a chain. */
     int links;  /* Links of a chain; 0 for a model with coefficients. */
     int order;  /* Order of the bending moment of a beam; 0 for links. */
-    int nodes;  /* Nodes of a beam. */
+    int nodes;  /* Nodes of a beam, or of its notch or waist. */
+    int profile; /* PROFILE_... */
+    uint32_t given; /* The bits of the dimensions that are given. */
     Expression thickness, width, youngs_modulus, density;
+    Expression dimensions[DIMENSION_COUNT]; /* of the profile and of the line as drawn */
     const Expression *gamma, *K_theta; /* (pivots,) */
 } FlexureType;
 
@@ -112,7 +116,7 @@ typedef struct {
 /* The first slot of each group in the vector of all values. */
 typedef struct {
     int parameters, inputs, bodies, stops, base, energies, latched, compliant, links, stretches,
-        probes, frequency, calculated, derivatives, indicators, time, count;
+        probes, stresses, frequency, calculated, derivatives, indicators, time, count;
 } Slots;
 
 /* The first index of each group of inputs; the forces begin at 0. */
@@ -131,8 +135,8 @@ typedef struct {
     int first_direction;    /* The first direction that the part adds. */
 } Step;
 
-/* A coordinate: an angle or a strain of a flexure, or the angle of a body.  Two of the three numbers
- * are -1, -1 and 0. */
+/* A coordinate: an angle or a strain of a flexure, or the angle of a body.  Two of the three
+ * numbers are -1, -1 and 0. */
 typedef struct {
     int link;   /* Index among the angles of the flexures, or -1. */
     int strain; /* Index among the strains, or -1. */
@@ -170,7 +174,7 @@ typedef struct {
     const Step *steps;             /* Flexures and joints in the order of the assembly. */
     const Coordinate *coordinates; /* (coordinate_count,) */
     const int *links, *strains;    /* Coordinates that are angles and strains of flexures. */
-    const int *arms;               /* (direction_count,) the arm that a direction turns or stretches */
+    const int *arms;               /* (direction_count,) arm that a direction turns or stretches */
     const int *stretches;          /* Directions that are stretches. */
     DirectionMap map;
     const int *independent; /* Coordinates that are states of model exchange. */
@@ -179,12 +183,17 @@ typedef struct {
     double default_step; /* Step of the default experiment [s]; 0: unknown. */
     /* Sizes of the assembled system. */
     int coordinate_count, direction_count, loop_count, link_count, strain_count, stretch_count,
-        mass_count, spring_count;
+        mass_count, spring_count, corner_count;
     int compliant_count; /* Number of compliant stops. */
+    int stressed_count;  /* Number of flexures whose stress is an output. */
     int longest; /* Largest number of links or nodes of a flexure. */
+    size_t beam_size; /* Largest number of doubles that a beam needs. */
     Slots slots;
 } Mechanism;
 
+PRBM bool has_dimension(const FlexureType *kind, int dimension);
+/* Whether a flexure has a notch without a waist, which bends like a hinge. */
+PRBM bool is_hinge(const FlexureType *kind);
 PRBM double evaluate(Expression quantity, const double *values); /* Twin: Affine in mechanism/. */
 PRBM bool check_parameter(const Parameter *parameter, double x, Problem *problem);
 /* Check all values and the fields that are expressions (Mechanism.values of the twin). */

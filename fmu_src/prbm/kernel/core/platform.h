@@ -62,6 +62,7 @@
 #else
 #define KNOWN(length) false
 #endif
-enum { SMALL = 4 }; /* The largest size that is compiled separately. */
+/* The largest size that is compiled separately, and the largest that is unrolled if it is known. */
+enum { SMALL = 4, UNROLLED_MAX = 7 };
 
 #endif

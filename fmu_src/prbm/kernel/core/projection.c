@@ -107,10 +107,7 @@ RARE void mapped_rows(const Equations *q, Correction *c) {
     const System *system = q->system;
     rows_and_convection(q, &c->at, c->by_direction, c->convective);
     zeros(q->r * system->even, c->rows);
-    for (int k = 0; k < q->r; k++) {
-        pull_directions(system, c->by_direction + k * system->wide, c->at.local,
-                        c->rows + k * system->even);
-    }
+    pull_directions(system, q->r, c->by_direction, c->rows);
 }
 
 SIZED void velocity_residuals(int even, const Equations *q, double t, Correction *c) {
@@ -179,5 +176,10 @@ PRBM bool project_near(const Equations *equations, const Evaluation *evaluation,
         return true;
     }
     copy(n, kept, y); /* Undo the correction. */
-    return project(q, t, y, scratch, problem);
+    if (!project(q, t, y, scratch, problem)) {
+        return false;
+    }
+    pad(n, y, correction->at.angle);
+    find_directions(q->system, near, &correction->at);
+    return true;
 }

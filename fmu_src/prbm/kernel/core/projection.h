@@ -20,7 +20,8 @@ PRBM bool project(const Equations *equations, double t, double *y, Scratch *scra
  * impulses may be NULL. */
 PRBM bool project_with_impulses(const Equations *equations, double t, double *y, double *impulses,
                                 Scratch *scratch, Problem *problem);
-/* Project y by one correction with the factors of its evaluation; call project if that fails. */
+/* Project y by one correction with the factors of its evaluation; call project if that fails.  Then
+ * correction->at has the arms at y. */
 PRBM bool project_near(const Equations *equations, const Evaluation *evaluation,
                        const Reference *near, double t, double *y, Correction *correction,
                        Scratch *scratch, Problem *problem);

@@ -13,8 +13,8 @@ static const double COARSE_ERROR_WEIGHT[STAGES] = COARSE_ERROR_WEIGHTS;
 static const double DENSE_WEIGHT[STAGES][DENSE] = DENSE_WEIGHTS;
 static const double LARGEST_WEIGHT[STAGES] = LARGEST_WEIGHTS;
 
-/* Compute y + h sum(a_i k_i) for all stages.  The length n is even: y contains angles, as many rates,
- * and two energies. */
+/* Compute y + h sum(a_i k_i) for all stages.  The length n is even: y contains angles, as many
+ * rates, and two energies. */
 SIZED void combine_length(int n, double h, const double *a, const double *k, const double *y,
                           double *result) {
     Lanes weight[STAGES];
@@ -96,8 +96,8 @@ static void add_to_range(const Equations *q, const Evaluation *evaluation, Force
 }
 
 PRBM bool stages(const Equations *equations, double t, int n, const double *y, double h,
-                 double *k, double *y1, Reference *reference, Evaluation *evaluation, ForceRange *forces,
-                 Problem *problem) {
+                 double *k, double *y1, Reference *reference, Evaluation *evaluation,
+                 ForceRange *forces, Problem *problem) {
     for (int i = 0; i < equations->held_count; i++) {
         forces->least[i] = HUGE_VAL;
         forces->largest[i] = -HUGE_VAL;

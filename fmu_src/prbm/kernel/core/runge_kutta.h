@@ -14,8 +14,8 @@ enum { NODES = 3 };
 /* Compute the stages k (STAGES, n) after the first, which is given, the new state y1 and its
  * evaluation.  The reference becomes that of y. */
 PRBM bool stages(const Equations *equations, double t, int n, const double *y, double h,
-                 double *k, double *y1, Reference *reference, Evaluation *evaluation, ForceRange *forces,
-                 Problem *problem);
+                 double *k, double *y1, Reference *reference, Evaluation *evaluation,
+                 ForceRange *forces, Problem *problem);
 /* The differences between the solution and those of orders 5 and 3. */
 PRBM void errors_of(int n, const double *k, double h, double *fine, double *coarse);
 /* The first of them only. */

@@ -12,8 +12,8 @@ typedef struct {
 /* Set B (r + 1, n) and c (r + 1,): the loops, then the displacement of the released point. */
 PRBM void stack_release(const System *system, Complex *B, double *c);
 /* Stack the loops and a last row that holds the released body at a displacement [m], or at an angle
- * [rad] if the release is by an angle.  In that case the row is the sine of the remaining angle times
- * the size. */
+ * [rad] if the release is by an angle.  In that case the row is the sine of the remaining angle
+ * times the size. */
 PRBM void stack_holding(const System *system, double amount, Complex *B, double *c);
 /* Stack the loops and the row that holds the released body at its place in a shape q (n,). */
 PRBM void stack_holding_at(const System *system, const double *q, Complex *B, double *c);

@@ -7,6 +7,8 @@
  * for stretches, so that the derivative of E by its direction is i e for both.
  */
 #include "core/system.h"
+#include "core/block_map.h"
+#include "core/free_body.h"
 #include "core/kinetics.h"
 #include "core/matrix.h"
 #include "core/vectors.h"
@@ -27,17 +29,6 @@ static Place *place_origins(Memory *memory, size_t count, size_t d) {
         origins[i].A = rows + i * d;
     }
     return origins;
-}
-
-/* Place the memory for the maps of all blocks, which belongs to the first map until it is divided. */
-static void place_maps(BlockMap *maps, const Mechanism *m, Memory *memory) {
-    size_t n = (size_t)m->coordinate_count, d = (size_t)m->direction_count;
-    int *coordinate = place(memory, (size_t)m->map.count, sizeof *coordinate);
-    double *change = place(memory, m->map.mapped ? d * (n + 1) : 0, sizeof *change);
-    if (memory->base) {
-        maps[0].coordinate = coordinate;
-        maps[0].change = change;
-    }
 }
 
 PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memory) {
@@ -82,18 +73,20 @@ PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memor
     result.pushed = place_frames(memory, (size_t)m->force_count, d);
     result.probes = place_frames(memory, (size_t)m->probe_count, d);
     result.origins = place_origins(memory, b + 1, d);
+    result.corners = place(memory, (size_t)m->corner_count * d, sizeof(Complex));
+    result.corners_c = place(memory, (size_t)m->corner_count, sizeof(Complex));
     result.stretch_count = m->stretch_count;
     result.stretches = m->stretches;
     result.spring = place(memory, (size_t)m->spring_count, sizeof(Spring));
     result.factors = place(memory, (size_t)m->map.count, sizeof(double));
     result.blocks = place(memory, d, sizeof(Block));
-    result.maps = place(memory, d, sizeof(BlockMap));
-    place_maps(result.maps, m, memory);
+    place_maps(&result, memory);
     result.mass_blocks = place(memory, n, sizeof(Block));
     result.coupling = place(memory, d * d, sizeof(Complex));
     result.own = place(memory, d, sizeof(double));
     result.straight = place(memory, (size_t)result.even, sizeof(double));
     result.calculated = place(memory, (size_t)m->type_count, sizeof(double));
+    place_free_bodies(&result, memory);
     *system = result;
 }
 

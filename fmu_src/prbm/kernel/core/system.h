@@ -30,24 +30,64 @@ typedef struct {
     int a, b;
 } Spring;
 
-/* A dense block on the diagonal of the mass matrix, for example that of the links of a flexure that
- * closes a loop. */
+/* The index TURNED - j stands for an arm that turns with coordinate j. */
+enum { TURNED = -2 };
+
+/* A flexure as a free body between its near end and its far end, as in the twin.  Arrays are in the
+ * order from the near end to the far end. */
 typedef struct {
-    int start, size;
+    bool forwards;          /* whether the near end is the start of the flexure */
+    int first, count, stub; /* mass points; the last ones, of the stub beyond a closed loop */
+    int sections, arm_count;
+    double *position, *area, *modulus; /* (sections,) */
+    double *ranks, *section_ranks;     /* (count,), (sections,) order along the flexure */
+    int *tangents;          /* (sections, 2) directions, FIXED or TURNED - coordinate */
+    Complex *drawn;         /* (sections, 2) */
+    int *arms;              /* (arm_count,) directions that turn with the ends, or FIXED */
+    Complex *levers;        /* (count + 1, arm_count) */
+    double *turning;        /* (2, arm_count) */
+    int *angles;            /* links: coordinates of the segments; beam: of start, end, first a_k */
+    double *rates;          /* links: of the springs; beam: of the rotation between the ends */
+    double *moments;        /* (sections, order + 1) polynomials of a beam, from its start */
+} FreeBody;
+
+/* A block on the diagonal of the mass matrix, for example that of the links of a flexure that
+ * closes a loop.  The rows after the row apart, counted in the block, are zero in the columns
+ * before it. */
+typedef struct {
+    int start, size, apart;
 } Block;
 
-/* The map from coordinates to the directions of a block of the mass matrix of the directions. */
+/* Sizes of the blocks whose code is compiled separately: those of a beam of the order 3. */
+enum {
+    BEAM_COORDINATES = 4,
+    BEAM_ENTRIES = 10, /* of a symmetric matrix of the coordinates */
+    BEAM_DIRECTIONS_MIN = 5,
+    BEAM_DIRECTIONS_MAX = 7,
+    BEAM_CHANGES = BEAM_DIRECTIONS_MAX * BEAM_COORDINATES
+};
+
+/* A block of the mass matrix of the directions, and its map from the coordinates. */
 typedef struct {
-    int start, size; /* The directions. */
-    int count, even; /* The number of coordinates that they depend on, and its padded length. */
-    int *coordinate; /* (count,) in ascending order */
-    double *change;  /* (size, even) changes of the directions with these coordinates */
+    int start, size, even; /* The directions: the first, their number, its padded length. */
+    int count;             /* The number of coordinates that they depend on. */
+    int *coordinate;       /* (count,) in ascending order */
+    double *change;        /* (count, even) changes of the directions with these coordinates */
+    Parts H;               /* (size, even) below the diagonal, and zero elsewhere */
+    int mass_first, mass_size; /* The mass of the coordinates i and j <= i is at the index
+                                * mass_first + i mass_size + j of the mass blocks. */
+    bool beam;             /* Whether the members below are used. */
+    int place[BEAM_ENTRIES];       /* The indices of the masses of the coordinates. */
+    double constant[BEAM_ENTRIES]; /* The part of these masses that is constant. */
+    double rows[BEAM_CHANGES];     /* (size, BEAM_COORDINATES) change, row by row. */
+    double *products;      /* (pairs, BEAM_ENTRIES) their changes with the mass of each pair of
+                            * directions */
 } BlockMap;
 
-/* The constant arrays of a mechanism, as in the twin.  There are n coordinates, d directions, r loop
- * rows, p mass points, s stops, f friction points and b bodies.  Columns of A and of the rows are
- * zero at stretches, see spread.  Vectors with the shape (even,) or (wide,) have n or d elements, and
- * are padded to an even length. */
+/* The constant arrays of a mechanism, as in the twin.  There are n coordinates, d directions, r
+ * loop rows, p mass points, s stops, f friction points and b bodies.  Columns of A and of the
+ * rows are zero at stretches, see spread.  Vectors with the shape (even,) or (wide,) have n or d
+ * elements, and are padded to an even length. */
 typedef struct {
     const Mechanism *mechanism;
     const double *values;
@@ -74,8 +114,12 @@ typedef struct {
     BodyFrame *pushed;        /* points of the forces */
     BodyFrame *probes;        /* points of the probes */
     Place *origins;           /* (b + 1,), the ground's first */
+    FreeBody *free_bodies;    /* of all flexures, if the stress of one is an output */
+    int *body_masses;         /* (b,) mass points of the bodies, if so */
     int stretch_count;
     const int *stretches;     /* directions that are stretches */
+    int corner_count;
+    Complex *corners, *corners_c; /* (corners, d), (corners,): flexures, for drawings */
     int spring_count;
     Spring *spring;           /* the springs whose rates make up K */
     int block_count;
@@ -111,8 +155,8 @@ PRBM void motion(const System *system, const BodyFrame *frame, const Complex *e,
                  Complex *displacement, Complex *velocity);
 /* Copy B (r, d) to rows, and repeat the column of each arm for its stretch.  rows may be B. */
 PRBM void spread(const System *system, int r, const Complex *B, Complex *rows);
-/* Replace the unit vectors e by the arms, and by -i times the arms for stretches.  theta (d,) are the
- * directions. */
+/* Replace the unit vectors e by the arms, and by -i times the arms for stretches.  theta (d,)
+ * are the directions. */
 PRBM void stretch(const System *system, const double *theta, Complex *e);
 /* Compute the mass matrix M (n, n). */
 PRBM void mass_matrix(const System *system, const Complex *e, double *M, Scratch *scratch);

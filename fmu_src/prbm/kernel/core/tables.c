@@ -85,6 +85,24 @@ static const Expression *read_expressions(Reader *reader, Mechanism *m, int coun
     return result;
 }
 
+/* Read the profile, its dimensions and those of the line as drawn. */
+static void read_profile(Reader *reader, FlexureType *t) {
+    t->profile = read_index(reader, 0, PROFILE_NOTCH + 1);
+    t->given = (uint32_t)read_index(reader, 0, 1 << DIMENSION_COUNT);
+    const uint32_t taper = 1u << DIMENSION_END_THICKNESS | 1u << DIMENSION_END_WIDTH;
+    const uint32_t notch = 1u << DIMENSION_END_THICKNESS | 1u << DIMENSION_NOTCH_RADIUS |
+                           1u << DIMENSION_NOTCH_DEPTH;
+    const uint32_t line = 1u << DIMENSION_CURVATURE | 1u << DIMENSION_RISE;
+    uint32_t others = t->given & ~line, waist = 1u << DIMENSION_WAIST_LENGTH;
+    bool leaf = others == 0u, notched = (t->given & ~waist) == notch;
+    bool fits = t->profile == PROFILE_LEAF    ? leaf
+                : t->profile == PROFILE_TAPER ? others == taper
+                                              : notched;
+    if (!fits || (t->given & line) == line || (t->order == 0 && t->given != 0u)) {
+        reader->wrong = reader->wrong ? reader->wrong : "a flexure type with wrong dimensions";
+    }
+}
+
 static void read_types(Reader *reader, Mechanism *m) {
     FlexureType *types = kept(reader, (size_t)m->type_count, sizeof *types);
     for (int i = 0; i < m->type_count && !reader->wrong; i++) {
@@ -93,6 +111,7 @@ static void read_types(Reader *reader, Mechanism *m) {
         t->lumped = read_flag(reader);
         t->rate_with_gamma = read_flag(reader);
         t->axial = read_flag(reader);
+        t->stress = read_flag(reader);
         t->pivots = read_index(reader, 0, LINKS_MAX + 1);
         t->links = read_index(reader, 0, LINKS_MAX + 1);
         t->order = read_index(reader, 0, ORDER_MAX + 1);
@@ -102,10 +121,16 @@ static void read_types(Reader *reader, Mechanism *m) {
             reader->wrong = reader->wrong ? reader->wrong
                                           : "a flexure type without a model, or with several";
         }
+        read_profile(reader, t);
         t->thickness = read_expression(reader, m);
         t->width = read_expression(reader, m);
         t->youngs_modulus = read_expression(reader, m);
         t->density = read_expression(reader, m);
+        for (int k = 0; k < DIMENSION_COUNT; k++) {
+            if (has_dimension(t, k)) {
+                t->dimensions[k] = read_expression(reader, m);
+            }
+        }
         t->gamma = read_expressions(reader, m, t->pivots);
         t->K_theta = read_expressions(reader, m, t->pivots);
     }

@@ -27,6 +27,11 @@ static inline Lanes lanes_at(const double *x) {
     return *(const LanesInMemory *)x;
 }
 
+/* The same for a number at an even index of an array that begins at a multiple of 16 bytes. */
+static inline Lanes aligned_lanes(const double *x) {
+    return *(const Lanes *)(const void *)x;
+}
+
 static inline Lanes all_lanes(double x) {
     Lanes lanes = NO_LANES;
     return x - lanes;

@@ -142,16 +142,19 @@ EXPORTED fmi3Status FMI3(SetClock)(fmi3Instance instance,
 }
 
 #define FMI3_OTHER_TYPE(type)                                                                  \
-    EXPORTED fmi3Status FMI3(Get##type)(fmi3Instance instance, const fmi3ValueReference valueReferences[], \
-                             size_t nValueReferences, fmi3##type values[], size_t nValues) {   \
+    EXPORTED fmi3Status FMI3(Get##type)(fmi3Instance instance,                                 \
+                                        const fmi3ValueReference valueReferences[],            \
+                                        size_t nValueReferences, fmi3##type values[],          \
+                                        size_t nValues) {                                      \
         Instance *it = accessed3(instance, RULE3_Get##type, valueReferences, nValueReferences, \
                                  values, nValues);                                             \
         return get_other3(it, valueReferences, nValueReferences);                              \
     }                                                                                          \
                                                                                                \
-    EXPORTED fmi3Status FMI3(Set##type)(fmi3Instance instance, const fmi3ValueReference valueReferences[], \
-                             size_t nValueReferences, const fmi3##type values[],               \
-                             size_t nValues) {                                                 \
+    EXPORTED fmi3Status FMI3(Set##type)(fmi3Instance instance,                                 \
+                                        const fmi3ValueReference valueReferences[],            \
+                                        size_t nValueReferences, const fmi3##type values[],    \
+                                        size_t nValues) {                                      \
         Instance *it = accessed3(instance, RULE3_Set##type, valueReferences, nValueReferences, \
                                  values, nValues);                                             \
         return set_other3(it, valueReferences, nValueReferences, NO_TYPE);                     \

@@ -1,7 +1,14 @@
 /* The latest step and its dense output: the twin of hybrid/arc.py. */
+#include <string.h>
+
 #include "hybrid/arc.h"
 #include "hybrid/simulation.h"
 #include "hybrid/stepping.h"
+
+PRBM void forget_arc(Simulation *sim) {
+    sim->stepping.has_middle = false;
+    sim->stepping.embedded_error = -1.0;
+}
 
 PRBM void arc_at(const Simulation *sim, double t, double *y) {
     const Arc *arc = &sim->state.arc;
@@ -93,13 +100,15 @@ static bool interpolated(Simulation *sim, double t, double *y, Problem *problem)
     return close || arc_cut(sim, t, located->k, y, problem);
 }
 
-PRBM bool arc_state(Simulation *sim, double *y, Reference *near, Evaluation *evaluation,
+PRBM bool arc_state(Simulation *sim, double *y, Complex *e, Reference *near, Evaluation *evaluation,
                     Problem *problem) {
     const State *state = &sim->state;
     const System *system = system_of(sim);
+    size_t bytes = (size_t)system->d * sizeof *e;
     if (!state->arc.valid || state->time >= state->front_time) {
         copy(state_size(sim), state->front, y);
         set_reference(near, system, y);
+        memcpy(e, near->e, bytes);
         return true;
     }
     if (!interpolated(sim, state->time, y, problem)) {
@@ -113,6 +122,7 @@ PRBM bool arc_state(Simulation *sim, double *y, Reference *near, Evaluation *eva
               project_near(&sim->equations, evaluation, near, state->time, y, &sim->correction,
                            &sim->scratch, problem) &&
               check_projection(sim, state->time, interpolated, y, problem);
+    memcpy(e, sim->correction.at.e, bytes);
     sim->scratch.used = mark;
     return ok;
 }

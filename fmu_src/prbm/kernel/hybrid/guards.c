@@ -388,8 +388,8 @@ PRBM void sample_arc(Simulation *sim) {
 static Instant sample(const Simulation *sim, int k) {
     int n = system_of(sim)->n;
     const double *y = sim->stepping.sample_y + k * 2 * n;
-    Instant at = {sample_time(sim, k), y, y + n, sim->stepping.sample_e + k * system_of(sim)->d,
-                  NULL, NULL};
+    const Complex *e = sim->stepping.sample_e + k * system_of(sim)->d;
+    Instant at = {sample_time(sim, k), y, y + n, e, NULL, NULL};
     return at;
 }
 

@@ -1,10 +1,12 @@
 /* The outputs at the present state: the twin of hybrid/outputs.py. */
 #include <string.h>
 
+#include "core/sections.h"
 #include "hybrid/compliant.h"
 #include "hybrid/configuration.h"
 #include "hybrid/impacts.h"
 #include "hybrid/outputs.h"
+#include "hybrid/peaks.h"
 #include "hybrid/simulation.h"
 
 static void output_bodies(const Simulation *sim, double *out) {
@@ -46,11 +48,13 @@ static void output_stops(const Simulation *sim, double *out) {
     Rows gaps = gap_rows(system);
     for (int i = 0; i < system->s; i++) {
         double *values = out + PER_STOP * i;
-        values[STOP_GAP] = gap(&sim->equations, i, sim->state.time, e);
-        values[STOP_GAP_RATE] = gap_rate(&sim->equations, i, sim->state.time, e, v);
-        values[STOP_POINT_DISPLACEMENT] = -(row_value(&gaps, i, e) + gaps.c[i]) -
-                    field_value(sim, system->mechanism->stops[i].position);
-        values[STOP_POINT_VELOCITY] = -row_rate(&gaps, i, e, v);
+        WallMotion wall = wall_motion(&sim->state.walls[i], sim->state.time);
+        double value = row_value(&gaps, i, e) + gaps.c[i], rate = row_rate(&gaps, i, e, v);
+        values[STOP_GAP] = value + wall.x;
+        values[STOP_GAP_RATE] = rate + wall.v;
+        values[STOP_POINT_DISPLACEMENT] =
+            -value - field_value(sim, system->mechanism->stops[i].position);
+        values[STOP_POINT_VELOCITY] = -rate;
     }
 }
 
@@ -156,6 +160,23 @@ static void output_base(Simulation *sim) {
     out[BASE_FORCE_Y] = force.im;
 }
 
+static void output_stresses(Simulation *sim) {
+    size_t mark = sim->scratch.used;
+    const Mechanism *m = sim->configuration.mechanism;
+    const Present *present = &sim->present;
+    double *out = sim->present.outputs + m->slots.stresses;
+    Stress *found = take_stresses(&sim->scratch, m->stressed_count);
+    stresses(&sim->equations, present->e, present->y, present->y + system_of(sim)->n,
+             &present->evaluation, found, &sim->scratch);
+    for (int i = 0; i < m->stressed_count; i++) {
+        out[PER_STRESS * i + STRESS_STRESS_START] = found[i].start;
+        out[PER_STRESS * i + STRESS_STRESS_END] = found[i].end;
+        out[PER_STRESS * i + STRESS_STRESS] = found[i].largest;
+        peak_outputs(sim, i, out + PER_STRESS * i + STRESS_PEAK_STRESS);
+    }
+    sim->scratch.used = mark;
+}
+
 static void output_energies(Simulation *sim) {
     size_t mark = sim->scratch.used;
     const System *system = system_of(sim);
@@ -207,6 +228,9 @@ PRBM bool compute_outputs(Simulation *sim, int groups, bool near, Problem *probl
     if (groups & ENERGIES) {
         output_energies(sim);
     }
+    if (groups & STRESSES) {
+        output_stresses(sim);
+    }
     return !(groups & MOBILITIES) || output_mobilities(sim, problem);
 }
 
@@ -223,6 +247,9 @@ PRBM int output_groups(const Simulation *sim, int slot) {
     }
     if (slot >= slots->base && slot < slots->energies) {
         return PLACES | MOTION | BASE;
+    }
+    if (slot >= slots->stresses && slot < slots->frequency) {
+        return PLACES | MOTION | STRESSES;
     }
     bool potential = slot == slots->energies + ENERGY_ELASTIC ||
                      slot == slots->energies + ENERGY_GRAVITATIONAL;

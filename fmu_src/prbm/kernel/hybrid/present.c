@@ -5,6 +5,7 @@
 
 PRBM void forget_present(Simulation *sim) {
     sim->present.fresh = NOTHING;
+    sim->untouched = false;
 }
 
 PRBM void forget_outputs(Simulation *sim) {

@@ -8,6 +8,7 @@
 #include "hybrid/configuration.h"
 #include "hybrid/contact_modes.h"
 #include "hybrid/impacts.h"
+#include "hybrid/peaks.h"
 #include "hybrid/present.h"
 #include "hybrid/simulation.h"
 #include "hybrid/stability.h"
@@ -54,6 +55,7 @@ static void place_numbers(State *state, const Mechanism *m, Memory *memory) {
         {&state->arc.before.y, 2 * n}, {&state->arc.before.a, n},
         {&state->first, 3 * n * (size_t)m->compliant_count},
         {&state->fastest, n},
+        {&state->peaks, PEAK_NUMBERS * (size_t)m->stressed_count},
         {&state->floors, s},         {&state->accepted, n},
         {&state->states, 2 * (size_t)m->independent_count + 2},
     };
@@ -90,9 +92,10 @@ static void place_scratch(Scratch *scratch, const Mechanism *m, Memory *memory) 
     }
     /* The number of unknowns of a complementarity problem of all contacts. */
     size_t forces = 4 * s + 3 * (size_t)m->friction_count, pivots_size = forces * (2 * forces + 2);
-    size_t single = size * size + 4 * size + 2 * drawn + 4 * pieces + 16 + pivots_size;
+    size_t single =
+        size * size + 4 * size + 2 * drawn + 4 * pieces + 16 + pivots_size + m->beam_size;
     scratch->size = 12 * size * size + 60 * size + 2 * drawn + 16 * pieces + 64 + pivots_size +
-                    forces * forces + 16 * forces;
+                    forces * forces + 16 * forces + m->beam_size;
     scratch->base = place(memory, scratch->size, sizeof(double));
     scratch->spare = place(memory, single, sizeof(double));
     scratch->used = scratch->most = 0;
@@ -217,6 +220,15 @@ PRBM double simulation_time(const Simulation *simulation) {
 
 PRBM double simulation_steps(const Simulation *simulation) {
     return simulation->steps;
+}
+
+PRBM double pass_point(Simulation *sim, double time) {
+    State *state = &sim->state;
+    double last = state->time - state->point, following = time - state->time;
+    double H = greater(last > 0.0 ? last : following, state->longest - WALL_FADING_FACTOR * last);
+    state->longest = lesser(H, WALL_LONGEST_RTOL * sim->configuration.scales.time);
+    state->point = state->time;
+    return H;
 }
 
 /* --- contact state and inputs ----------------------------------------------------------------- */
@@ -440,6 +452,7 @@ PRBM bool start_motion(Simulation *sim, double start_time, double tolerance, Sim
     }
     state->tolerance = lesser(state->tolerance, TOLERANCE_USED_MAX);
     set_scales(configuration, state->frequency);
-    state->started = release_mechanism(sim, problem);
+    clear_peaks(sim);
+    state->started = release_mechanism(sim, problem) && restart_peaks(sim, problem);
     return state->started;
 }

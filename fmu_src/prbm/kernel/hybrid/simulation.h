@@ -8,6 +8,9 @@ PRBM int state_size(const Simulation *sim); /* ny = 2 n + 2 */
 PRBM const System *system_of(const Simulation *sim);
 PRBM int contact_count(const Simulation *sim);
 PRBM Complex *directions_at(Simulation *sim, const double *q); /* in working memory */
+/* Record the communication step from the present time to another; return the recent
+ * longest step. */
+PRBM double pass_point(Simulation *sim, double time);
 PRBM void set_inputs(Simulation *sim); /* and the equations of the contacts */
 PRBM void set_contacts(Simulation *sim, const ContactMode *modes);
 PRBM void set_mode(Simulation *sim, int contact, ContactMode mode);

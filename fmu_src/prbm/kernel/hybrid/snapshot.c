@@ -2,6 +2,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "hybrid/arc.h"
 #include "hybrid/configuration.h"
 #include "hybrid/present.h"
 #include "hybrid/simulation.h"
@@ -213,7 +214,7 @@ static bool consistent(const Simulation *sim) {
 /* Compute the configuration and the equations from a state that has been read. */
 static bool rebuild(Simulation *sim, Problem *problem) {
     Configuration *configuration = &sim->configuration;
-    sim->stepping.has_middle = false;
+    forget_arc(sim);
     if (!sim->state.started) {
         return true;
     }

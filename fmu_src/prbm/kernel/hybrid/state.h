@@ -107,10 +107,25 @@ typedef struct {
     double *front, *k1;                   /* (ny,): state at the end of the last step, its rates */
     double *first;                        /* (c, 3 n): q, v and M phi at first touch */
     double *fastest;                      /* (n,): shape of the fastest mode */
+    double *peaks;                        /* (stressed flexures, PEAK_NUMBERS), see peaks.c */
     double *floors;                       /* (s,): depth below zero at which gaps close */
     double *accepted;                     /* model exchange: (n,) angles of the last step */
     double *states;                       /* model exchange: the states as they were set */
 } State;
+
+/* The largest stress in a flexure at one time, with the number and position of its section. */
+typedef struct {
+    double time, stress, place, position;
+} Sample;
+
+/* The largest stress in a flexure so far.  known: the number of the last samples of the smooth
+ * motion; ahead: whether next is a sample at the front, which counts once the time reaches it. */
+typedef struct {
+    double stress, time, position, known, ahead;
+    Sample last[2], next;
+} Peak;
+
+enum { PEAK_NUMBERS = sizeof(Peak) / sizeof(double) };
 
 /* Equations in a contact state that is being tried, and their evaluation. */
 typedef struct {
@@ -143,6 +158,7 @@ typedef struct {
     Located located;
     Node middle;           /* of the latest step */
     bool has_middle;       /* whether the middle has been computed */
+    double embedded_error; /* of the latest step; negative before it is computed */
     double *reach;         /* (d,), (n,) bounds of the changes of arms and coordinates */
     double *torques;       /* (even + 2,) of the springs in the fastest mode */
     double *response;      /* (even + 2,) accelerations by these torques */
@@ -152,7 +168,7 @@ typedef struct {
 /* Groups of present quantities: outputs, the rates and, in model exchange, the front itself. */
 enum {
     NOTHING = 0, PLACES = 1, MOTION = 2, BASE = 4, ENERGIES = 8, MOBILITIES = 16, RATES = 32,
-    FRONT = 64
+    FRONT = 64, STRESSES = 128
 };
 
 /* The present state, its outputs and rates.  They are valid only if they are fresh: read them by
@@ -182,7 +198,8 @@ struct Simulation {
     Scratch scratch;
     ImpactListener *on_impact;
     void *listener;
-    double steps; /* integration steps since the simulation was opened */
+    bool untouched; /* whether nothing has been set since the last communication point */
+    double steps;   /* integration steps since the simulation was opened */
     size_t bytes;
 };
 

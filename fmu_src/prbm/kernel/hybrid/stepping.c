@@ -5,6 +5,7 @@
 #include "hybrid/arc.h"
 #include "hybrid/compliant.h"
 #include "hybrid/events.h"
+#include "hybrid/peaks.h"
 #include "hybrid/simulation.h"
 #include "hybrid/stability.h"
 #include "hybrid/stepping.h"
@@ -15,23 +16,19 @@
 
 /* --- errors ----------------------------------------------------------------------------------- */
 
-/* Compute the mean squares of the errors x and z.  Those of angles are in rad, those of rates and
- * energies relative to their size in y and y1. */
-static void mean_squares(const Simulation *sim, const double *x, const double *z, const double *y,
-                         const double *y1, double *means) {
+/* Return the root mean square of an error x.  That of angles is in rad, that of rates and energies
+ * relative to the larger of their sizes in y and y1. */
+static double error_norm(const Simulation *sim, const double *x, const double *y,
+                         const double *y1) {
     const double *least = sim->configuration.least, *share = sim->configuration.share;
     int ny = state_size(sim);
-    Lanes fine[SUMS] = {NO_LANES}, coarse[SUMS] = {NO_LANES};
+    Lanes sum[SUMS] = {NO_LANES};
     for (int j = 0; j < ny; j += LANES) {
         Lanes size = larger(magnitudes(lanes_at(y + j)), magnitudes(lanes_at(y1 + j)));
-        Lanes scale = 1.0 / larger(lanes_at(least + j), lanes_at(share + j) * size);
-        Lanes a = lanes_at(x + j) * scale, b = lanes_at(z + j) * scale;
-        fine[SUM_OF(j)] += a * a;
-        coarse[SUM_OF(j)] += b * b;
+        Lanes ratio = lanes_at(x + j) / larger(lanes_at(least + j), lanes_at(share + j) * size);
+        sum[SUM_OF(j)] += ratio * ratio;
     }
-    int core = 2 * system_of(sim)->n + 2;
-    means[0] = total(fine) / core;
-    means[1] = total(coarse) / core;
+    return sqrt(total(sum) / (2 * system_of(sim)->n + 2));
 }
 
 /* --- step sizes ------------------------------------------------------------------------------- */
@@ -43,10 +40,9 @@ PRBM double longest_step(const Simulation *sim) {
 /* Choose the first step size by the size of the rates (Hairer, II.4). */
 static double first_step(const Simulation *sim) {
     const State *state = &sim->state;
-    double means[2];
-    mean_squares(sim, state->k1, state->k1, state->front, state->front, means);
+    double size = error_norm(sim, state->k1, state->front, state->front);
     double allowed = FIRST_STEP_FACTOR * power(state->tolerance, FIRST_STEP_EXPONENT);
-    return lesser(longest_step(sim), allowed / greater(sqrt(means[0]), FIRST_RATE_MIN));
+    return lesser(longest_step(sim), allowed / greater(size, FIRST_RATE_MIN));
 }
 
 /* A step size rounded to four binary digits, so that round-off in the errors does not change it. */
@@ -105,9 +101,10 @@ static double step_error(Simulation *sim, double h, Problem *problem) {
         return HUGE_VAL;
     }
     errors_of(ny, arc->k, h, stepping->error, stepping->coarse_error);
-    double means[2];
-    mean_squares(sim, stepping->error, stepping->coarse_error, arc->y, stepping->end, means);
-    double size = sqrt(means[0] + means[1]), error = size > 0.0 ? means[0] / size : size;
+    double fine = error_norm(sim, stepping->error, arc->y, stepping->end);
+    double coarse = error_norm(sim, stepping->coarse_error, arc->y, stepping->end);
+    double size = sqrt(fine * fine + coarse * coarse);
+    double error = size > 0.0 ? fine * fine / size : size;
     if (sim->equations.pressed_count > 0) {
         error = greater(error, contact_error(sim, h));
     }
@@ -117,22 +114,23 @@ static double step_error(Simulation *sim, double h, Problem *problem) {
 PRBM double embedded_error(Simulation *sim) {
     Stepping *stepping = &sim->stepping;
     const Arc *arc = &sim->state.arc;
-    double means[2];
-    fine_error_of(state_size(sim), arc->k, arc->h, stepping->error);
-    mean_squares(sim, stepping->error, stepping->error, arc->y, arc->y, means);
-    return sqrt(means[0]);
+    if (stepping->embedded_error < 0.0) {
+        fine_error_of(state_size(sim), arc->k, arc->h, stepping->error);
+        stepping->embedded_error = error_norm(sim, stepping->error, arc->y, arc->y);
+    }
+    return stepping->embedded_error;
 }
 
 PRBM double difference(Simulation *sim, const double *y, const double *z) {
     size_t mark = sim->scratch.used;
     int ny = state_size(sim);
-    double *change = take(&sim->scratch, (size_t)ny), means[2];
-    for (int i = 0; i < ny; i++) {
-        change[i] = z[i] - y[i];
+    double *change = take(&sim->scratch, (size_t)ny);
+    for (int j = 0; j < ny; j += LANES) {
+        set_lanes(change + j, lanes_at(z + j) - lanes_at(y + j));
     }
-    mean_squares(sim, change, change, y, z, means);
+    double size = error_norm(sim, change, y, z);
     sim->scratch.used = mark;
-    return sqrt(means[0]);
+    return size;
 }
 
 PRBM bool check_projection(Simulation *sim, double t, const double *y, const double *projected,
@@ -226,7 +224,7 @@ PRBM bool end_step(Simulation *sim, double t, Problem *problem) {
         return true;
     }
     state->arc.h = t - state->arc.start;
-    sim->stepping.has_middle = false;
+    forget_arc(sim);
     return arc_cut(sim, t, state->arc.k, state->front, problem) && project_end(sim, problem);
 }
 
@@ -272,9 +270,12 @@ PRBM bool take_step(Simulation *sim, Problem *problem) {
     if (sim->equations.pressed_count > 0 && !settle_calm(sim, problem)) {
         return false;
     }
-    if (!state->has_k1 && !rate(&sim->equations, state->front_time, state->front, NULL,
-                                &stepping->evaluation, state->k1, problem)) {
-        return false;
+    if (!state->has_k1) {
+        if (!rate(&sim->equations, state->front_time, state->front, NULL, &stepping->evaluation,
+                  state->k1, problem)) {
+            return false;
+        }
+        restart_peaks_from(sim, &stepping->evaluation);
     }
     sim->steps += 1.0;
     if (!find_step(sim, longest, &h, problem)) {
@@ -283,7 +284,7 @@ PRBM bool take_step(Simulation *sim, Problem *problem) {
     double start = state->front_time, end = start + h;
     state->arc.start = start;
     state->arc.h = h;
-    stepping->has_middle = false;
+    forget_arc(sim);
     stepping->located.stop = -1;
     state->pending.kind = EVENT_NONE;
     if (h > STABLE_STEP_WATCH_FACTOR * stable_step(sim)) {
@@ -295,9 +296,10 @@ PRBM bool take_step(Simulation *sim, Problem *problem) {
     }
     state->arc.valid = true;
     if (event.kind != EVENT_NONE) {
-        return cut_step(sim, &event, problem);
+        return cut_step(sim, &event, problem) && step_peaks_to_event(sim, problem);
     }
     state->front_time = end;
+    step_peaks(sim, &stepping->evaluation);
     state->has_k1 = true;
     copy(ny, state->arc.k + (STAGES - 1) * ny, state->k1);
     return true;

@@ -7,9 +7,9 @@
 #include "hybrid/simulation.h"
 #include "hybrid/walls.h"
 
-/* The reference that the inputs of a stop define at the present time.  In model exchange, where walls
- * follow no cubic, the excess is the change of the wall's velocity by impulses.  It remains until
- * stop.velocity is set. */
+/* The reference that the inputs of a stop define at the present time.  In model exchange, where
+ * walls follow no cubic, the excess is the change of the wall's velocity by impulses.  It remains
+ * until stop.velocity is set. */
 static Wall given_reference(const Simulation *sim, int i) {
     const Mechanism *m = sim->configuration.mechanism;
     const double *given = wall_inputs(m, sim->state.given, i);
@@ -47,10 +47,8 @@ PRBM double push_wall(Simulation *sim, int i, double P) {
 PRBM void join_walls(Simulation *sim, double time, bool set, Wall *joined) {
     State *state = &sim->state;
     double now = state->time, last = now - state->point, following = time - now;
-    double H = greater(last > 0.0 ? last : following, state->longest - WALL_FADING_FACTOR * last);
+    double H = pass_point(sim, time);
     double share = lesser(H / following, 1.0), least = WALL_PATH_RTOL * system_of(sim)->length;
-    state->longest = lesser(H, WALL_LONGEST_RTOL * sim->configuration.scales.time);
-    state->point = now;
     for (int i = 0; i < system_of(sim)->s; i++) {
         const Stop *stop = &sim->configuration.mechanism->stops[i];
         Wall wall = state->walls[i], line = given_reference(sim, i);

@@ -15,7 +15,7 @@ from ...mechanics.inputs import check_input, input_names
 from ...mechanics.system import unit
 from ...mechanism.description import Mechanism
 from ...mechanism.expressions import affine
-from ...mechanism.flexure import PIN
+from ...mechanism.flexure import LEAF, PIN
 from ...mechanism.parts import (
     GROUND,
     Body,
@@ -275,6 +275,12 @@ def _check_supported(
         unsupported.append("damping.zeta")
     forces = {f.name for f in mechanism.forces}
     unsupported += [name for name, x in given.items() if x and name.split(".")[0] not in forces]
+    for kind in mechanism.flexure_types:
+        if kind.profile != LEAF or kind.curvature is not None or kind.rise is not None:
+            raise FiniteElementError(
+                f"the flexures {kind.name} are not straight and uniform: the finite elements have "
+                "no other flexures; remove profile, curvature and rise"
+            )
     for name in unsupported:
         raise FiniteElementError(
             f"{name} is not 0: the finite elements have no friction, no damping in proportion to "

@@ -1,7 +1,8 @@
 /* Reliability of native FMUs: an importer that checks the values behind each OK.
  *
  * It makes legal and illegal calls, damages saved states, and draws parameters.  Each sequence runs
- * in a process of its own with a limit of CPU time; the counts are in memory that all of them share.
+ * in a process of its own with a limit of CPU time; the counts are in memory that all of them
+ * share.
  */
 #ifndef DRIVER_H
 #define DRIVER_H
@@ -49,7 +50,8 @@ double drawn_over_bounds(Random *random, const Variable *variable);
 enum { STATUSES = 6 };
 
 typedef enum {
-    NOT_FINITE, PENETRATED, ENERGY_LOST, COUNT_FELL, ACCEPTED, CHANGED, SILENT, OVER_BUDGET, VIOLATIONS
+    NOT_FINITE, PENETRATED, ENERGY_LOST, COUNT_FELL, ACCEPTED, CHANGED, SILENT, OVER_BUDGET,
+    VIOLATIONS
 } Violation;
 
 typedef enum {

@@ -102,7 +102,8 @@ static void try_damage(Subject *s, Damage damage, const uint8_t *bytes, size_t s
     if (FINE(status) && FINE(continued(s, s->values))) {
         for (size_t i = 0; i < s->reals; i++) {
             if (!isfinite(s->values[i])) {
-                violated(s, NOT_FINITE, "value reference %u after a forged state", s->references[i]);
+                violated(s, NOT_FINITE, "value reference %u after a forged state",
+                         s->references[i]);
                 break;
             }
         }

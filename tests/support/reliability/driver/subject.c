@@ -267,8 +267,8 @@ static void judge_energy(Subject *s) {
     if (s->judges_energy && off > 1e-12) { /* J; less is round-off of vanishing energies */
         s->counts->energy = fmax(s->counts->energy, relative / bound);
         if (relative > bound) {
-            violated(s, ENERGY_LOST, "the balance changed by %.3g of %.3g J at tolerance %.2g", off, s->largest,
-                     s->tolerance);
+            violated(s, ENERGY_LOST, "the balance changed by %.3g of %.3g J at tolerance %.2g", off,
+                     s->largest, s->tolerance);
             s->balance = balance; /* Report a change once. */
         }
     }

@@ -1,0 +1,23 @@
+"""``prbm explore``: a page that simulates a mechanism in the browser."""
+
+import argparse
+import webbrowser
+from pathlib import Path
+
+from ..base.atomic import check_file, write
+from ..files.mechanism_file import load
+from ..files.settings import settings
+from ..fmu.explorer import explorer
+
+
+def write_page(options: argparse.Namespace) -> None:
+    """Write the page of a mechanism, and open it in the browser."""
+    mechanism = load(options.mechanism)
+    path = options.out or Path(f"{mechanism.name}.html")
+    check_file(path)
+    page = explorer(mechanism, settings(mechanism, options.set))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write(path, page.encode())
+    print(path)
+    if options.open:
+        webbrowser.open(path.resolve().as_uri())

@@ -1,0 +1,152 @@
+"""``prbm shock``: the effect of a shock of the base, and the level at which a flexure yields."""
+
+import argparse
+import math
+
+from ..analysis.shock import GRAVITY, Pulse, Shock, fragility, shock
+from ..base.progress import reporter
+from ..base.unit_text import length_unit
+from ..files.mechanism_file import load
+from ..files.settings import UserMistake, quantities, quantity, settings
+from ..mechanics.assembly import assemble
+from ..mechanism.description import Mechanism
+from ..runs.headline import instant, length
+from .output import Output, aligned
+
+
+def run_shock(options: argparse.Namespace) -> None:
+    """Simulate a shock and print its effect."""
+    mechanism, output = load(options.mechanism), Output(options.out)
+    values = settings(mechanism, options.set)
+    if given := next((name for name in values if name.startswith("release.")), None):
+        raise UserMistake(f"--set {given}: a shock acts on the mechanism at rest")
+    stop_time = quantity(options.stop_time, "s", "--stop-time") if options.stop_time else None
+    if options.record:
+        _check_record(options)
+        name = f"base.acceleration.{options.axis}"
+        found = shock(
+            mechanism, {name: f"csv({options.record})"}, values, stop_time=stop_time, fatigue=True,
+            progress=reporter(), engine=options.engine,
+        )  # fmt: skip
+        _print(found, mechanism, f"record {options.record}")
+    elif options.peaks:
+        _sweep(options, mechanism, values, stop_time, output)
+        return
+    else:
+        pulse = _pulse(options)
+        found = shock(
+            mechanism, {pulse.input: pulse.signal}, values, duration=pulse.duration,
+            stop_time=stop_time, fatigue=True, progress=reporter(), engine=options.engine,
+        )  # fmt: skip
+        _print(found, mechanism, _text(pulse))
+    columns = found.result.columns
+    output.table(
+        f"{mechanism.name}-shock.csv", columns.dtype.names or (),
+        (list(row) for row in columns.tolist()),
+    )  # fmt: skip
+    if options.out is not None:
+        from ..plots.shock import shock_figure  # imported here: it takes a second
+
+        output.figure(f"{mechanism.name}-shock.png", lambda: shock_figure(found, options.axis))
+    output.write()
+
+
+def _check_record(options: argparse.Namespace) -> None:
+    """Reject options of a pulse beside a record."""
+    for name in ("peak", "height", "duration", "peaks"):
+        if getattr(options, name):
+            raise UserMistake(f"--record excludes --{name}: the record has the acceleration")
+
+
+def _pulse(options: argparse.Namespace, peak: float | None = None) -> Pulse:
+    """Return the pulse of the options."""
+    if options.duration is None:
+        raise UserMistake('--duration is missing: give that of the pulse, for instance "0.5 ms"')
+    duration = quantity(options.duration, "s", "--duration")
+    if peak is not None:
+        return Pulse(options.pulse, peak, duration, options.axis)
+    if (options.peak is None) == (options.height is None):
+        raise UserMistake('give --peak "500 g" or --height "1 m", the drop height')
+    if options.peak is not None:
+        given = quantity(options.peak, "m/s2", "--peak")
+        return Pulse(options.pulse, given, duration, options.axis)
+    height = quantity(options.height, "m", "--height")
+    return Pulse.drop(options.pulse, height, duration, options.axis)
+
+
+def _text(pulse: Pulse) -> str:
+    return (
+        f"{pulse.kind} of {pulse.peak / GRAVITY:.4g} g and {1e3 * pulse.duration:.4g} ms along "
+        f"{pulse.axis}, {pulse.velocity:.4g} m/s"
+    )
+
+
+def _print(found: Shock, mechanism: Mechanism, about: str) -> None:
+    """Print the effect of a shock."""
+    size = assemble(mechanism, mechanism.values()).length
+    end = float(found.result.columns["time"][-1])
+    release = mechanism.release
+    print(f"{mechanism.name}: {about}")
+    largest = (
+        f"{math.degrees(found.displacement):.3g} deg"
+        if release.turns
+        else length(found.displacement, size)
+    )
+    print(f"largest displacement {release.body} {largest} from its equilibrium")
+    for hits in found.hits:
+        how = f", at most {hits.speed:.4g} m/s and {hits.impulse:.4g} N s" if hits.count else ""
+        print(f"impacts at {hits.stop:9} {hits.count}{how}")
+    for one in found.loadings:
+        safety = "" if one.safety is None else f", safety factor {one.safety:.3g} (yield)"
+        damage = "" if one.damage is None else f", damage {one.damage:.3g}"
+        print(
+            f"stress in {one.flexure:10} {1e-6 * one.peak:.4g} MPa at t = "
+            f"{instant(one.time, end, 5)}{safety}{damage}"
+        )
+    rest = "not yet" if math.isnan(found.rest) else f"at t = {instant(found.rest, end, 4)}"
+    print(f"settled              {rest}")
+
+
+def _sweep(
+    options: argparse.Namespace,
+    mechanism: Mechanism,
+    values: dict[str, float],
+    stop_time: float | None,
+    output: Output,
+) -> None:
+    """Print the effect over the peak, and the level at which a flexure yields."""
+    if options.peak or options.height:
+        raise UserMistake("--peaks excludes --peak and --height")
+    peaks = sorted(quantities(options.peaks, "m/s2", "--peaks"))
+    pulse = _pulse(options, peaks[0])
+    found, level = fragility(
+        mechanism, pulse, peaks, values, stop_time=stop_time, progress=reporter(),
+        engine=options.engine,
+    )  # fmt: skip
+    factor, unit = length_unit(assemble(mechanism, mechanism.values()).length)
+    factor, unit = (180 / math.pi, "deg") if mechanism.release.turns else (factor, unit)
+    rows = [
+        [
+            f"{peak / GRAVITY:.4g}", f"{factor * one.displacement:.4g}",
+            str(sum(hits.count for hits in one.hits)), f"{1e-6 * one.peak_stress:.4g}",
+            "-" if math.isinf(one.safety) else f"{one.safety:.3g}",
+        ]
+        for peak, one in zip(peaks, found, strict=True)
+    ]  # fmt: skip
+    print(f"{mechanism.name}: {pulse.kind} of {1e3 * pulse.duration:.4g} ms along {pulse.axis}")
+    print(aligned(("peak [g]", f"displacement [{unit}]", "hits", "stress [MPa]", "safety"), rows))
+    if all(math.isinf(one.safety) for one in found):
+        print("no safety factor without yield_strength: add it to the material")
+    elif math.isnan(level):
+        print("yield                at none of these peaks, or below the first")
+    else:
+        print(f"yield                from a peak of {level / GRAVITY:.4g} g on")
+    output.table(
+        f"{mechanism.name}-fragility.csv",
+        ["peak [m/s2]", "displacement", "hits", "stress [Pa]", "safety factor [-]"],
+        [
+            [p, x.displacement, sum(h.count for h in x.hits), x.peak_stress, x.safety]
+            for p, x in zip(peaks, found, strict=True)
+        ],
+    )
+    output.write()

@@ -1,0 +1,125 @@
+"""``prbm stress``: the stress of flexures at rest, held and in motion, and their fatigue."""
+
+import argparse
+
+from ..analysis.strength import Loading, loadings, with_stress
+from ..base.progress import reporter
+from ..files.mechanism_file import load
+from ..files.settings import UserMistake, quantities, settings
+from ..mechanics.assembly import assemble
+from ..mechanics.statics import equilibrium
+from ..mechanics.stress import Stress, static_stresses
+from ..mechanism.description import Mechanism
+from ..mechanism.parts import FlexureType
+from ..runs.headline import instant, length
+from ..runs.run import communication_points, simulate
+from .duration import given_inputs, span
+from .output import Output, aligned
+from .systems import check_held, held_unit
+
+ROWS_PER_STEP = 5  # Rows of the counted history per communication step.
+HEAD = ("flexure", "peak [MPa]", "at t", "from start", "yield/peak", "damage", "runs to failure")
+
+
+def print_stress(options: argparse.Namespace) -> None:
+    """Print the stress of all flexures in held shapes, or in the motion after the release."""
+    mechanism = with_stress(load(options.mechanism))
+    if options.held:
+        _held(options, mechanism)
+    else:
+        _moving(options, mechanism)
+
+
+def _kind(mechanism: Mechanism, flexure: str) -> FlexureType:
+    """Return the type of a flexure."""
+    kind = next(f.type for f in mechanism.flexures if f.name == flexure)
+    return next(k for k in mechanism.flexure_types if k.name == kind)
+
+
+def _held(options: argparse.Namespace, mechanism: Mechanism) -> None:
+    """Print the stress in shapes in which the released body is held."""
+    values = settings(mechanism, options.set)
+    own = {p.name for p in mechanism.parameters}
+    for name in values:
+        if name not in own:
+            raise UserMistake(f"--set {name}: inputs have no effect on held shapes")
+    if options.input or options.stop_time:
+        raise UserMistake("--held excludes --input and --stop-time: the mechanism does not move")
+    system, unit = assemble(mechanism, mechanism.values(values)), held_unit(mechanism)
+    head = (
+        f"at [{unit.shown}]", "flexure", "start [MPa]", "end [MPa]", "largest [MPa]",
+        "yield/largest",
+    )  # fmt: skip
+    rows, table = [], []
+    for text in quantities(options.held, unit.si, "--held"):
+        x = check_held(text, system, "--held")
+        for name, one in static_stresses(system, equilibrium(system, x)).items():
+            safety = _safety(one, _kind(mechanism, name))
+            numbers = [1e-6 * y for y in (one.start, one.end, one.largest)]
+            rows.append([f"{unit.factor * x:.5g}", name, *(f"{y:.5g}" for y in numbers), safety])
+            table.append([x, name, one.start, one.end, one.largest, one.position])
+    print(
+        f"{mechanism.name}: stress on the left faces, seen from start to end; tension is positive"
+    )
+    print(aligned(head, rows))
+    output = Output(options.out)
+    output.table(
+        f"{mechanism.name}-stress.csv",
+        [
+            f"{unit.amount} [{unit.si}]", "flexure", "start [Pa]", "end [Pa]", "largest [Pa]",
+            "position [m]",
+        ],
+        table,
+    )  # fmt: skip
+    output.write()
+
+
+def _safety(one: Stress, kind: FlexureType) -> str:
+    return "-" if not kind.yield_strength else f"{kind.yield_strength / one.largest:.3g}"
+
+
+def _moving(options: argparse.Namespace, mechanism: Mechanism) -> None:
+    """Print peak stress, safety factor and fatigue of the motion after the release."""
+    values, output = settings(mechanism, options.set), Output(options.out)
+    stop_time, step = span(mechanism, values, options.stop_time, None, options.engine)
+    communication_points(stop_time, step / ROWS_PER_STEP)
+    result = simulate(
+        mechanism, values, inputs=given_inputs(options), stop_time=stop_time,
+        step=step / ROWS_PER_STEP, progress=reporter(), engine=options.engine,
+    )  # fmt: skip
+    found = loadings(result.columns, mechanism)
+    size = assemble(mechanism, mechanism.values()).length
+    print(f"{mechanism.name}: largest stress in {stop_time:g} s")
+    print(aligned(HEAD, [_row(one, stop_time, size) for one in found]))
+    for line in _missing(mechanism):
+        print(line)
+    output.table(
+        f"{mechanism.name}-stress.csv",
+        ["flexure", "peak [Pa]", "time [s]", "position [m]", "yield/peak [-]", "damage [-]"],
+        [[x.flexure, x.peak, x.time, x.position, x.safety, x.damage] for x in found],
+    )
+    output.write()
+
+
+def _row(one: Loading, stop_time: float, size: float) -> list[str]:
+    """Return the printed row of a flexure."""
+    return [
+        one.flexure, f"{1e-6 * one.peak:.5g}", instant(one.time, stop_time, 5),
+        length(one.position, size), "-" if one.safety is None else f"{one.safety:.3g}",
+        "-" if one.damage is None else f"{one.damage:.3g}",
+        "-" if not one.damage else f"{1.0 / one.damage:.3g}",
+    ]  # fmt: skip
+
+
+def _missing(mechanism: Mechanism) -> list[str]:
+    """Return remedies for strengths that are not given."""
+    kinds = [_kind(mechanism, flexure.name) for flexure in mechanism.flexures]
+    lines = []
+    if any(kind.yield_strength is None for kind in kinds):
+        lines.append("no safety factor without yield_strength: add it to the material")
+    if any(kind.fatigue_strength is None for kind in kinds):
+        lines.append(
+            "no damage without fatigue_strength, fatigue_cycles and tensile_strength: add them to "
+            "the material"
+        )
+    return lines

@@ -1,0 +1,1 @@
+"""Live pages: HTML pages that simulate a mechanism in the browser, without a network."""

@@ -1,0 +1,403 @@
+// The live page: a simulation for the present parameters, its film, plots, tables and link.
+
+const RUN_AGE_MIN = 120; // Milliseconds that a run gets before a drag replaces it.
+const PLOT_PERIOD = 50; // Milliseconds between two drawings of the plots while the film runs.
+
+class Page {
+  constructor(description, kernel, tables) {
+    this.description = description;
+    this.kernel = kernel;
+    this.mechanism = kernel.mechanism(tables);
+    this.known = new Map(description.quantities.map((quantity) => [quantity.name, quantity]));
+    this.changes = new Map();
+    this.outputs = plottedOutputs(description);
+    description.stops.forEach((stop) =>
+      this.outputs.push(
+        `${stop.name}.contact`,
+        `${stop.name}.impact_count`,
+        `${stop.name}.impact_time`,
+      ),
+    );
+    const slot = new Map(description.outputs.map((output) => [output.name, output.slot]));
+    this.slots = this.outputs.map((name) => slot.get(name));
+    this.column = new Map(this.outputs.map((name, k) => [name, k]));
+    this.run = null;
+    this.runs = 0;
+    this.build();
+  }
+
+  build() {
+    const { description } = this;
+    const actions = {
+      quantity: (name) => this.known.get(name),
+      value: (name) => this.value(name),
+      wall: (k) => this.wall(k),
+      drag: (name, value, ended) => this.dragged(name, value, ended),
+      grab: (name) => this.grabbed(name),
+    };
+    this.film = new Film(description.stopTime, () => this.show());
+    this.stage = new Stage(byId("stage"), description, actions);
+    this.controls = new Controls(byId("fields"), description, (...change) =>
+      this.change(...change),
+    );
+    const seek = (time) => this.film.seek(time);
+    this.plots = plotList(description, this.column).map(
+      (plot) => new Plot(plot, byId("plots"), seek),
+    );
+    this.modes = new ModeView(byId("modes"), description, (shape) =>
+      this.stage.draw(this.shapes, shape),
+    );
+    const handles = [
+      ...(description.stops.length ? ["a wall"] : []),
+      ...(this.stage.bodyHandle ? ["the released body"] : []),
+    ];
+    byId("hint").textContent =
+      (handles.length ? `Drag ${handles.join(" or ")}; arrow keys move a focused handle. ` : "") +
+      "Drag over a plot to move in time.";
+    byId("impact-card").hidden = description.stops.length === 0;
+    this.listen();
+  }
+
+  listen() {
+    byId("reset").addEventListener("click", () => this.apply(new Map(), true));
+    byId("copy").addEventListener("click", () => this.copy());
+    byId("download").addEventListener("click", () => this.download());
+    byId("show-links").addEventListener("change", (event) =>
+      byId("live").classList.toggle("with-links", event.target.checked),
+    );
+    window.addEventListener("hashchange", () => this.follow());
+    const tabs = [byId("tab-motion"), byId("tab-modes")];
+    tabs.forEach((tab, k) => {
+      tab.addEventListener("click", () => this.view(k === 1));
+      tab.addEventListener("keydown", (event) => {
+        if (event.key === "ArrowRight" || event.key === "ArrowLeft") {
+          this.view(k === 0);
+          tabs[1 - k].focus();
+        }
+      });
+    });
+    new ResizeObserver(() => {
+      if (this.shapes && this.stage.bounds) {
+        this.stage.resize(this.shapes);
+        this.show(true);
+      }
+    }).observe(byId("plots"));
+    window
+      .matchMedia("(prefers-color-scheme: dark)")
+      .addEventListener("change", () => this.show(true));
+  }
+
+  // -- values --
+
+  value(name) {
+    return this.changes.has(name) ? this.changes.get(name) : this.known.get(name).start;
+  }
+
+  values() {
+    return new Map([...this.known.keys()].map((name) => [name, this.value(name)]));
+  }
+
+  // The position of a wall [m].
+  wall(k) {
+    const stop = this.description.stops[k];
+    return (
+      evaluated(stop.position, { get: (name) => this.value(name) }) + this.value(stop.displacement)
+    );
+  }
+
+  change(name, value, ended) {
+    const changes = new Map(this.changes);
+    if (Object.is(value, this.known.get(name).start)) {
+      changes.delete(name);
+    } else {
+      changes.set(name, value);
+    }
+    this.apply(changes, ended);
+  }
+
+  dragged(name, value, ended) {
+    this.change(name, value, ended);
+    if (ended && name === this.description.release.quantity && !reducedMotion.matches) {
+      this.film.replay();
+    }
+  }
+
+  grabbed(name) {
+    if (this.modes.active) {
+      this.view(false);
+    }
+    if (name === this.description.release.quantity) {
+      this.film.seek(0);
+    }
+  }
+
+  // Start a simulation with changes, at once or when the present one has been shown.
+  apply(changes, now) {
+    this.wanted = changes;
+    if (now || !this.busy || performance.now() - this.started > RUN_AGE_MIN) {
+      this.begin();
+    }
+  }
+
+  follow() {
+    const { changes, problems } = changesOf(location.hash, this.known);
+    this.apply(changes, true);
+    if (problems.length) {
+      this.say([byId("message").textContent, ...problems].filter(Boolean).join(" "));
+    }
+  }
+
+  // -- the simulation --
+
+  begin() {
+    const changes = this.wanted;
+    this.wanted = null;
+    let simulation = null;
+    let run = null;
+    try {
+      const numbers = [...changes].map(([name, value]) => [this.known.get(name).slot, value]);
+      simulation = new Simulation(this.kernel, this.mechanism, this.slots, new Map(numbers));
+      run = new Run(
+        simulation,
+        Math.round(this.description.stopTime / this.description.step),
+        this.description.step,
+      );
+    } catch (error) {
+      simulation?.close();
+      this.refuse(error, changes);
+      return;
+    }
+    this.stop?.();
+    this.simulation?.close();
+    [this.changes, this.simulation, this.run] = [changes, simulation, run];
+    this.shapes = new Shapes(this.description, this.values(), simulation);
+    this.started = performance.now();
+    this.busy = true;
+    this.say("");
+    this.known.forEach((_, name) => this.controls.show(name, this.value(name)));
+    showFragment(changes);
+    this.state("running");
+    this.stop = compute(run, () => this.progress());
+    this.show();
+    if (this.modes.active) {
+      this.modes.open(this.shapes);
+    }
+  }
+
+  refuse(error, changes) {
+    if (!(error instanceof KernelError)) {
+      throw error;
+    }
+    const wrong = [...changes.keys()].find((name) => error.message.startsWith(name));
+    this.say(
+      `${error.message}.${this.run ? " The last valid simulation is still shown." : ""}`,
+      wrong,
+    );
+    if (!this.run) {
+      this.state("error");
+      if (changes.size) {
+        this.wanted = new Map();
+        const text = byId("message").textContent;
+        this.begin();
+        this.say(`${text} The default values are shown instead.`);
+      }
+    }
+  }
+
+  progress() {
+    const { run } = this;
+    this.film.available = run.time;
+    if (run.finished) {
+      this.busy = false;
+      this.finish();
+    }
+    this.show();
+    if (this.wanted && (run.finished || performance.now() - this.started > RUN_AGE_MIN)) {
+      this.begin();
+    }
+  }
+
+  finish() {
+    const { run, description } = this;
+    const { stops } = description;
+    const read = (name, output) => run.last(this.column.get(`${name}.${output}`));
+    const { dataset } = document.documentElement;
+    dataset.impacts = stops.reduce((sum, stop) => sum + read(stop.name, "impact_count"), 0);
+    dataset.last = JSON.stringify(
+      Object.fromEntries(stops.map((stop) => [stop.name, read(stop.name, "impact_time")])),
+    );
+    this.runs += 1;
+    dataset.runs = this.runs;
+    dataset.milliseconds = Math.round(performance.now() - this.started);
+    if (run.error) {
+      this.say(`${run.error.message}.`);
+    }
+    this.stage.fit(this.shapes, run);
+    this.film.stopTime = run.error ? Math.max(run.time, run.step) : description.stopTime;
+    this.state("done");
+    if (this.runs === 1 && !reducedMotion.matches) {
+      this.film.play(true);
+    }
+  }
+
+  state(text) {
+    document.documentElement.dataset.state = text;
+  }
+
+  say(text, name = null) {
+    const message = byId("message");
+    message.textContent = text;
+    message.hidden = text === "";
+    this.controls.mark(name);
+  }
+
+  // -- what is shown --
+
+  // Draw the present time of the film.
+  show(whole = false) {
+    const { run, film } = this;
+    if (!run) {
+      return;
+    }
+    film.available = run.time;
+    const now = Math.min(film.now, run.time);
+    if (!this.stage.bounds) {
+      this.stage.fit(this.shapes, run);
+    }
+    if (!this.modes.active) {
+      this.stage.draw(this.shapes, this.shapes.at(run.coordinates(now)), this.flashes(now));
+    }
+    film.show();
+    byId("clock").textContent = timeText(now, this.description.stopTime);
+    const time = performance.now();
+    if (whole || !film.playing || time - (this.plotted ?? 0) > PLOT_PERIOD) {
+      this.plotted = time;
+      this.showNumbers(now);
+    }
+  }
+
+  showNumbers(now) {
+    const { run, description } = this;
+    this.plots.forEach((plot) =>
+      plot.draw(run, now, plot.plot.walls ? this.wallLines() : [], description.stopTime),
+    );
+    const key = `${this.runs} ${run.count} ${this.started}`;
+    if (key !== this.listed) {
+      this.listed = key;
+      showHeadline(byId("headline"), headline(description, run, this.column));
+      showImpacts(byId("impacts"), description, run, (time) => this.film.seek(time));
+    }
+  }
+
+  // The positions of the walls on the ground, as displacements along the plotted axis [m].
+  wallLines() {
+    const { stops, release } = this.description;
+    const axis = Math.abs(unitVector(release.direction)[1]) > 0.5 ? 1 : 0;
+    return stops.flatMap((stop, k) => {
+      const along = unitVector(stop.direction)[axis];
+      return stop.on === GROUND && Math.abs(along) > 0.99 ? [this.wall(k) * along] : [];
+    });
+  }
+
+  // The impacts that have just happened at a time of the film.
+  flashes(now) {
+    const { run, film } = this;
+    const marks = [];
+    const strongest = Math.max(...run.impacts.map((impact) => impact.approach), 1e-30);
+    const length = FLASH_TIME / film.slow;
+    for (let k = run.impactAfter(now) - 1; k >= 0 && run.impacts[k].time > now - length; k--) {
+      const { stop, time, approach } = run.impacts[k];
+      marks.push({
+        stop,
+        age: (now - time) / length,
+        strength: Math.max(0.25, approach / strongest),
+      });
+    }
+    return reducedMotion.matches ? [] : marks;
+  }
+
+  view(modes) {
+    byId("tab-motion").setAttribute("aria-selected", String(!modes));
+    byId("tab-modes").setAttribute("aria-selected", String(modes));
+    byId("tab-motion").tabIndex = modes ? -1 : 0;
+    byId("tab-modes").tabIndex = modes ? 0 : -1;
+    byId("live").classList.toggle("modal", modes);
+    byId("transport").hidden = modes;
+    byId("clock").hidden = modes;
+    if (modes && !this.modes.active) {
+      this.film.play(false);
+      this.modes.open(this.shapes);
+    } else if (!modes) {
+      this.modes.close();
+      this.show();
+    }
+  }
+
+  // -- results --
+
+  async copy() {
+    const link = linkWith(this.changes);
+    try {
+      await navigator.clipboard.writeText(link);
+      byId("done").textContent = "Link copied.";
+    } catch {
+      byId("done").textContent = link;
+    }
+  }
+
+  // Simulate again with all outputs, and save them as CSV.
+  download() {
+    const { outputs, stopTime, step, name } = this.description;
+    const numbers = [...this.changes].map(([key, value]) => [this.known.get(key).slot, value]);
+    const slots = outputs.map((output) => output.slot);
+    const simulation = new Simulation(this.kernel, this.mechanism, slots, new Map(numbers));
+    const run = new Run(simulation, Math.round(stopTime / step), step);
+    byId("done").textContent = "Computing all outputs\u2026";
+    compute(run, () => {
+      if (run.finished) {
+        save(`${name}.csv`, table(run, outputs));
+        simulation.close();
+        byId("done").textContent = "Saved.";
+      }
+    });
+  }
+}
+
+// Return the rows of a run as CSV, in SI units with all digits.
+function table(run, outputs) {
+  const lines = [["time", ...outputs.map((output) => output.name)].join(",")];
+  for (let row = 0; row < run.count; row++) {
+    const numbers = run.rows.subarray(row * run.width, (row + 1) * run.width);
+    lines.push([row * run.step, ...numbers].join(","));
+  }
+  return `${lines.join("\n")}\n`;
+}
+
+function save(name, text) {
+  const address = URL.createObjectURL(new Blob([text], { type: "text/csv" }));
+  element("a", { href: address, download: name }).click();
+  setTimeout(() => URL.revokeObjectURL(address), 1000);
+}
+
+// Return the bytes that an element holds, compressed by gzip, as base64.
+async function unpacked(id) {
+  const packed = Uint8Array.from(atob(byId(id).textContent), (letter) => letter.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+async function open() {
+  document.documentElement.dataset.state = "loading";
+  const description = JSON.parse(byId("live-content").textContent);
+  const [tables, bytes] = await Promise.all([unpacked("live-tables"), unpacked("live-module")]);
+  const kernel = await Kernel.compile(bytes);
+  byId("live").hidden = false;
+  const page = new Page(description, kernel, tables);
+  page.follow();
+}
+
+open().catch((error) => {
+  document.documentElement.dataset.state = "error";
+  byId("live").hidden = true;
+  console.error(error);
+});

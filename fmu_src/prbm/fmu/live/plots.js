@@ -1,0 +1,267 @@
+// Plots of a run over time on a canvas, which fill as the film runs.
+
+const PLOT_HEIGHT = 170;
+const INSET = { left: 58, right: 12, top: 10, bottom: 24 };
+const ZERO_RTOL = 1e-6; // Smaller values, as a share of the largest one, are shown as zero.
+const ROUND_OFF = { m: 1e-13, "m/s": 1e-12 }; // Motions below these limits are shown as zero.
+const POINTS_MAX = 2000; // Corners of a drawn curve.
+
+// Return the plots of a mechanism: title, unit, and series with the columns of a run.
+function plotList(description, column) {
+  const outputs = new Map(description.outputs.map((output) => [output.name, output]));
+  const { release } = description;
+  const vertical = Math.abs(unitVector(release.direction)[1]) > 0.5;
+  const axis = vertical ? "y" : "x";
+  const series = (name, label, extra = {}) => ({ label, column: column.get(name), ...extra });
+  const moving = description.bodies.slice(0, 4).map((body) => body.name);
+  const bodies = (suffix) =>
+    moving.map((body) => series(`${body}.${suffix}`, `${words(body)} ${suffix}`));
+  const energies = ["kinetic", "elastic", "gravitational", "dissipated", "work"];
+  const displacements = [
+    { title: "Displacement", unit: "m", series: bodies(axis), walls: axis },
+    { title: "Velocity", unit: "m/s", series: bodies(`v${axis}`) },
+  ];
+  const rotations = [
+    { title: "Rotation", unit: "rad", series: bodies("angle") },
+    { title: "Angular velocity", unit: "rad/s", series: bodies("omega") },
+  ];
+  const plots = [
+    ...(release.start === "angle" ? rotations : displacements),
+    { title: "Energy", unit: "J", series: energies.map((name) => series(`energy.${name}`, name)) },
+  ];
+  const forces = description.stops
+    .slice(0, 4)
+    .map((stop) => series(`${stop.name}.force`, words(stop.name)));
+  if (forces.length > 0) {
+    plots.push({ title: "Contact force at rest", unit: "N", series: forces, quiet: true });
+  }
+  const stresses = [...outputs.values()].filter(
+    (output) => output.unit === "Pa" && /\.stress$/.test(output.name),
+  );
+  if (stresses.length > 0) {
+    const shown = stresses.slice(0, 5).map((output) => series(output.name, words(output.name)));
+    plots.push({ title: "Stress", unit: "Pa", series: shown });
+  }
+  return plots;
+}
+
+// The names of the outputs that the plots show.
+function plottedOutputs(description) {
+  const known = new Set(description.outputs.map((output) => output.name));
+  const names = new Map();
+  const column = { get: (name) => names.set(name, true) && 0 };
+  plotList(description, column);
+  return [...names.keys()].filter((name) => known.has(name));
+}
+
+// Return the least and the largest value of a column, zero included.
+function range(run, column) {
+  let [low, high] = [0, 0];
+  for (let row = 0; row < run.count; row++) {
+    const x = run.at(row, column);
+    low = x < low ? x : low;
+    high = x > high ? x : high;
+  }
+  return [low, high];
+}
+
+class Plot {
+  // Parameters: the plot (see plotList), the parent element, and the function seek(time).
+  constructor(plot, parent, seek) {
+    this.plot = plot;
+    this.canvas = element("canvas", { height: PLOT_HEIGHT, role: "img", tabindex: -1 });
+    this.reading = element("span", { class: "reading" });
+    const keys = plot.series.map((series, k) =>
+      element("span", { class: "key" }, element("i", { class: `swatch s${k}` }), series.label),
+    );
+    const head = element(
+      "div",
+      { class: "plot-head" },
+      element("h3", {}, plot.title),
+      element("span", { class: "keys" }, ...keys),
+      this.reading,
+    );
+    this.keys = keys;
+    this.card = element("figure", { class: "card plot" }, head, this.canvas);
+    parent.append(this.card);
+    this.seek = seek;
+    this.listen();
+  }
+
+  listen() {
+    const time = (event) => {
+      const box = this.canvas.getBoundingClientRect();
+      const share =
+        (event.clientX - box.left - INSET.left) / (box.width - INSET.left - INSET.right);
+      return Math.min(1, Math.max(0, share)) * this.stopTime;
+    };
+    this.canvas.addEventListener("pointerdown", (event) => {
+      this.canvas.setPointerCapture(event.pointerId);
+      this.seek(time(event));
+    });
+    this.canvas.addEventListener("pointermove", (event) => {
+      if (event.buttons) {
+        this.seek(time(event));
+      }
+    });
+  }
+
+  // Draw the run up to the time of the film in full colours, and the rest of it in pale ones.
+  draw(run, now, walls, stopTime) {
+    this.stopTime = stopTime;
+    const width = this.canvas.clientWidth;
+    const ratio = window.devicePixelRatio || 1;
+    if (this.canvas.width !== Math.round(width * ratio)) {
+      this.canvas.width = Math.round(width * ratio);
+    }
+    this.canvas.height = Math.round(PLOT_HEIGHT * ratio);
+    const pen = this.canvas.getContext("2d");
+    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    pen.clearRect(0, 0, width, PLOT_HEIGHT);
+    const style = getComputedStyle(document.getElementById("live"));
+    this.colour = (name) => style.getPropertyValue(`--${name}`).trim();
+    this.setScales(run, walls, width);
+    this.drawAxes(pen, width);
+    this.drawImpacts(pen, run, now);
+    this.drawWalls(pen, walls, width);
+    this.drawSeries(pen, run, now);
+    this.drawCursor(pen, run, now);
+  }
+
+  setScales(run, walls, width) {
+    const ranges = this.plot.series.map(({ column }) => range(run, column));
+    let low = Math.min(...ranges.map((sides) => sides[0]));
+    let high = Math.max(...ranges.map((sides) => sides[1]));
+    let largest = Math.max(high, -low);
+    if (largest < (ROUND_OFF[this.plot.unit] ?? 0)) {
+      [low, high, largest] = [0, 0, 0];
+    }
+    ranges.forEach(([a, b], k) => {
+      this.keys[k].classList.toggle(
+        "flat",
+        ranges.length > 1 && Math.max(b, -a) <= ZERO_RTOL * largest,
+      );
+    });
+    this.tiny = high === low ? Infinity : ZERO_RTOL * largest;
+    if (this.plot.walls) {
+      low = Math.min(low, ...walls);
+      high = Math.max(high, ...walls);
+    }
+    if (high === low) {
+      high = low + 1;
+    }
+    const unit = prefixed(Math.max(high, -low), this.plot.unit);
+    this.kind = unit;
+    const room = 0.08 * (high - low);
+    this.low = low < 0 ? low - room : low;
+    this.high = high > 0 ? high + room : high;
+    const inner = width - INSET.left - INSET.right;
+    const tall = PLOT_HEIGHT - INSET.top - INSET.bottom;
+    this.x = (time) => INSET.left + (inner * time) / this.stopTime;
+    this.y = (value) => INSET.top + (tall * (this.high - value)) / (this.high - this.low);
+  }
+
+  drawAxes(pen, width) {
+    pen.font = "12px system-ui, sans-serif";
+    pen.fillStyle = this.colour("muted");
+    pen.lineWidth = 1;
+    pen.textAlign = "right";
+    pen.textBaseline = "middle";
+    const { factor, shown } = this.kind;
+    for (const tick of ticks(this.low * factor, this.high * factor, 5)) {
+      const y = Math.round(this.y(tick / factor)) + 0.5;
+      pen.strokeStyle = this.colour(tick === 0 ? "axis" : "grid");
+      pen.beginPath();
+      pen.moveTo(INSET.left, y);
+      pen.lineTo(width - INSET.right, y);
+      pen.stroke();
+      pen.fillText(digits(tick).replace("-", "\u2212"), INSET.left - 6, y);
+    }
+    pen.save();
+    pen.translate(12, INSET.top + (PLOT_HEIGHT - INSET.top - INSET.bottom) / 2);
+    pen.rotate(-Math.PI / 2);
+    pen.textAlign = "center";
+    pen.fillText(unitText(shown), 0, 0);
+    pen.restore();
+    pen.textBaseline = "top";
+    const time = prefixed(this.stopTime, "s");
+    const marks = ticks(0, this.stopTime * time.factor, Math.max(3, Math.min(8, width / 90)));
+    for (const [k, tick] of marks.entries()) {
+      const x = this.x(tick / time.factor);
+      const last = k === marks.length - 1;
+      pen.textAlign = last ? "right" : "center";
+      const label = last ? `${digits(tick)} ${time.shown}` : digits(tick);
+      pen.fillText(label, last ? Math.min(width - 2, x + 10) : x, PLOT_HEIGHT - INSET.bottom + 6);
+    }
+  }
+
+  drawImpacts(pen, run, now) {
+    for (const impact of run.impacts) {
+      const x = this.x(impact.time);
+      pen.strokeStyle = this.colour("impact");
+      pen.globalAlpha = impact.time <= now ? 0.55 : 0.15;
+      pen.beginPath();
+      pen.moveTo(x, INSET.top);
+      pen.lineTo(x, PLOT_HEIGHT - INSET.bottom);
+      pen.stroke();
+    }
+    pen.globalAlpha = 1;
+  }
+
+  drawWalls(pen, walls, width) {
+    if (!this.plot.walls) {
+      return;
+    }
+    pen.strokeStyle = this.colour("wall");
+    pen.setLineDash([5, 4]);
+    for (const wall of walls) {
+      pen.beginPath();
+      pen.moveTo(INSET.left, this.y(wall));
+      pen.lineTo(width - INSET.right, this.y(wall));
+      pen.stroke();
+    }
+    pen.setLineDash([]);
+  }
+
+  drawSeries(pen, run, now) {
+    const every = Math.max(1, Math.floor(run.count / POINTS_MAX));
+    const end = Math.min(run.count - 1, Math.floor(now / run.step));
+    pen.lineWidth = 1.8;
+    pen.lineJoin = "round";
+    this.plot.series.forEach(({ column }, k) => {
+      pen.strokeStyle = this.colour(`s${k}`);
+      const stroke = (from, to, alpha) => {
+        pen.globalAlpha = alpha;
+        pen.beginPath();
+        for (let row = from; row <= to; row += every) {
+          pen.lineTo(this.x(row * run.step), this.y(run.at(row, column)));
+        }
+        pen.stroke();
+      };
+      stroke(end, run.count - 1, 0.22);
+      stroke(0, end, 1);
+    });
+    pen.globalAlpha = 1;
+  }
+
+  drawCursor(pen, run, now) {
+    const row = Math.min(run.count - 1, Math.round(now / run.step));
+    const x = this.x(Math.min(now, run.time));
+    pen.strokeStyle = this.colour("text");
+    pen.lineWidth = 1;
+    pen.beginPath();
+    pen.moveTo(x, INSET.top);
+    pen.lineTo(x, PLOT_HEIGHT - INSET.bottom);
+    pen.stroke();
+    const texts = this.plot.series.map(({ column }, k) => {
+      pen.fillStyle = this.colour(`s${k}`);
+      pen.beginPath();
+      pen.arc(x, this.y(run.at(row, column)), 3.5, 0, 2 * Math.PI);
+      pen.fill();
+      const value = run.at(row, column);
+      return quantityText(Math.abs(value) > this.tiny ? value : 0, this.kind, 3);
+    });
+    this.reading.textContent = texts.length === 1 ? texts[0] : "";
+    this.canvas.setAttribute("aria-label", `${this.plot.title} over time`);
+  }
+}

@@ -1,0 +1,85 @@
+// The summary of a run and the table of its impacts.
+
+const COLUMNS = [
+  ["#", null, (impact, k) => k + 1],
+  ["Stop", null, (impact) => impact.name],
+  ["Time", "s", (impact) => impact.time],
+  ["Approach", "m/s", (impact) => impact.approach],
+  ["Rebound", "m/s", (impact) => impact.rebound],
+  ["Impulse", "N.s", (impact) => impact.impulse],
+  ["Energy lost", "J", (impact) => impact.lost],
+  ["Modal restitution", "1", (impact) => impact.modal],
+];
+const ROWS_MAX = 200; // Rows of the table; the CSV file has all outputs.
+
+// Return what the headline says about a run, as pairs of a term and a text.
+function headline(description, run, column) {
+  const { stops } = description;
+  if (stops.length === 0) {
+    return [["Simulated", timeText(run.time, run.time)]];
+  }
+  const { impacts, impactCount } = run;
+  const [first, last] = [impacts[0], impacts.at(-1)];
+  const speed = { factor: 1, shown: "m/s" };
+  const resting = stops.filter((stop) => run.last(column.get(`${stop.name}.contact`)) > 0.5);
+  const lost = impacts.reduce((sum, impact) => sum + impact.lost, 0);
+  const state = resting.length
+    ? `at rest on ${resting.map((stop) => words(stop.name)).join(", ")}`
+    : "moving";
+  return [
+    ["Impacts", `${impactCount}`],
+    [
+      "First impact",
+      first
+        ? `${timeText(first.time, first.time)} at ${quantityText(first.approach, speed, 4)}`
+        : "none",
+    ],
+    ["Last impact", last ? timeText(last.time, last.time) : "none"],
+    ["Lost in impacts", quantityText(lost, prefixed(lost, "J"), 3)],
+    ["At the end", state],
+  ];
+}
+
+function showHeadline(parent, pairs) {
+  parent.replaceChildren(
+    ...pairs.map(([term, text]) =>
+      element("div", {}, element("dt", {}, term), element("dd", {}, text)),
+    ),
+  );
+}
+
+// Fill the table of impacts.  seek(time) is called for the time of a row.
+function showImpacts(table, description, run, seek) {
+  const several = description.stops.length > 1;
+  const columns = COLUMNS.filter(([title]) => several || title !== "Stop");
+  const rows = run.impacts.slice(0, ROWS_MAX).map((impact) => ({
+    ...impact,
+    name: words(description.stops[impact.stop].name),
+  }));
+  const units = columns.map(([, unit, value]) => {
+    const largest = Math.max(0, ...rows.map((row, k) => (unit ? Math.abs(value(row, k)) : 0)));
+    return unit && unit !== "1" ? prefixed(largest, unit) : { factor: 1, shown: "" };
+  });
+  const titles = columns.map(([title], k) => {
+    const unit = unitText(units[k].shown);
+    return element("th", { scope: "col" }, unit ? `${title} [${unit}]` : title);
+  });
+  const body = rows.map((row, i) => {
+    const cells = columns.map(([, unit, value], k) => {
+      const x = value(row, i);
+      return element(
+        "td",
+        {},
+        unit ? digits(x * units[k].factor, 5).replace("-", "\u2212") : String(x),
+      );
+    });
+    const line = element("tr", { "data-time": row.time }, ...cells);
+    line.addEventListener("click", () => seek(row.time));
+    return line;
+  });
+  const none = element("tr", {}, element("td", { colspan: columns.length }, "No impact."));
+  table.replaceChildren(
+    element("thead", {}, element("tr", {}, ...titles)),
+    element("tbody", {}, ...(body.length ? body : [none])),
+  );
+}

@@ -1,0 +1,159 @@
+/* The section and the drawn line of a beam along its length: the twin of mechanics/profile.py. */
+#include <math.h>
+
+#include "core/profile.h"
+
+static double hyperbolic_sine(double x) {
+    double e = exponential(x);
+    return 0.5 * (e - 1.0 / e);
+}
+
+static double hyperbolic_cosine(double x) {
+    double e = exponential(x);
+    return 0.5 * (e + 1.0 / e);
+}
+
+static double inverse_sine(double x) {
+    return phase(complex_of(sqrt(1.0 - x * x), x));
+}
+
+static double inverse_cosine(double x) {
+    return phase(complex_of(x, sqrt(1.0 - x * x)));
+}
+
+static double inverse_hyperbolic_sine(double x) {
+    double root = sqrt(1.0 + x * x);
+    return x < 0.0 ? -natural_log(root - x) : natural_log(root + x);
+}
+
+/* Set tau at the start and the end of a round panel; return the factor c w. */
+static double round_range(const Panel *panel, double *first, double *last) {
+    double pole = 2.0 * inverse_hyperbolic_sine(sqrt(panel->thickness[0] / (4.0 * panel->axes[1])));
+    double scale = NOTCH_PEAK_FACTOR * pole;
+    *first = inverse_hyperbolic_sine(panel->angles[0] / scale);
+    *last = inverse_hyperbolic_sine(panel->angles[1] / scale);
+    return scale;
+}
+
+PRBM bool waist_at(const Panel *panel, double *x) {
+    double first, last;
+    if (!panel->round) {
+        return false;
+    }
+    round_range(panel, &first, &last);
+    *x = -(first + last) / (last - first);
+    return *x != 0.0 || panel->nodes % 2 == 0;
+}
+
+static Section round_section(const Panel *panel, double x) {
+    double a = panel->axes[0], b = panel->axes[1], h = panel->thickness[0], first, last;
+    double scale = round_range(panel, &first, &last);
+    double tau = first + 0.5 * (last - first) * (1.0 + x);
+    double beta = scale * hyperbolic_sine(tau), half = 0.5 * beta;
+    Complex whole, halved;
+    unit_vectors(1, &beta, &whole);
+    unit_vectors(1, &half, &halved);
+    Section result = {panel->start + a * whole.im,
+                      a * whole.re * scale * hyperbolic_cosine(tau) * 0.5 * (last - first),
+                      h + 4.0 * b * halved.im * halved.im, panel->width[0]};
+    return result;
+}
+
+PRBM Section section_at(const Panel *panel, double x) {
+    if (panel->round) {
+        return round_section(panel, x);
+    }
+    double part = 0.5 * (1.0 + x);
+    const double *h = panel->thickness, *b = panel->width;
+    Section result = {panel->start + panel->length * part, 0.5 * panel->length,
+                      h[0] + (h[1] - h[0]) * part, b[0] + (b[1] - b[0]) * part};
+    return result;
+}
+
+PRBM Panel straight_panel(int nodes, double start, double length, double thickness, double width) {
+    Panel panel = {false, nodes, start, length, {thickness, thickness}, {width, width},
+                   {0.0, 0.0}, {0.0, 0.0}};
+    return panel;
+}
+
+static Panel round_panel(int nodes, double waist, const Notch *notch, double first, double last) {
+    Panel panel = straight_panel(nodes, waist, 0.0, notch->thickness, notch->width);
+    panel.round = true;
+    panel.axes[0] = notch->along;
+    panel.axes[1] = notch->across;
+    panel.angles[0] = first;
+    panel.angles[1] = last;
+    return panel;
+}
+
+PRBM double notch_angle(const Notch *notch) {
+    double depth = 0.5 * (notch->end_thickness - notch->thickness);
+    return inverse_cosine(greater(1.0 - depth / notch->across, 0.0));
+}
+
+PRBM double notch_length(const Notch *notch) {
+    double angle = notch_angle(notch);
+    Complex edge;
+    unit_vectors(1, &angle, &edge);
+    return 2.0 * notch->along * edge.im + (notch->waisted ? notch->waist_length : 0.0);
+}
+
+PRBM int panel_count(bool notched, bool waisted) {
+    return notched ? waisted ? PANELS_MAX : 3 : 1;
+}
+
+PRBM int node_count(bool notched, bool waisted, int nodes) {
+    return nodes + (notched ? 2 * THICK_NODES + (waisted ? 2 * FILLET_NODES : 0) : 0);
+}
+
+PRBM bool notch_panels(const char *name, const Notch *notch, double L, int nodes, Panel *panels,
+                       Problem *problem) {
+    double h = notch->thickness, H = notch->end_thickness, width = notch->width;
+    if (!(h < H)) {
+        return fail(problem,
+                    "flexure %s: the thickness outside its notch, %g m, must be above the "
+                    "thickness of its waist, %g m: increase end_thickness",
+                    name, H, h);
+    }
+    double length = notch_length(notch), angle = notch_angle(notch);
+    if (!(length <= L)) {
+        return fail(problem,
+                    "flexure %s: its notch of the length %g m is longer than the flexure, %g m: "
+                    "reduce notch_radius or waist_length, or move the ends apart",
+                    name, length, L);
+    }
+    double rest = 0.5 * (L - length), waist = notch->waist_length;
+    Panel *next = panels;
+    *next++ = straight_panel(THICK_NODES, 0.0, rest, H, width);
+    if (notch->waisted) {
+        double start = 0.5 * (L - waist), end = 0.5 * (L + waist);
+        *next++ = round_panel(FILLET_NODES, start, notch, -angle, 0.0);
+        *next++ = straight_panel(nodes, start, waist, h, width);
+        *next++ = round_panel(FILLET_NODES, end, notch, 0.0, angle);
+    } else {
+        *next++ = round_panel(nodes, 0.5 * L, notch, -angle, angle);
+    }
+    *next = straight_panel(THICK_NODES, L - rest, rest, H, width);
+    return true;
+}
+
+PRBM double line_length(Line line) {
+    double half = 0.5 * line.curvature * line.chord;
+    if (half != 0.0) {
+        return line.chord * inverse_sine(half) / half;
+    }
+    return sqrt(line.chord * line.chord - line.rise * line.rise);
+}
+
+PRBM Complex tangent(Line line, double v) {
+    double L = line_length(line);
+    Complex e;
+    if (line.curvature != 0.0) {
+        double angle = line.curvature * (v - 0.5 * L);
+        unit_vectors(1, &angle, &e);
+        return e;
+    }
+    double angle = HALF_TURN / L * v;
+    unit_vectors(1, &angle, &e);
+    return complex_of(1.0, 0.5 * HALF_TURN * line.rise / L * e.im);
+}

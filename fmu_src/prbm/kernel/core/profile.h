@@ -1,0 +1,58 @@
+/* The section and the drawn line of a beam along its length, in panels. */
+#ifndef PRBM_PROFILE_H
+#define PRBM_PROFILE_H
+
+#include "core/memory.h"
+
+#define HALF_TURN 3.141592653589793 /* rad */
+
+enum { PANELS_MAX = 5 };
+
+/* A section: position and its change with x, thickness and width [m]. */
+typedef struct {
+    double v, dv, thickness, width;
+} Section;
+
+/* A straight panel, or a round one: an arc of an ellipse.  Of a round panel, start is the position
+ * of the waist, and the first thickness and width are those of the waist. */
+typedef struct {
+    bool round;
+    int nodes;
+    double start, length;         /* [m] */
+    double thickness[2], width[2]; /* at the start and the end [m] */
+    double axes[2];               /* half axes along and across the flexure [m] */
+    double angles[2];             /* angles from the waist at the start and the end [rad] */
+} Panel;
+
+/* The dimensions of a notch [m]. */
+typedef struct {
+    double thickness, width, along, across, end_thickness, waist_length;
+    bool waisted; /* It has a waist between fillets. */
+} Notch;
+
+/* The line of a beam as drawn: distance of its ends [m], curvature [1/m] and rise [m]. */
+typedef struct {
+    double chord, curvature, rise;
+} Line;
+
+/* Return the section of a panel at x, from -1 to 1. */
+PRBM Section section_at(const Panel *panel, double x);
+/* Set the point x of the waist of a round panel; false if there is none, or if it is a node. */
+PRBM bool waist_at(const Panel *panel, double *x);
+PRBM Panel straight_panel(int nodes, double start, double length, double thickness, double width);
+/* Return the largest angle from the waist, at the edges of a notch [rad]. */
+PRBM double notch_angle(const Notch *notch);
+/* Return the length of a notch along the flexure [m]. */
+PRBM double notch_length(const Notch *notch);
+/* Set the panels of a notch in the middle of a flexure of the length L [m]. */
+PRBM bool notch_panels(const char *name, const Notch *notch, double L, int nodes, Panel *panels,
+                       Problem *problem);
+PRBM int panel_count(bool notched, bool waisted);
+/* Return the number of nodes in all panels, with the given number in the leaf, notch or waist. */
+PRBM int node_count(bool notched, bool waisted, int nodes);
+/* Return the range of the positions along a line [m]. */
+PRBM double line_length(Line line);
+/* Return dz/dv at a position, turned by the same angle everywhere [-]. */
+PRBM Complex tangent(Line line, double v);
+
+#endif

@@ -1,0 +1,382 @@
+/* Forces, moments and stress in the sections of flexures: the twin of mechanics/sections.py and
+ * mechanics/stress.py. */
+#include <math.h>
+#include <string.h>
+
+#include "core/collection.h"
+#include "core/free_body.h"
+#include "core/matrix.h"
+#include "core/sections.h"
+#include "core/vectors.h"
+
+/* --- loads ------------------------------------------------------------------------------------ */
+
+/* Compute gravity, inertia and mass-proportional damping of all mass points. */
+static void point_loads_at(const Equations *q, const Complex *e, const double *v, const double *a,
+                           Complex *loads, Scratch *scratch) {
+    const System *system = q->system;
+    size_t mark = scratch->used;
+    int d = system->d;
+    Complex field = minus(system->gravity, q->inputs.base);
+    Complex *bend = take_complex(scratch, d, 1), *w = take_complex(scratch, d, 1);
+    arm_accelerations(system, e, v, a, bend, scratch);
+    if (q->mass_damping != 0.0) {
+        turning(system, v, w);
+        for (int j = 0; j < d; j++) {
+            Complex rate = product(e[j], w[j]);
+            bend[j] = plus(bend[j], scaled(q->mass_damping, complex_of(-rate.im, rate.re)));
+        }
+    }
+    for (int i = 0; i < system->p; i++) {
+        Complex change = minus(field, along_arms(d, system->A + i * d, bend));
+        loads[i] = scaled(system->m[i], change);
+    }
+    scratch->used = mark;
+}
+
+static void pull_body(Complex *on, int body, Complex force) {
+    on[body] = plus(on[body], force);
+}
+
+/* Let a closed stop push and rub its bodies. */
+static void pull_stop(const Equations *q, const Complex *e, int i, double force, double along,
+                      Complex *on) {
+    const System *system = q->system;
+    const Stop *stop = &system->mechanism->stops[i];
+    Complex u = unit(stop->direction);
+    u = system->on[i] == FIXED ? u : product(u, e[system->on[i]]);
+    Complex pull = product(u, complex_of(-force, along));
+    pull_body(on, stop->body, pull);
+    pull_body(on, stop->on, scaled(-1.0, pull));
+}
+
+PRBM void add_contact_pulls(const Equations *q, const Complex *e, const Evaluation *found,
+                            Complex *on) {
+    const System *system = q->system;
+    const Mechanism *m = system->mechanism;
+    const double *lam = found->lam;
+    for (int k = 0; k < q->held_count; k++) {
+        int i = q->held[k];
+        ContactMode mode = q->contacts.modes[i];
+        double force = stop_force(q, lam, i);
+        double along = mode == CONTACT_STICK ? stick_force(q, lam, i)
+                                             : -q->stop_friction[i] * slip_sign(mode) * force;
+        pull_stop(q, e, i, force, along, on);
+    }
+    for (int k = 0; k < q->pressed_count; k++) {
+        int i = q->pressed[k];
+        pull_stop(q, e, i, found->pressure[i], 0.0, on);
+    }
+    for (int i = 0; i < system->f; i++) {
+        const Friction *friction = &m->frictions[i];
+        bool sticks = q->contacts.modes[system->s + i] == CONTACT_STICK;
+        double size = sticks ? stick_force(q, lam, system->s + i) : rub_force(q, i, e);
+        Complex pull = scaled(size, unit(friction->direction));
+        pull_body(on, friction->body, pull);
+        pull_body(on, GROUND, scaled(-1.0, pull));
+    }
+}
+
+/* Return the sum of the loads of mass points i to end - 1. */
+static Complex sum_loads(const Complex *loads, int i, int end) {
+    Complex sum = {0.0, 0.0};
+    for (; i < end; i++) {
+        sum = plus(sum, loads[i]);
+    }
+    return sum;
+}
+
+/* Let a step, at whose far end a force acts, load its bodies. */
+static void load_bodies(const System *system, const Step *step, Complex far, SectionState *at) {
+    Complex own = {0.0, 0.0};
+    if (step->flexure) {
+        int i = (int)(step->flexure - system->mechanism->flexures);
+        const FreeBody *body = &system->free_bodies[i];
+        own = sum_loads(at->loads, body->first, body->first + body->count);
+        at->far[i] = far;
+    }
+    pull_body(at->on, step->backwards ? step->between->end : step->between->start, plus(far, own));
+}
+
+PRBM void transmit(const System *system, const double *lam, SectionState *at) {
+    const Mechanism *m = system->mechanism;
+    int parts = m->flexure_count + m->joint_count, row = 0;
+    for (int k = 0; k < parts; k++) {
+        const Step *step = &m->steps[k];
+        if (step->closes) {
+            Complex far = complex_of(lam[row], lam[row + 1]);
+            if (step->flexure) {
+                const FreeBody *body = &system->free_bodies[step->flexure - m->flexures];
+                int end = body->first + body->count;
+                far = minus(far, sum_loads(at->loads, end - body->stub, end));
+            }
+            int reached = step->backwards ? step->between->start : step->between->end;
+            pull_body(at->on, reached, scaled(-1.0, far));
+            load_bodies(system, step, far, at);
+            row += 2;
+        }
+    }
+    for (int k = parts - 1; k >= 0; k--) {
+        const Step *step = &m->steps[k];
+        if (!step->closes) {
+            int reached = step->backwards ? step->between->start : step->between->end;
+            load_bodies(system, step, at->on[reached], at);
+        }
+    }
+}
+
+PRBM SectionState section_state(const Equations *q, const Complex *e, const double *angle,
+                                const double *v, const Evaluation *found, Scratch *scratch) {
+    const System *system = q->system;
+    const Mechanism *m = system->mechanism;
+    double *strained = take(scratch, (size_t)system->n);
+    SectionState at = {e, angle, strained, take_complex(scratch, system->p, 1),
+                       take_complex(scratch, system->b + 1, 1),
+                       take_complex(scratch, m->flexure_count, 1)};
+    for (int j = 0; j < system->n; j++) {
+        strained[j] = angle[j] - system->q0[j] + q->beta * v[j];
+    }
+    point_loads_at(q, e, v, found->a, at.loads, scratch);
+    at.on[GROUND] = complex_of(0.0, 0.0);
+    for (int body = 1; body <= system->b; body++) {
+        at.on[body] = at.loads[system->body_masses[body - 1]];
+    }
+    for (int i = 0; i < m->force_count; i++) {
+        const double *given = q->inputs.forces + LOADS * i;
+        pull_body(at.on, m->forces[i].body, complex_of(given[0], given[1]));
+    }
+    add_contact_pulls(q, e, found, at.on);
+    transmit(system, found->lam, &at);
+    return at;
+}
+
+/* --- sections --------------------------------------------------------------------------------- */
+
+/* Work of the loads in the virtual rotation of an end: side 0 is the near end. */
+static double end_work(const FreeBody *body, int side, const Complex *e, const Complex *loads,
+                       Complex far) {
+    int k = body->arm_count;
+    double sum = 0.0;
+    for (int j = 0; j < k; j++) {
+        double turn = body->turning[side * k + j];
+        if (turn != 0.0 && body->arms[j] != FIXED) {
+            Complex pulled = product(conjugate(far), body->levers[body->count * k + j]);
+            for (int i = 0; i < body->count; i++) {
+                Complex load = conjugate(loads[body->first + i]);
+                pulled = plus(pulled, product(load, body->levers[i * k + j]));
+            }
+            sum -= turn * product(pulled, e[body->arms[j]]).im;
+        }
+    }
+    return sum;
+}
+
+/* Work at a stub that is fixed to the ground; it does not change. */
+static double ground_work(const FreeBody *body, int side, const Complex *loads, Complex far) {
+    int k = body->arm_count;
+    double sum = 0.0;
+    for (int j = 0; j < k; j++) {
+        if (body->arms[j] == FIXED && body->turning[side * k + j] != 0.0) {
+            sum -= product(conjugate(far), body->levers[body->count * k + j]).im;
+            for (int i = 0; i < body->count; i++) {
+                Complex load = conjugate(loads[body->first + i]);
+                sum -= product(load, body->levers[i * k + j]).im;
+            }
+        }
+    }
+    return sum;
+}
+
+static double strain_at(const double *strained, int j) {
+    return j == FIXED ? 0.0 : strained[j];
+}
+
+/* Torque of the springs in the direction from near to far: at pivot i of links, or the part of the
+ * polynomial of a beam that its ends contribute. */
+static double torque_at(const FreeBody *body, bool beam, int i, const double *strained) {
+    int a = beam ? body->angles[0] : body->angles[i];
+    int b = beam ? body->angles[1] : body->angles[i + 1];
+    double torque = body->rates[beam ? 0 : i] * (strain_at(strained, b) - strain_at(strained, a));
+    return beam && !body->forwards ? -torque : torque;
+}
+
+/* Bending moment between the ends at section k, positive from start to end. */
+static double bending_between(const FreeBody *body, bool beam, int order, int k,
+                              const double *strained) {
+    double sign = body->forwards ? 1.0 : -1.0;
+    if (!beam) {
+        return sign * torque_at(body, beam, k - 1, strained);
+    }
+    int cut = body->forwards ? k : body->sections - 1 - k;
+    double sum = 0.0;
+    for (int l = 1; l <= order; l++) {
+        double P = body->moments[cut * (order + 1) + l];
+        sum += P * strained[body->angles[2] + l - 1];
+    }
+    return sign * torque_at(body, beam, 0, strained) + body->rates[0] * sum;
+}
+
+/* Bending moment at an end without the work of the loads, and its sign: side 0 is the near end. */
+static double end_bending(const FreeBody *body, bool beam, int side, const double *strained,
+                          double work) {
+    int last = beam ? 0 : body->sections - 3;
+    double torque = torque_at(body, beam, side == 0 ? 0 : last, strained);
+    double moment = (side == 0 ? -torque : torque) - work;
+    bool at_start = (side == 0) == body->forwards;
+    return at_start ? -moment : moment;
+}
+
+/* Force that the part of a flexure beyond section k transmits. */
+static Complex force_through(const FreeBody *body, int k, const Complex *loads, Complex far) {
+    Complex sum = far;
+    for (int i = 0; i < body->count; i++) {
+        double apart = body->ranks[i] - body->section_ranks[k];
+        if (apart >= 0.0) {
+            sum = plus(sum, scaled(apart == 0.0 ? 0.5 : 1.0, loads[body->first + i]));
+        }
+    }
+    return sum;
+}
+
+static Complex tangent_arm(const Complex *e, const double *angle, int j) {
+    Complex arm = {1.0, 0.0};
+    if (j <= TURNED) {
+        unit_vectors(1, angle + (TURNED - j), &arm);
+        return arm;
+    }
+    return j == FIXED ? arm : e[j];
+}
+
+/* Sum of the two arms of the tangent of section k. */
+static Complex tangent_at(const FreeBody *body, int k, const SectionState *at) {
+    int a = body->tangents[2 * k], b = body->tangents[2 * k + 1];
+    Complex first = product(body->drawn[2 * k], tangent_arm(at->e, at->q, a));
+    return plus(first, product(body->drawn[2 * k + 1], tangent_arm(at->e, at->q, b)));
+}
+
+static int flexure_of(const System *system, const FreeBody *body) {
+    return (int)(body - system->free_bodies);
+}
+
+static const FlexureType *kind_of_body(const System *system, const FreeBody *body) {
+    const Mechanism *m = system->mechanism;
+    return &m->types[m->flexures[flexure_of(system, body)].type];
+}
+
+/* Store the stress of both faces at section k from normal force and bending moment. */
+static void store_faces(const FreeBody *body, int k, double tension, double bending, double *left,
+                        double *right) {
+    int i = body->forwards ? k : body->sections - 1 - k;
+    double pulled = tension / body->area[k], bent = bending / body->modulus[k];
+    left[i] = pulled - bent;
+    right[i] = pulled + bent;
+}
+
+PRBM void face_stresses(const System *system, const FreeBody *body, const SectionState *at,
+                        double *left, double *right) {
+    int order = kind_of_body(system, body)->order, last = body->sections - 1;
+    bool beam = order > 0;
+    Complex far = at->far[flexure_of(system, body)];
+    for (int k = 0; k <= last; k++) {
+        double bending;
+        if (k == 0 || k == last) {
+            double work = end_work(body, k != 0, at->e, at->loads, far) +
+                          ground_work(body, k != 0, at->loads, far);
+            bending = end_bending(body, beam, k != 0, at->strained, work);
+        } else {
+            bending = bending_between(body, beam, order, k, at->strained);
+        }
+        Complex tangent = tangent_at(body, k, at);
+        Complex through = force_through(body, k, at->loads, far);
+        double tension = product(conjugate(through), tangent).re / modulus(tangent);
+        store_faces(body, k, tension, bending, left, right);
+    }
+}
+
+PRBM Stress stress_in(const FreeBody *body, const double *left, const double *right) {
+    int m = body->sections, k = 0;
+    double most = 0.0;
+    for (int i = 0; i < m; i++) {
+        most = greater(most, greater(fabs(left[i]), fabs(right[i])));
+    }
+    double enough = (1.0 - STRESS_TIE_RTOL) * most;
+    while (k < m - 1 && greater(fabs(left[k]), fabs(right[k])) < enough) {
+        k++;
+    }
+    bool on_left = fabs(left[k]) >= (1.0 - STRESS_TIE_RTOL) * fabs(right[k]);
+    double position = body->position[body->forwards ? k : m - 1 - k];
+    Stress result = {left[0], left[m - 1], most, on_left ? k + 1 : -(k + 1), position};
+    return result;
+}
+
+PRBM Stress *take_stresses(Scratch *scratch, int count) {
+    return (Stress *)take_matrix(scratch, count, sizeof(Stress) / sizeof(double));
+}
+
+PRBM void stresses(const Equations *q, const Complex *e, const double *angle, const double *v,
+                   const Evaluation *evaluation, Stress *found, Scratch *scratch) {
+    const System *system = q->system;
+    const Mechanism *m = system->mechanism;
+    size_t mark = scratch->used;
+    SectionState at = section_state(q, e, angle, v, evaluation, scratch);
+    for (int i = 0, k = 0; i < m->flexure_count; i++) {
+        if (m->types[m->flexures[i].type].stress) {
+            const FreeBody *body = &system->free_bodies[i];
+            size_t inner = scratch->used, count = (size_t)body->sections;
+            double *left = take(scratch, count), *right = take(scratch, count);
+            face_stresses(system, body, &at, left, right);
+            found[k++] = stress_in(body, left, right);
+            scratch->used = inner;
+        }
+    }
+    scratch->used = mark;
+}
+
+/* --- changes ---------------------------------------------------------------------------------- */
+
+/* Change of the angle of the tangent of section k. */
+static double tangent_change(const FreeBody *body, int k, const SectionState *at,
+                             const SectionState *change) {
+    Complex sum = tangent_at(body, k, at), moved = {0.0, 0.0};
+    for (int side = 0; side < 2; side++) {
+        int j = body->tangents[2 * k + side];
+        Complex arm = {0.0, 0.0};
+        if (j <= TURNED) {
+            double dq = change->q[TURNED - j];
+            Complex turned = tangent_arm(at->e, at->q, j);
+            arm = complex_of(-turned.im * dq, turned.re * dq);
+        } else if (j != FIXED) {
+            arm = change->e[j];
+        }
+        moved = plus(moved, product(body->drawn[2 * k + side], arm));
+    }
+    double size = modulus(sum);
+    return product(conjugate(sum), moved).im / (size * size);
+}
+
+PRBM void face_changes(const System *system, const FreeBody *body, const SectionState *at,
+                       const SectionState *change, double *left, double *right) {
+    int order = kind_of_body(system, body)->order, last = body->sections - 1;
+    bool beam = order > 0;
+    int i = flexure_of(system, body);
+    Complex far = at->far[i], dfar = change->far[i];
+    for (int k = 0; k <= last; k++) {
+        double bending;
+        if (k == 0 || k == last) {
+            double work = end_work(body, k != 0, change->e, at->loads, far) +
+                          end_work(body, k != 0, at->e, change->loads, dfar) +
+                          ground_work(body, k != 0, change->loads, dfar);
+            bending = end_bending(body, beam, k != 0, change->strained, work);
+        } else {
+            bending = bending_between(body, beam, order, k, change->strained);
+        }
+        Complex tangent = tangent_at(body, k, at);
+        tangent = scaled(1.0 / modulus(tangent), tangent);
+        double turn = tangent_change(body, k, at, change);
+        Complex through = force_through(body, k, at->loads, far);
+        Complex dthrough = force_through(body, k, change->loads, dfar);
+        double tension = product(conjugate(dthrough), tangent).re -
+                         turn * product(conjugate(through), tangent).im;
+        store_faces(body, k, tension, bending, left, right);
+    }
+}

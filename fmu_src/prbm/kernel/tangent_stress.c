@@ -1,0 +1,131 @@
+/* Directional derivatives of the stress of flexures. */
+#include <string.h>
+
+#include "core/sections.h"
+#include "core/vectors.h"
+#include "hybrid/simulation.h"
+#include "tangent_stress.h"
+
+/* Compute the changes of the loads of all mass points. */
+static void load_changes(const Tangent *t, Complex *loads) {
+    const System *system = t->q->system;
+    size_t mark = t->sim->scratch.used;
+    int d = system->d;
+    const double *base = t->du + system->mechanism->input.base;
+    Complex *bend = take_complex(&t->sim->scratch, d, 1);
+    for (int j = 0; j < d; j++) {
+        Complex rate = scaled(t->q->mass_damping, t->dswing[j]);
+        bend[j] = plus(t->dbend[j], complex_of(-rate.im, rate.re));
+    }
+    for (int i = 0; i < system->p; i++) {
+        Complex moved = along_arms(d, system->A + i * d, bend);
+        loads[i] = scaled(-system->m[i], plus(complex_of(base[0], base[1]), moved));
+    }
+    t->sim->scratch.used = mark;
+}
+
+static void add_change(Complex *on, int body, Complex change) {
+    on[body] = plus(on[body], change);
+}
+
+/* Add the changes of the forces of closed stops. */
+static void stop_pull_changes(const Tangent *t, Complex *on) {
+    const Equations *q = t->q;
+    const System *system = q->system;
+    for (int k = 0; k < q->held_count; k++) {
+        int i = q->held[k], carrier = system->on[i];
+        const Stop *stop = &system->mechanism->stops[i];
+        double share = -q->stop_friction[i] * sliding_sign(t, i);
+        bool sticks = q->contacts.modes[i] == CONTACT_STICK;
+        double force = stop_force(q, t->lam, i), dforce = stop_force(q, t->dlam, i);
+        double along = sticks ? stick_force(q, t->lam, i) : share * force;
+        double dalong = sticks ? stick_force(q, t->dlam, i) : share * dforce;
+        Complex change = complex_of(-dforce, dalong);
+        if (carrier != FIXED) {
+            change = plus(product(t->e[carrier], change),
+                          product(t->dE[carrier], complex_of(-force, along)));
+        }
+        change = product(unit(stop->direction), change);
+        add_change(on, stop->body, change);
+        add_change(on, stop->on, scaled(-1.0, change));
+    }
+}
+
+/* Add the changes of the forces of friction points and of the inputs. */
+static void pull_changes(const Tangent *t, Complex *on) {
+    const Equations *q = t->q;
+    const System *system = q->system;
+    const Mechanism *m = system->mechanism;
+    for (int i = 0; i < system->f; i++) {
+        int contact = system->s + i;
+        bool sticks = q->contacts.modes[contact] == CONTACT_STICK;
+        double size = sticks ? stick_force(q, t->dlam, contact)
+                             : -sliding_sign(t, contact) * limit_change(t, i);
+        Complex change = scaled(size, unit(m->frictions[i].direction));
+        add_change(on, m->frictions[i].body, change);
+        add_change(on, GROUND, scaled(-1.0, change));
+    }
+    for (int i = 0; i < m->force_count; i++) {
+        const double *given = t->du + LOADS * i;
+        add_change(on, m->forces[i].body, complex_of(given[0], given[1]));
+    }
+}
+
+/* Compute the change of the state at which sections are loaded, in working memory. */
+static SectionState state_change(const Tangent *t) {
+    const System *system = t->q->system;
+    Scratch *scratch = &t->sim->scratch;
+    double *strained = take(scratch, (size_t)system->n);
+    SectionState change = {t->dE, t->dq, strained, take_complex(scratch, system->p, 1),
+                           take_complex(scratch, system->b + 1, 1),
+                           take_complex(scratch, system->mechanism->flexure_count, 1)};
+    for (int j = 0; j < system->n; j++) {
+        strained[j] = t->dq[j] + t->q->beta * t->dv[j];
+    }
+    load_changes(t, change.loads);
+    change.on[GROUND] = complex_of(0.0, 0.0);
+    for (int body = 1; body <= system->b; body++) {
+        change.on[body] = change.loads[system->body_masses[body - 1]];
+    }
+    stop_pull_changes(t, change.on);
+    pull_changes(t, change.on);
+    transmit(system, t->dlam, &change);
+    return change;
+}
+
+/* Compute the changes of the stress of a flexure. */
+static void flexure_changes(const Tangent *t, const FreeBody *body, const SectionState *at,
+                            const SectionState *change, double *out) {
+    const System *system = t->q->system;
+    Scratch *scratch = &t->sim->scratch;
+    size_t mark = scratch->used, m = (size_t)body->sections;
+    double *left = take(scratch, m), *right = take(scratch, m);
+    double *dleft = take(scratch, m), *dright = take(scratch, m);
+    face_stresses(system, body, at, left, right);
+    face_changes(system, body, at, change, dleft, dright);
+    double place = stress_in(body, left, right).place;
+    int k = (int)(place > 0.0 ? place : -place) - 1;
+    double stress = place > 0.0 ? left[k] : right[k], dstress = place > 0.0 ? dleft[k] : dright[k];
+    out[STRESS_STRESS_START] = dleft[0];
+    out[STRESS_STRESS_END] = dleft[m - 1];
+    out[STRESS_STRESS] = stress < 0.0 ? -dstress : dstress;
+    scratch->used = mark;
+}
+
+PRBM void stress_changes(const Tangent *t, double *out) {
+    const System *system = t->q->system;
+    const Mechanism *m = system->mechanism;
+    Scratch *scratch = &t->sim->scratch;
+    size_t mark = scratch->used;
+    if (m->stressed_count == 0) {
+        return;
+    }
+    SectionState at = section_state(t->q, t->e, t->y, t->v, t->evaluation, scratch);
+    SectionState change = state_change(t);
+    for (int i = 0, k = 0; i < m->flexure_count; i++) {
+        if (m->types[m->flexures[i].type].stress) {
+            flexure_changes(t, &system->free_bodies[i], &at, &change, out + PER_STRESS * k++);
+        }
+    }
+    scratch->used = mark;
+}

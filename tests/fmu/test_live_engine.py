@@ -1,0 +1,137 @@
+"""The kernel of live pages, run in Node: the same bits as the native library."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from live import SCRIPTS, module_file, node, simulated
+from prbm.drawing.shapes import Shapes, corners, curve
+from prbm.interface.variables import LATCHED
+from prbm.kernel.library import FUNCTIONS
+from prbm.kernel.simulation import KernelSimulation
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.modal import modes
+from prbm.mechanics.statics import equilibrium
+from prbm.runs.experiment import experiment
+from support import each_shipped, mechanism
+
+pytestmark = pytest.mark.native
+
+MODULE = """
+const module = new WebAssembly.Module(require("node:fs").readFileSync(process.argv[1]));
+const names = (list) => list.map((item) => item.name);
+const [imports, exports] = [WebAssembly.Module.imports(module), WebAssembly.Module.exports(module)];
+console.log(JSON.stringify([names(imports), names(exports)]));
+"""
+
+
+def beam_guide():
+    """Return the guide on beams."""
+    guide = mechanism("PRBDM")
+    kinds = (replace(kind, model="beam", coefficients={}) for kind in guide.flexure_types)
+    return replace(guide, name="BeamGuide", flexure_types=tuple(kinds))
+
+
+def native(chosen, changes=None):
+    """Simulate the default experiment in the native library."""
+    default = experiment(chosen)
+    simulation = KernelSimulation(chosen, changes)
+    simulation.record = []
+    for k in range(1, round(default.stop_time / default.step) + 1):
+        simulation.advance(k * default.step)
+    return simulation
+
+
+def test_the_module_needs_no_imports_and_has_all_functions_of_the_engine():
+    imports, exports = json.loads(node("-e", MODULE, module_file()))
+    assert imports == []
+    assert set(exports) >= {*FUNCTIONS, "malloc", "free", "memory"}
+
+
+@each_shipped
+def test_impacts_and_outputs_equal_those_of_the_native_library_to_the_bit(model):
+    chosen = mechanism(model)
+    expected = native(chosen)
+    outputs = expected.outputs()
+    found = simulated(chosen, [*outputs])
+    assert [impact["time"] for impact in found["impacts"]] == [i.time for i in expected.record]
+    assert [impact["q"] for impact in found["impacts"]] == [i.q.tolist() for i in expected.record]
+    assert dict(zip(outputs, found["last"], strict=True)) == outputs
+
+
+def test_changed_values_act_as_in_the_native_library():
+    changes = {"stop.restitution": 0.3, "flexure.length": 0.05, "force.x": -0.05}
+    chosen, names = mechanism("PRBDM"), [f"stop.{name}" for name in LATCHED]
+    found = simulated(chosen, names, changes=changes)
+    outputs = native(chosen, changes).outputs()
+    assert found["last"] == [outputs[name] for name in names]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("stop.restitution", "2", "stop.restitution = 2 must be at most 1"),
+        ("flexure.thickness", "-1", "flexure.thickness"),
+        ("stop.position", "NaN", "stop.position"),
+        ("shuttle.mass", "Infinity", "shuttle.mass"),
+        ("stop.position", "-0.03", "stop"),
+    ],
+)
+def test_invalid_values_give_the_message_of_the_kernel(name, value, words):
+    """The last value places the wall inside the body."""
+    found = simulated(mechanism("PRBDM"), ["stop.gap"], changes={name: value})
+    assert words in found["error"]
+
+
+@pytest.mark.parametrize(
+    "chosen",
+    [*map(mechanism, ("PRBDM2R", "Bistable", "NotchGuide", "CurvedBistable")), beam_guide()],
+)
+def test_drawings_equal_those_of_the_python_package(chosen):
+    found = simulated(chosen, ["energy.kinetic"], steps=40, drawing=True)
+    system = assemble(chosen, chosen.values())
+    shapes, e = Shapes(system), system.directions(np.array(found["q"]))
+    for line, drawn in zip(shapes.flexures, found["curves"], strict=True):
+        places, z = np.array(drawn) @ [1, 1j], corners(line.outline, e)
+        if not line.jointed:
+            distance = np.abs(places[:, None] - z[None, :]).min(axis=0).max()
+            assert distance < 0.02 * system.length  # Both are polygons with many corners.
+            assert abs(places[[0, -1]] - z[[0, -1]]).max() < 1e-9 * system.length
+        else:
+            assert abs(places - curve(z, line.guided)).max() < 1e-12 * system.length
+    for body, drawn in zip(chosen.bodies, found["bodies"], strict=True):
+        assert around(shapes.body(body.name, e)) == around(np.array(drawn) @ [1, 1j])
+    for i, wall in enumerate(found["walls"]):
+        assert abs(complex(*wall["point"]) - shapes.wall(i, 0.0, e)[:2].mean()) < 1e-12
+
+
+def around(points):
+    """Return the corners of a polygon in micrometres, sorted."""
+    return sorted((round(1e6 * z.real, 3) + 0.0, round(1e6 * z.imag, 3) + 0.0) for z in points)
+
+
+def test_modes_equal_those_of_the_python_package():
+    chosen = mechanism("PRBDM2R")
+    found = simulated(chosen, ["energy.kinetic"], steps=1, drawing=True)
+    system = assemble(chosen, chosen.values())
+    shape = equilibrium(system)
+    expected = modes(system, shape)
+    assert found["rest"] == pytest.approx(shape.q, abs=1e-9)
+    frequencies = [mode["frequency"] for mode in found["modes"]]
+    assert frequencies == pytest.approx(expected.frequency, rel=1e-8)
+    for k, mode in enumerate(found["modes"]):
+        cosine = np.array(mode["shape"]) @ expected.M @ expected.shape[:, k]
+        assert abs(cosine) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_repeated_runs_need_no_more_memory():
+    found = simulated(mechanism("PRBDM"), ["stop.gap"], steps=100, repeat=50, drawing=True)
+    first, last = found["memory"]
+    assert last == first
+
+
+@pytest.mark.parametrize("file", sorted(path.name for path in SCRIPTS.glob("*.js")))
+def test_scripts_have_no_syntax_errors(file):
+    node("--check", SCRIPTS / file)

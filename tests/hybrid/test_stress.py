@@ -1,0 +1,156 @@
+"""Stress of flexures and its peaks: faces, parabolas, events, causality, both engines."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import prbm
+from prbm.hybrid.peaks import Peak, Sample
+from prbm.hybrid.simulation import Simulation
+from prbm.kernel.simulation import KernelSimulation
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.statics import equilibrium
+from prbm.mechanics.stress import static_stresses
+
+ENGINES = pytest.mark.parametrize("engine", [Simulation, KernelSimulation])
+THROWN = {"release.displacement": 0.0, "release.velocity": -0.5, "gravity.x": 0.0}
+
+
+def guide(model="beam", **changes):
+    """Return the guide with stress as outputs of its flexures."""
+    known = prbm.load("PRBDM2R")
+    kinds = tuple(replace(k, model=model, stress=True, **changes) for k in known.flexure_types)
+    return replace(known, flexure_types=kinds)
+
+
+def test_left_face_is_in_tension_where_the_flexure_bends_to_the_right():
+    system = assemble(guide(), guide().values({"gravity.x": 0.0}))
+    found = static_stresses(system, equilibrium(system, 5e-3))
+    for one in found.values():
+        assert one.start > 0.0 > one.end
+        assert one.largest == pytest.approx(max(one.start, -one.end), rel=1e-2)
+
+
+def test_tension_adds_to_both_faces():
+    """A vertical load stretches the straight leaves: the stress is the force over the area."""
+    straight = guide(axial=True)
+    changes = {"gravity.x": 0.0, "gravity.y": 9.81}
+    system = assemble(straight, straight.values(changes))
+    found = static_stresses(system, equilibrium(system))
+    moving = 0.053187 + 2 * 7800 * 0.04 * 8e-3 * 1e-4
+    area = 8e-3 * 1e-4
+    for one in found.values():
+        assert one.start == pytest.approx(9.81 * moving / 2 / area, rel=1e-6)
+        assert one.end == pytest.approx(9.81 * 0.053187 / 2 / area, rel=1e-6)
+
+
+@ENGINES
+@pytest.mark.parametrize(("model", "changes"), [("beam", {"order": 3}), ("2R", {})])
+def test_peak_is_the_maximum_of_the_stress(engine, model, changes):
+    mechanism = guide(model, **changes)
+    times = np.linspace(0.0, 0.12, 12001)  # Sampled by the faster engine.
+    names = ("left_flexure.stress", "right_flexure.stress")
+    sampled = KernelSimulation(mechanism, THROWN).sample(times, names)
+    simulation = engine(mechanism, THROWN)
+    simulation.advance(0.12)
+    out = simulation.outputs()
+    for name, column in zip(names, sampled.T, strict=True):
+        flexure = name.removesuffix(".stress")
+        assert out[f"{flexure}.peak_stress"] == pytest.approx(column.max(), rel=2e-3)
+        assert 0.0 < out[f"{flexure}.peak_stress_time"] < 0.12
+
+
+@ENGINES
+def test_peak_does_not_depend_on_communication_points_and_is_known_only_afterwards(engine):
+    mechanism = guide()
+    fine, coarse = engine(mechanism, THROWN), engine(mechanism, THROWN)
+    last = 0.0
+    for t in np.linspace(0.0, 0.1, 101)[1:]:
+        fine.advance(float(t))
+        out = fine.outputs()
+        assert out["left_flexure.peak_stress_time"] <= t
+        assert out["left_flexure.peak_stress"] >= last
+        last = out["left_flexure.peak_stress"]
+    coarse.advance(0.1)
+    same = coarse.outputs()
+    for name in ("peak_stress", "peak_stress_time", "peak_stress_position"):
+        assert out[f"left_flexure.{name}"] == same[f"left_flexure.{name}"]
+
+
+@ENGINES
+def test_a_step_that_an_impulse_shortens_has_no_peak_at_its_end(engine):
+    """An impulse stops the shuttle while the stress rises: the rest of the step never happens."""
+    simulation = engine(guide("1R"), THROWN)
+    simulation.advance(0.02)
+    out = simulation.outputs()
+    stopping = -2.0 * out["energy.kinetic"] / out["shuttle.vx"]
+    simulation.set({"force.impulse.x": stopping})
+    seen = [out["left_flexure.stress"]]
+    for t in np.linspace(0.02, 0.021, 21)[1:]:
+        simulation.advance(float(t))
+        seen.append(simulation.outputs()["left_flexure.stress"])
+    assert simulation.outputs()["left_flexure.peak_stress"] <= max(seen) * (1 + 1e-5)
+
+
+@ENGINES
+def test_a_saved_state_continues_with_the_same_peaks(engine):
+    simulation = engine(guide(), THROWN)
+    simulation.advance(0.03)
+    saved = simulation.snapshot()
+    simulation.advance(0.08)
+    expected = simulation.outputs()
+    simulation.restore(saved)
+    simulation.advance(0.08)
+    assert simulation.outputs() == expected
+
+
+def test_engines_agree_on_peaks_of_driven_motion_with_impacts():
+    mechanism = guide()
+    one, other = Simulation(mechanism, THROWN), KernelSimulation(mechanism, THROWN)
+    for k, t in enumerate(np.linspace(0.0, 0.1, 41)[1:]):
+        for simulation in (one, other):
+            simulation.set({"base.acceleration.x": 3.0 * np.sin(0.3 * k)})
+            simulation.advance(float(t))
+        expected, found = one.outputs(), other.outputs()
+        for name, x in expected.items():
+            if "stress" in name:
+                scale = 1.0 if name.endswith(("_time", "_position")) else 1e6
+                assert found[name] == pytest.approx(x, rel=1e-5, abs=1e-5 * scale), (t, name)
+
+
+def test_a_parabola_does_not_pass_an_event():
+    peak = Peak()
+    for t, x in ((0.0, 1.0), (1.0, 2.0)):
+        peak = peak.after(Sample(t, x, 1, 0.0))
+    peak = peak.restarted().after(Sample(2.0, 1.5, 1, 0.0))
+    assert (peak.stress, peak.time) == (2.0, 1.0)
+
+
+def test_a_parabola_joins_samples_of_one_place_only():
+    peak = Peak()
+    for t, x, place in ((0.0, 1.0, 1), (1.0, 2.0, -1), (2.0, 1.5, 1)):
+        peak = peak.after(Sample(t, x, place, 0.0))
+    assert (peak.stress, peak.time) == (2.0, 1.0)
+
+
+def test_mechanisms_without_stress_have_no_outputs_of_it():
+    assert not [n for n in Simulation(prbm.load("PRBDM2R")).outputs() if "stress" in n]
+
+
+@ENGINES
+def test_stress_in_a_hit_of_a_compliant_stop_has_a_peak(engine):
+    """The stress sampled during the contact has the peak, and both engines agree."""
+    own = guide("beam", order=3)
+    stop = replace(own.stops[0], law="compliant", stiffness=1e6, exponent=1.0, position=0.0)
+    mechanism = replace(own, stops=(stop,))
+    values = {**THROWN, "release.displacement": -1e-5, "release.velocity": 0.5}
+    times = np.linspace(0.0, 1.5e-3, 301)
+    names = ("left_flexure.stress", "stop.force", "left_flexure.peak_stress")
+    stress, force, peak = engine(mechanism, values).sample(times, names).T
+    assert force.max() > 10.0
+    assert np.all(np.diff(peak) >= 0.0)
+    assert peak[-1] == pytest.approx(stress.max(), rel=2e-3)
+    expected = Simulation(mechanism, values).sample(times[::10], names).T
+    for mine, theirs in zip((stress, force, peak), expected, strict=True):
+        assert mine[::10] == pytest.approx(theirs, rel=1e-5, abs=1e-5 * theirs.max())
