@@ -7,18 +7,18 @@ import numpy as np
 import pytest
 
 from point_mass import MASS, point_mass
-from prbm.base.errors import MechanismError, ParameterError, SimulationError
+from prbm.base.errors import SimulationError
 from prbm.hybrid.simulation import Simulation
 from prbm.kernel.simulation import KernelSimulation
-from prbm.runs.engine import simulation
 from support import energy_balance, mechanism
 
 
-def guide(name, stiffness):
+def guide(name, stiffness, **changes):
     """Return a shipped guide with a compliant stop."""
     own = mechanism(name)
     (stop,) = own.stops
-    soft = dataclasses.replace(stop, law="compliant", stiffness=stiffness, exponent=1.0)
+    keys = {"law": "compliant", "stiffness": stiffness, "exponent": 1.0, **changes}
+    soft = dataclasses.replace(stop, **keys)
     return dataclasses.replace(own, stops=(soft,))
 
 
@@ -46,6 +46,26 @@ CASES = {  # Mechanism, values, end [s], values set at half the time.
         point_mass(stiffness=1e6), {"stop.velocity": -0.02}, 2e-3, {"stop.velocity": 0.01}
     ),
     "guide": (guide("PRBDM", 6e7), {}, 0.3, {}),
+    "oblique hit": (
+        point_mass(stiffness=1e7, restitution=0.8, direction=30.0, friction=0.3), {}, 2e-3, {}
+    ),
+    "sticking hit": (
+        point_mass(stiffness=1e6, restitution=0.8, direction=5.0, friction=0.5), {}, 2e-3, {}
+    ),
+    "oblique guide": (guide("PRBDM2R", 6e6, direction=5.0, friction=0.4), {}, 0.15, {}),
+    "oblique guide of one degree of freedom": (
+        guide("PRBDM", 6e6, direction=30.0, friction=0.9), {}, 0.15, {}
+    ),
+    "guide and giving wall": (guide("PRBDM2R", 6e6), {"stop.mobility": 5.0}, 0.1, {}),
+    "giving wall": (point_mass(), {"stop.mobility": 0.7 / MASS}, 2e-3, {}),
+    "giving wall at rest": (
+        point_mass(stiffness=1e7, velocity=0.0), {"push.x": 1.0, "stop.mobility": 1e-3 / MASS},
+        0.02, {"push.x": -0.1},
+    ),
+    "giving wall, pushed in": (
+        point_mass(stiffness=1e4, displacement=-1e-9, velocity=2e-3),
+        {"push.x": 1.0, "stop.mobility": 0.5 / MASS}, 2e-3, {},
+    ),
 }  # fmt: skip
 
 
@@ -90,18 +110,6 @@ def test_a_state_saved_in_contact_restores_in_the_kernel(time):
     for one in (sim, other):
         one.advance(time + 0.01)
     assert other.snapshot() == sim.snapshot()
-
-
-def test_values_that_only_the_engine_supports_choose_it_or_are_rejected():
-    assert simulation(point_mass(friction=0.3)).engine == "python"
-    assert simulation(point_mass(), {"stop.mobility": 1.0}).engine == "python"
-    with pytest.raises(MechanismError, match="use the Python engine"):
-        simulation(point_mass(friction=0.3), engine="kernel")
-    sim = simulation(point_mass())
-    assert sim.engine == "kernel"
-    for name in ("stop.mobility", "stop.friction"):
-        with pytest.raises(ParameterError, match="use the Python engine"):
-            sim.set({name: 0.5})
 
 
 def test_an_indentation_beyond_the_size_is_rejected_by_the_kernel():

@@ -11,7 +11,6 @@ from ..interface.native import NativeInterface, native_interface
 from ..interface.tables import FILE, tables
 from ..interface.variables import CLOCK
 from ..kernel.compiler import HOST, NoCompilerError, Platform, browser_module, libraries
-from ..kernel.simulation import check_start
 from ..kernel.sources import TABLES, amalgamation, files_digest, kernel, tables_header
 from ..mechanics.independent import independent
 from ..mechanism.description import Mechanism
@@ -72,7 +71,6 @@ def build(
     from ..drawing.icon import icon  # Imported here: Matplotlib takes half a second.
 
     changes = dict(changes or {})
-    check_start(mechanism, changes)
     progress("checking the start")
     native = described(mechanism, changes, fmi, clock)
     compiled = libraries(platforms, progress)

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..base.errors import SimulationError
 from ..base.tolerances import (
+    DEPENDENT_FRICTION_RTOL,
     GUARD_INTERVALS,
     IMPACT_COUNT_MAX,
     PEAK_REFINEMENT_FACTOR,
@@ -142,8 +143,9 @@ def rephased(front: Front) -> Front:
 
 def _acceleration(front: Front, stop: int) -> float:
     """Return the second derivative of the indentation of a stop [m/s^2]."""
-    equations, a = front.equations, front.evaluate().a
-    return -float(equations.gap_accelerations(front.time, front.e, front.v, a)[stop])
+    equations, at = front.equations, front.evaluate()
+    accelerations = equations.gap_accelerations(front.time, front.e, front.v, at.a, at.pressure)
+    return -float(accelerations[stop])
 
 
 def unsettled(front: Front) -> Front:
@@ -206,10 +208,23 @@ def point_mobility(front: Front, stop: int) -> float:
     return contact_modes.mobility(M, loops, G) + front.inputs.mobilities[stop]
 
 
+def _stuck(front: Front, stop: int) -> bool:
+    """Return whether other constraints, such as its own friction, hold a hit point at rest."""
+    e, M, loops = front.equations.mass_and_loops(front.q)
+    G = front.equations.system.gap_rows.jacobian(e)[[stop]]
+    left = contact_modes.mobility(M, front.equations.rows.jacobian(e), G)
+    return left <= DEPENDENT_FRICTION_RTOL * contact_modes.mobility(M, loops, G)
+
+
 def _settled(configuration: Configuration, front: Front, stop: int) -> tuple[Front, list[Impact]]:
-    """Return the front in which a calm contact is settled, if the forces are in balance."""
+    """Return the front in which a calm contact is settled, if the forces are in balance.
+
+    A contact that is stuck does not move: it stays a force.
+    """
     touching = front.contacts.touching[stop]
     assert touching is not None
+    if _stuck(front, stop):
+        return front, []
     gaps, _ = front.gaps_and_rates()
     depth = float(-gaps[stop])
     held = replace(touching, phase=Phase.SETTLED, depth=depth)

@@ -404,7 +404,7 @@ def _agrees(
     e, v, equations = front.e, front.v, front.equations.with_contacts(contacts)
     evaluation = equations.at(front.time, front.y)
     a = evaluation.a
-    opening = equations.gap_accelerations(front.time, e, v, a)
+    opening = equations.gap_accelerations(front.time, e, v, a, evaluation.pressure)
     forces, zero = (
         equations.stop_forces(evaluation.lam, evaluation.pressure),
         scales.zero_acceleration,

@@ -58,8 +58,8 @@ def switching(equations: Equations, stop: int, t: float, y: Real) -> float:
     rate = -_gap_rate(equations, stop, t, y)
     if touching.phase is Phase.RISING:
         e, n = equations.system.directions(y[: equations.n]), equations.n
-        a = equations.at(t, y).a
-        return -float(equations.gap_accelerations(t, e, y[n : 2 * n], a)[stop])
+        at = equations.at(t, y)
+        return -float(equations.gap_accelerations(t, e, y[n : 2 * n], at.a, at.pressure)[stop])
     return switching_margin(equations, stop, rate)
 
 

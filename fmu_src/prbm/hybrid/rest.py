@@ -79,7 +79,8 @@ def rest_forces(
     rows, pushes = np.vstack([G, T]), np.vstack([G - np.reshape(rubs, (-1, n)), T])
     W = rows @ contact.response(M, loops, pushes)
     slide = [equations.slip_acceleration(c, e, v, a) for c in at_rest]
-    u = np.concatenate([equations.gap_accelerations(t, e, v, a)[list(stops)], slide])
+    opening = equations.gap_accelerations(t, e, v, a, evaluation.pressure)
+    u = np.concatenate([opening[list(stops)], slide])
     friction = np.array([equations.stop_friction[c] if c in stops else 0.0 for c in at_rest])
     fixed = np.array([
         0.0 if c in stops else equations.friction_limit(c, e, evaluation.pressure) for c in at_rest

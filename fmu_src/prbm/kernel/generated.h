@@ -235,6 +235,16 @@ typedef enum {
     START_COUNT = 3,
 } ReleaseStart;
 
+/* --- prbm.mechanics.compliant_stops ------------------------------------------------------------- */
+
+typedef enum {
+    EXTRA_GIVE = 0,
+    EXTRA_GIVE_RATE = 1,
+    EXTRA_IMPULSE = 2,
+    EXTRA_LOSS = 3,
+} Extra;
+enum { EXTRA_STATES = 4 };
+
 /* --- prbm.interface.variables ------------------------------------------------------------------- */
 
 typedef enum {

@@ -35,6 +35,7 @@ from ..interface.variables import (
     STRESS_OUTPUTS,
     STRETCH_OUTPUTS,
 )
+from ..mechanics.compliant_stops import COMPLIANT_STATES, Extra
 from ..mechanics.contact_state import ContactMode, Phase
 from ..mechanics.inputs import BASE_AXES, INPUT_GROUPS, LOADS, WALL_INPUTS
 from ..mechanism.flexure import (
@@ -93,6 +94,13 @@ def header() -> str:
             ],
         ),
         _section(tables, _tables()),
+        _section(
+            sys.modules[Extra.__module__],
+            [
+                _enumeration("Extra", "EXTRA", {m.name: m for m in Extra}),
+                _constant("EXTRA_STATES", COMPLIANT_STATES),
+            ],
+        ),
         _section("prbm.interface.variables", _groups()),
         _section("prbm.mechanics.inputs", _inputs()),
         _section("prbm.hybrid.runge_kutta", _tableau(TSITOURAS_PAPAKOSTAS)),

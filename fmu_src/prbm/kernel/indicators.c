@@ -50,14 +50,14 @@ PRBM double lifted_guard(const Simulation *sim, const Instant *at, EventKind kin
 /* Compute an indicator that is positive while a gap is open.  The rate of an opening gap is added,
  * so that the indicator is positive directly after an impact, when the gap is round-off. */
 static double impact_indicator(const Simulation *sim, const Instant *at, int i) {
-    double speed = gap_rate(&sim->equations, i, at->time, at->e, at->v);
+    double speed = gap_rate(&sim->equations, i, at->time, at->e, at->v, at->extra);
     double ahead = INDICATOR_LEAD_RTOL * sim->configuration.scales.time * greater(speed, 0.0);
     return (lifted_guard(sim, at, EVENT_IMPACT, i) + ahead) / guard_scale(sim, EVENT_IMPACT);
 }
 
 /* The rate at which a closed stop leaves its wall. */
 PRBM double leaving_rate(const Simulation *sim, const Instant *at, int i) {
-    return gap_rate(&sim->equations, i, at->time, at->e, at->v);
+    return gap_rate(&sim->equations, i, at->time, at->e, at->v, at->extra);
 }
 
 /* Compute an indicator that is positive while a closed stop is pressed and its gap rate is below

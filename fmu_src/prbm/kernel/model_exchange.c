@@ -208,7 +208,7 @@ static double speed_drift(const Simulation *sim, double speed) {
  * wall moves, its acceleration is unknown.  A larger distance is then allowed, and the release
  * indicator limits the speed instead. */
 static double stop_drift(const Simulation *sim, const Instant *at, int i) {
-    double off = fabs(gap(&sim->equations, i, at->time, at->e)) / system_of(sim)->length;
+    double off = fabs(gap(&sim->equations, i, at->time, at->e, at->extra)) / system_of(sim)->length;
     return sim->state.walls[i].rate != 0.0
                ? off / MOVING_DRIFT_FACTOR
                : greater(off, speed_drift(sim, leaving_rate(sim, at, i)));
@@ -267,8 +267,8 @@ static void stop_sliding(Simulation *sim, int contact) {
 
 /* Whether the gap of an open stop closes at this state. */
 static bool closes_here(const Simulation *sim, const Instant *at, int stop) {
-    double distance = gap(&sim->equations, stop, at->time, at->e);
-    double speed = gap_rate(&sim->equations, stop, at->time, at->e, at->v);
+    double distance = gap(&sim->equations, stop, at->time, at->e, at->extra);
+    double speed = gap_rate(&sim->equations, stop, at->time, at->e, at->v, at->extra);
     bool touches = distance <= TOUCHING_RTOL * system_of(sim)->length;
     return (touches && speed < -zero_speed(&sim->configuration)) ||
            (lifted_guard(sim, at, EVENT_IMPACT, stop) <= 0.0 && speed < 0.0);
@@ -305,7 +305,7 @@ static void arm(Simulation *sim, const Instant *at) {
     for (int i = 0; i < system_of(sim)->s; i++) {
         state->floors[i] = GAP_CLOSED_RTOL * system_of(sim)->length;
         if (state->modes[i] == CONTACT_OPEN) {
-            state->floors[i] += greater(0.0, -gap(&sim->equations, i, at->time, at->e));
+            state->floors[i] += greater(0.0, -gap(&sim->equations, i, at->time, at->e, at->extra));
         }
     }
     state->point = state->time;
@@ -321,7 +321,7 @@ static bool apply_inputs(Simulation *sim, Problem *problem) {
     if (impulses_changed(sim)) {
         ok = receive_impulses(sim, problem) && settle_moved(sim, problem);
     } else if (sim->equations.walls_move || drift(sim, &now.at) > DRIFT_CORRECTED_RTOL) {
-        ok = follow_walls(sim, now.at.lam, sim->state.time - sim->state.point, problem);
+        ok = follow_walls(sim, now.evaluation->lam, sim->state.time - sim->state.point, problem);
     }
     forget_outputs(sim);
     return ok;
@@ -429,7 +429,7 @@ PRBM const char *exchange_deepest(Simulation *simulation, double *depth) {
         return NULL;
     }
     for (int i = 0; i < system_of(sim)->s; i++) {
-        double inside = -gap(&sim->equations, i, now.at.time, now.at.e);
+        double inside = -gap(&sim->equations, i, now.at.time, now.at.e, now.at.extra);
         if (inside > *depth) {
             *depth = inside;
             found = sim->configuration.mechanism->stops[i].name;

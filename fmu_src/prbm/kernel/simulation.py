@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.errors import MechanismError, ParameterError, SimulationError
+from ..base.errors import ParameterError, SimulationError
 from ..base.names import unknown
 from ..base.tolerances import TOLERANCE_USED_MAX
 from ..hybrid.configuration import Configuration, Scales, checked_tolerance
@@ -25,58 +25,22 @@ from ..hybrid.simulation import Simulation
 from ..interface import tables
 from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble, calculated
+from ..mechanics.compliant_stops import COMPLIANT_STATES
 from ..mechanics.independent import independent
-from ..mechanics.inputs import MOBILITY
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from ..mechanism.parameters import number
-from ..mechanism.parts import value
 from .library import MESSAGE_LENGTH, library
 
 Slots = NDArray[np.intc]
 UNFINISHED = -2  # Result of a call that is to be repeated, ENGINE_UNFINISHED in C.
 IMPACT = 12  # Numbers of a recorded impact before its states, ENGINE_IMPACT in C.
-EXTRA_STATES = 2  # States of a compliant stop, EXTRA_STATES in C.
 MOTION_GROUPS = ("bodies", "probes")
 OUTPUT_GROUPS = (
     *MOTION_GROUPS, "stops", "base", "energies", "latched", "compliant", "links", "stretches",
     "stresses", "frequency", "calculated",
 )  # fmt: skip
 """The groups of values that are outputs, in the order of the Python engine."""
-
-
-def check_supported(
-    mechanism: Mechanism, values: Mapping[str, float], given: Mapping[str, float]
-) -> None:
-    """Reject values of compliant stops that only the Python engine supports.
-
-    Raises
-    ------
-    MechanismError
-        If a compliant stop has friction, or its wall has a mobility.
-    """
-    for stop in mechanism.stops:
-        for name, x in (
-            ("friction", value(stop, "friction", values)),
-            (MOBILITY, given[f"{stop.name}.{MOBILITY}"]),
-        ):
-            if stop.compliant and x:
-                raise MechanismError(
-                    f"{stop.name}.{name} = {x:g}: a compliant stop of the kernel has none; "
-                    "use the Python engine or a Python FMU"
-                )
-
-
-def check_start(mechanism: Mechanism, changes: Mapping[str, float]) -> None:
-    """Reject start values of a mechanism that the kernel does not support, by `check_supported`.
-
-    Raises
-    ------
-    PrbmError
-        If a value is invalid or not supported.
-    """
-    values, given, _ = start_values(mechanism, changes, 0.0)
-    check_supported(mechanism, values, given)
 
 
 class Tables:
@@ -144,7 +108,6 @@ class KernelSimulation:
         tolerance: float | None = None,
     ) -> None:
         self.values, self.given, start = start_values(mechanism, values, start_time)
-        check_supported(mechanism, self.values, self.given)
         if tolerance is not None:
             tolerance = checked_tolerance(tolerance)
         self.mechanism = mechanism
@@ -228,10 +191,6 @@ class KernelSimulation:
             value is then changed.
         """
         values, given = changed_values(self.mechanism, self.values, self.given, changes)
-        try:
-            check_supported(self.mechanism, values, given)
-        except MechanismError as error:
-            raise ParameterError(str(error)) from None
         with self._lock:
             self._set({**values, **given})
         if values != self.values:
@@ -321,10 +280,10 @@ class KernelSimulation:
     def state(self) -> Real:
         """Return y = (q, v, dissipated energy, work) at the present time, on the constraints.
 
-        The integral of the force and the dissipated energy of each compliant stop follow.
+        The states of compliant stops follow, see :mod:`prbm.mechanics.compliant_stops`.
         """
         compliant = sum(stop.compliant for stop in self.mechanism.stops)
-        y = np.empty(2 * self._size + 2 + EXTRA_STATES * compliant)
+        y = np.empty(2 * self._size + 2 + COMPLIANT_STATES * compliant)
         with self._lock:
             if not self._library.prbm_state(self._address, y.ctypes.data, self._message):
                 raise self._error()

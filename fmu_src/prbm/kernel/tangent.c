@@ -266,7 +266,7 @@ static void rub_change(const Tangent *t) {
         int i = q->slipping[k] - s;
         row_jacobian(&rubs, i, t->e, row);
         add_scaled(q->system->n, -sliding_sign(t, s + i) * limit_change(t, i), row, t->dx);
-        add_pull(t, &rubs, i, rub_force(q, i, t->e));
+        add_pull(t, &rubs, i, slip_force(q, t->e, t->evaluation, s + i));
     }
     scratch->used = mark;
 }
@@ -501,7 +501,7 @@ static double dissipation_change(const Tangent *t) {
         int i = q->slipping[k] - system->s;
         double change = -sliding_sign(t, system->s + i) * limit_change(t, i);
         sum -= change * row_rate(&rubs, i, t->e, t->v) +
-               rub_force(q, i, t->e) * rate_change(t, &rubs, i);
+               slip_force(q, t->e, t->evaluation, system->s + i) * rate_change(t, &rubs, i);
     }
     for (int k = 0; k < q->slipping_stops; k++) {
         int i = q->slipping[k], h = q->first_hold + held_at(q, i);

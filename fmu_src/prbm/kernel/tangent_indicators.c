@@ -12,7 +12,7 @@ static double sign_times(double x, double change) {
 
 static double impact_indicator_change(const Tangent *t, int i) {
     const Scales *scales = &t->sim->configuration.scales;
-    bool opens = gap_rate(t->q, i, t->at->time, t->e, t->v) > 0.0;
+    bool opens = gap_rate(t->q, i, t->at->time, t->e, t->v, t->at->extra) > 0.0;
     double ahead = opens ? INDICATOR_LEAD_RTOL * scales->time * gap_rate_change(t, i) : 0.0;
     return (gap_change(t, i) + ahead) / scales->length;
 }

@@ -391,11 +391,18 @@ class Equations:
         self.compliant.add_gives(extras, result, Extra.GIVE_RATE)
         return result
 
-    def gap_accelerations(self, t: float, e: Complex, v: Real, a: Real) -> Real:
-        """Return the accelerations of all gaps [m/s^2] for accelerations a (n,) [rad/s^2]."""
+    def gap_accelerations(
+        self, t: float, e: Complex, v: Real, a: Real, pressure: Pressure | None = None
+    ) -> Real:
+        """Return the accelerations of all gaps [m/s^2] for accelerations a (n,) [rad/s^2].
+
+        Walls give way to the forces of pressed stops.
+        """
         rows = self.system.gap_rows
         walls = np.array([wall.motion(t)[2] for wall in self.inputs.walls])
         result: Real = rows.jacobian(e) @ a - rows.convective(e, v) + walls
+        if pressure is not None:
+            result[self.pressed] += np.array(self.inputs.mobilities)[self.pressed] * pressure.force
         return result
 
     def stop_forces(self, lam: Real, pressure: Pressure | None = None) -> Real:

@@ -15,6 +15,11 @@ PRBM bool is_pressed(const Touching *touching) {
            touching->phase == PHASE_FREE;
 }
 
+/* Whether a stop is a constraint. */
+PRBM bool is_held(const ContactState *contacts, int stop) {
+    return contacts->modes[stop] != CONTACT_OPEN && !is_pressed(&contacts->touching[stop]);
+}
+
 PRBM bool is_stop(const System *system, int contact) {
     return contact < system->s;
 }

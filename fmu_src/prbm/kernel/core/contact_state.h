@@ -9,8 +9,8 @@
  * independently of other contacts. */
 PRBM int slip_sign(ContactMode mode); /* Sign of the sliding velocity: -1, 0 or +1. */
 
-/* A contact at a compliant stop.  Its phase is PHASE_NONE at other stops.  The mode of a stop that
- * is pressed is CONTACT_OPEN, because it is no constraint. */
+/* A contact at a compliant stop.  Its phase is PHASE_NONE at other stops.  A settled stop whose mode
+ * is CONTACT_OPEN has no force; this occurs only while modes are tried. */
 typedef struct {
     Phase phase;
     double reference_speed, depth;
@@ -21,6 +21,7 @@ typedef struct {
     Touching *touching; /* (s,) */
 } ContactState;
 PRBM bool is_pressed(const Touching *touching);
+PRBM bool is_held(const ContactState *contacts, int stop);
 PRBM ContactMode slipping_mode(double sign);
 PRBM bool is_stop(const System *system, int contact);
 PRBM Rows tangential_rows(const System *system, int contact, int *i);

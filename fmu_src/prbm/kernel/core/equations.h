@@ -37,7 +37,7 @@ typedef struct {
     int pressed_count;
     ComplianceLaw *laws;    /* (s,) of compliant stops */
     int *sticking;          /* contacts; the k-th has the row first_stick + k */
-    int *slipping;          /* contacts; the first slipping_stops of them are stops */
+    int *slipping;          /* contacts; the first slipping_stops of them are held stops */
     int slipping_stops;
     double *stop_friction;  /* (s,) */
     double *rub_law;        /* (f, 3): coefficient, normal force, normal stiffness */
@@ -64,5 +64,6 @@ PRBM Parts place_parts(Memory *memory, size_t count);
 PRBM Parts parts_from(Parts parts, int start);
 PRBM int place_in(const int *list, int index);
 PRBM int held_at(const Equations *q, int stop);
+PRBM double friction_coefficient(const Equations *q, int contact);
 
 #endif

@@ -69,6 +69,7 @@ typedef struct {
     Expression position, offset, restitution, friction, rest_speed;
     bool compliant;
     Expression stiffness, exponent; /* of a compliant stop */
+    int extra; /* Index of the first state of a compliant stop behind the energies. */
 } Stop;
 
 typedef struct {

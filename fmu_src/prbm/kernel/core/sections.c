@@ -38,6 +38,13 @@ static void pull_body(Complex *on, int body, Complex force) {
     on[body] = plus(on[body], force);
 }
 
+/* The friction force of a contact along its direction. */
+static double rubbing_force(const Equations *q, const Complex *e, const Evaluation *found,
+                            int contact) {
+    return q->contacts.modes[contact] == CONTACT_STICK ? stick_force(q, found->lam, contact)
+                                                       : slip_force(q, e, found, contact);
+}
+
 /* Let a closed stop push and rub its bodies. */
 static void pull_stop(const Equations *q, const Complex *e, int i, double force, double along,
                       Complex *on) {
@@ -57,20 +64,15 @@ PRBM void add_contact_pulls(const Equations *q, const Complex *e, const Evaluati
     const double *lam = found->lam;
     for (int k = 0; k < q->held_count; k++) {
         int i = q->held[k];
-        ContactMode mode = q->contacts.modes[i];
-        double force = stop_force(q, lam, i);
-        double along = mode == CONTACT_STICK ? stick_force(q, lam, i)
-                                             : -q->stop_friction[i] * slip_sign(mode) * force;
-        pull_stop(q, e, i, force, along, on);
+        pull_stop(q, e, i, stop_force(q, lam, i), rubbing_force(q, e, found, i), on);
     }
     for (int k = 0; k < q->pressed_count; k++) {
         int i = q->pressed[k];
-        pull_stop(q, e, i, found->pressure[i], 0.0, on);
+        pull_stop(q, e, i, found->pressure[i], rubbing_force(q, e, found, i), on);
     }
     for (int i = 0; i < system->f; i++) {
         const Friction *friction = &m->frictions[i];
-        bool sticks = q->contacts.modes[system->s + i] == CONTACT_STICK;
-        double size = sticks ? stick_force(q, lam, system->s + i) : rub_force(q, i, e);
+        double size = rubbing_force(q, e, found, system->s + i);
         Complex pull = scaled(size, unit(friction->direction));
         pull_body(on, friction->body, pull);
         pull_body(on, GROUND, scaled(-1.0, pull));

@@ -196,7 +196,7 @@ static void read_stops(Reader *reader, Mechanism *m) {
         if (s->compliant) {
             s->stiffness = read_expression(reader, m);
             s->exponent = read_expression(reader, m);
-            m->compliant_count++;
+            s->extra = EXTRA_STATES * m->compliant_count++;
         }
     }
     m->stops = stops;

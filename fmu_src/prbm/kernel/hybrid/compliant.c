@@ -1,5 +1,5 @@
 /* Contacts at compliant stops: first touch, phases, settling, separation, and their outputs: the
- * twin of hybrid/compliant.py.  The kernel has no friction and no mobility of compliant stops. */
+ * twin of hybrid/compliant.py. */
 #include <math.h>
 
 #include "core/matrix.h"
@@ -19,47 +19,31 @@ static const Stop *stop_of(const Simulation *sim, int stop) {
     return &sim->configuration.mechanism->stops[stop];
 }
 
-/* The number of compliant stops before a stop. */
-static int compliant_before(const Simulation *sim, int stop) {
-    int count = 0;
-    for (int i = 0; i < stop; i++) {
-        count += stop_of(sim, i)->compliant;
-    }
-    return count;
-}
-
-PRBM int extra_index(const Simulation *sim, int stop) {
-    return 2 * system_of(sim)->n + 2 + EXTRA_STATES * compliant_before(sim, stop);
+PRBM double *extra_of(const Simulation *sim, double *y, int stop) {
+    return y + 2 * system_of(sim)->n + 2 + stop_of(sim, stop)->extra;
 }
 
 /* Coordinates, rates and M phi at the first touch of a compliant stop, (3 n,). */
 static double *first_state(const Simulation *sim, int stop) {
-    return sim->state.first + 3 * system_of(sim)->n * compliant_before(sim, stop);
+    return sim->state.first + 3 * system_of(sim)->n * (stop_of(sim, stop)->extra / EXTRA_STATES);
 }
 
 static double rest_speed_of(const Simulation *sim, int stop) {
     return field_value(sim, stop_of(sim, stop)->rest_speed);
 }
 
-PRBM bool reject_unsupported(const Simulation *sim, Problem *problem) {
-    for (int i = 0; i < system_of(sim)->s; i++) {
-        const Stop *stop = stop_of(sim, i);
-        double mobile = sim->equations.inputs.mobilities[i];
-        double rough = field_value(sim, stop->friction);
-        if (stop->compliant && (mobile > 0.0 || rough > 0.0)) {
-            return fail(problem, "%s.%s = %g: a compliant stop of the kernel has none; use the "
-                        "Python engine", stop->name, mobile > 0.0 ? "mobility" : "friction",
-                        mobile > 0.0 ? mobile : rough);
-        }
-    }
-    return true;
-}
-
 /* --- phases ----------------------------------------------------------------------------------- */
 
+/* Set the contact of a stop.  A contact that becomes free, or begins, has no friction. */
 static void set_phase(Simulation *sim, int stop, Phase phase, double speed, double depth) {
     Touching touching = {phase, speed, depth};
+    ContactMode *mode = &sim->state.modes[stop];
     sim->state.touching[stop] = touching;
+    if (phase == PHASE_NONE) {
+        *mode = CONTACT_OPEN;
+    } else if (phase == PHASE_FREE || *mode == CONTACT_OPEN) {
+        *mode = CONTACT_FRICTIONLESS;
+    }
     sim->state.has_k1 = false;
     set_inputs(sim);
 }
@@ -70,9 +54,10 @@ static bool indentation_acceleration(Simulation *sim, int stop, double *result,
     size_t mark = sim->scratch.used;
     const double *q = sim->state.front, *v = q + system_of(sim)->n;
     double t = sim->state.front_time;
-    bool ok = evaluate_equations(&sim->equations, t, q, v, NULL, &sim->at_front, problem);
+    bool ok = evaluate_equations(&sim->equations, t, q, v, extra_states(sim, q), NULL,
+                                 &sim->at_front, problem);
     *result = ok ? -gap_acceleration(&sim->equations, stop, t, directions_at(sim, q), v,
-                                     sim->at_front.a)
+                                     &sim->at_front)
                  : 0.0;
     sim->scratch.used = mark;
     return ok;
@@ -113,11 +98,11 @@ PRBM bool rephase(Simulation *sim, Problem *problem) {
 
 PRBM void unsettle(Simulation *sim) {
     for (int i = 0; i < system_of(sim)->s; i++) {
-        if (sim->state.touching[i].phase == PHASE_SETTLED) {
-            sim->state.modes[i] = CONTACT_OPEN;
+        const Touching *touching = &sim->state.touching[i];
+        if (touching->phase == PHASE_SETTLED) {
+            set_phase(sim, i, PHASE_PRESSED, touching->reference_speed, 0.0);
         }
     }
-    (void)press_released(sim);
 }
 
 PRBM bool press_released(Simulation *sim) {
@@ -140,7 +125,7 @@ static bool begin_contact(Simulation *sim, int stop, double speed, bool counted,
     size_t mark = sim->scratch.used;
     const System *system = system_of(sim);
     int n = system->n;
-    const double *front = sim->state.front, *extra = front + extra_index(sim, stop);
+    const double *front = sim->state.front, *extra = extra_of(sim, sim->state.front, stop);
     double least = greater(rest_speed_of(sim, stop), zero_speed(&sim->configuration));
     double *first = first_state(sim, stop);
     Touch begun = {sim->state.front_time, counted, extra[EXTRA_IMPULSE], extra[EXTRA_LOSS], false,
@@ -247,7 +232,7 @@ static bool end_impact(Simulation *sim, int stop, Problem *problem) {
     int n = system_of(sim)->n;
     Touch *begun = &sim->state.touches[stop];
     Latched *latched = &sim->state.latched[stop];
-    const double *extra = sim->state.front + extra_index(sim, stop);
+    const double *extra = extra_of(sim, sim->state.front, stop);
     const double *first = first_state(sim, stop);
     if (!begun->counted) {
         return true;
@@ -275,7 +260,7 @@ PRBM bool separate(Simulation *sim, int stop, Problem *problem) {
 
 /* --- settling --------------------------------------------------------------------------------- */
 
-/* Compute the inverse effective mass of a hit point at the front. */
+/* Compute the inverse effective mass of a hit point at the front, with that of its wall. */
 static bool point_mobility(Simulation *sim, int stop, double *result, Problem *problem) {
     size_t mark = sim->scratch.used;
     const System *system = system_of(sim);
@@ -284,6 +269,7 @@ static bool point_mobility(Simulation *sim, int stop, double *result, Problem *p
     Rows gaps = gap_rows(system);
     row_jacobian(&gaps, stop, at.e, G);
     bool ok = mobility(sim, &at, system->r, at.loops, G, result, problem);
+    *result += sim->equations.inputs.mobilities[stop];
     sim->scratch.used = mark;
     return ok;
 }
@@ -337,27 +323,75 @@ static bool stop_motion(Simulation *sim, int stop, Problem *problem) {
     bool ok = project(&sim->equations, sim->state.front_time, front, &sim->scratch, problem);
     loss -= kinetic_energy(sim, front + n);
     front[2 * n] += loss;
-    front[extra_index(sim, stop) + EXTRA_LOSS] += loss;
+    extra_of(sim, front, stop)[EXTRA_LOSS] += loss;
     sim->scratch.used = mark;
     return ok;
 }
 
-/* Settle a calm contact if its force as a constraint is close to its elastic force. */
+/* Whether other constraints, such as its own friction, hold a hit point at rest. */
+static bool is_stuck(Simulation *sim, int stop, bool *result, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    const Equations *q = &sim->equations;
+    int n = q->system->n;
+    double left = 0.0, own = 0.0, *G = take(&sim->scratch, (size_t)n);
+    double *held = take_matrix(&sim->scratch, q->r, n);
+    Inertia at = inertia_at(sim, sim->state.front);
+    Rows gaps = gap_rows(q->system);
+    row_jacobian(&gaps, stop, at.e, G);
+    jacobian(&q->active, at.e, held);
+    bool ok = mobility(sim, &at, q->r, held, G, &left, problem) &&
+              mobility(sim, &at, q->system->r, at.loops, G, &own, problem);
+    *result = left <= DEPENDENT_FRICTION_RTOL * own;
+    sim->scratch.used = mark;
+    return ok;
+}
+
+PRBM void fold_give(Wall *wall, double t, double *extra) {
+    wall->position += extra[EXTRA_GIVE] - extra[EXTRA_GIVE_RATE] * (t - wall->since);
+    wall->rate += extra[EXTRA_GIVE_RATE];
+    extra[EXTRA_GIVE] = extra[EXTRA_GIVE_RATE] = 0.0;
+}
+
+PRBM void fold_gives(Simulation *sim) {
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        if (stop_of(sim, i)->compliant) {
+            double *extra = extra_of(sim, sim->state.front, i);
+            fold_give(&sim->state.walls[i], sim->state.front_time, extra);
+        }
+    }
+}
+
+/* Settle a calm contact if its force as a constraint is close to its elastic force.  A contact that
+ * is stuck does not move: it stays a force. */
 static bool try_to_settle(Simulation *sim, int stop, double depth, Problem *problem) {
     State *state = &sim->state;
+    bool stuck;
+    if (!is_stuck(sim, stop, &stuck, problem)) {
+        return false;
+    }
+    if (stuck) {
+        return true;
+    }
     const double *q = state->front, *v = q + system_of(sim)->n;
     Touching before = state->touching[stop];
+    ContactMode mode = state->modes[stop];
+    double *extra = extra_of(sim, state->front, stop);
+    double give = extra[EXTRA_GIVE], give_rate = extra[EXTRA_GIVE_RATE];
+    Wall wall = state->walls[stop];
     bool has_k1 = state->has_k1;
-    state->modes[stop] = CONTACT_FRICTIONLESS;
+    fold_give(&state->walls[stop], state->front_time, extra);
     set_phase(sim, stop, PHASE_SETTLED, before.reference_speed, depth);
-    if (!evaluate_equations(&sim->equations, state->front_time, q, v, NULL, &sim->at_front,
-                            problem)) {
+    if (!evaluate_equations(&sim->equations, state->front_time, q, v, extra_states(sim, q), NULL,
+                            &sim->at_front, problem)) {
         return false;
     }
     double elastic = elastic_force(&sim->equations.laws[stop], depth);
     double force = stop_force(&sim->equations, sim->at_front.lam, stop);
     if (fabs(force - elastic) > SETTLING_FACTOR * SETTLED_FORCE_RTOL * elastic) {
-        state->modes[stop] = CONTACT_OPEN;
+        state->walls[stop] = wall;
+        extra[EXTRA_GIVE] = give;
+        extra[EXTRA_GIVE_RATE] = give_rate;
+        state->modes[stop] = mode;
         set_phase(sim, stop, before.phase, before.reference_speed, 0.0);
         state->has_k1 = has_k1;
         return true;
@@ -407,11 +441,12 @@ static double contact_at(Simulation *sim, int stop, double t, bool force) {
     const Equations *equations = &sim->equations;
     arc_at(sim, t, located->y);
     directions(system, located->y, located->e);
-    double depth = -gap(equations, stop, t, located->e);
+    const double *extra = extra_states(sim, located->y);
+    double depth = -gap(equations, stop, t, located->e, extra);
     if (!force) {
         return depth;
     }
-    double rate = -gap_rate(equations, stop, t, located->e, located->y + system->n);
+    double rate = -gap_rate(equations, stop, t, located->e, located->y + system->n, extra);
     return contact_force(&equations->laws[stop], &equations->contacts.touching[stop], depth, rate);
 }
 
@@ -492,9 +527,11 @@ PRBM double contact_error(Simulation *sim, double h) {
         double depth = greater(greater(fabs(dot(n, row, change)), speed * h),
                                INDENTATION_MIN_RTOL * system->length);
         double squares[2];
+        int give = 2 * n + 2 + stop_of(sim, i)->extra + EXTRA_GIVE;
         for (int part = 0; part < 2; part++) {
             const double *error = part == 0 ? stepping->error : stepping->coarse_error;
-            double d = dot(n, row, error) / depth, rate = dot(n, row, error + n) / speed;
+            double d = (dot(n, row, error) + error[give]) / depth;
+            double rate = (dot(n, row, error + n) + error[give + 1]) / speed;
             squares[part] = d * d + rate * rate;
         }
         double size = sqrt(squares[0] + squares[1]);

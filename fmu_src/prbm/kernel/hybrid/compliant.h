@@ -23,7 +23,10 @@ PRBM void peaks_until(Simulation *sim, int stop, double time, double *depth, dou
 PRBM bool latch_peaks(Simulation *sim, double time, Problem *problem);
 /* Return the error of the contacts in a step of size h, relative to their scales. */
 PRBM double contact_error(Simulation *sim, double h);
-PRBM int extra_index(const Simulation *sim, int stop); /* of the states of a compliant stop */
-PRBM bool reject_unsupported(const Simulation *sim, Problem *problem);
+PRBM double *extra_of(const Simulation *sim, double *y, int stop); /* states of a stop in y (ny,) */
+/* Let the displacement of a wall by the force of its stop become its motion at time t; extra: the
+ * states of the stop. */
+PRBM void fold_give(Wall *wall, double t, double *extra);
+PRBM void fold_gives(Simulation *sim); /* of all compliant stops at the front */
 
 #endif

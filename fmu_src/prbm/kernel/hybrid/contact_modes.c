@@ -5,6 +5,7 @@
 #include "hybrid/compliant.h"
 #include "hybrid/configuration.h"
 #include "hybrid/contact_modes.h"
+#include "hybrid/guards.h"
 #include "hybrid/impacts.h"
 #include "hybrid/rest.h"
 #include "hybrid/simulation.h"
@@ -37,20 +38,23 @@ static ContactMode slip_mode(const Simulation *sim, double speed) {
 }
 
 static double friction_of(const Simulation *sim, int contact) {
-    const System *system = system_of(sim);
-    return is_stop(system, contact) ? sim->equations.stop_friction[contact]
-                                    : sim->equations.rub_law[3 * (contact - system->s)];
+    return friction_coefficient(&sim->equations, contact);
 }
 
-/* The contact state in which a set of stops is closed, and closed contacts and friction points slip
- * if they have a velocity and friction. */
+/* Whether a contact is a compliant stop that is pressed. */
+static bool presses(const Simulation *sim, int contact) {
+    return is_stop(system_of(sim), contact) && is_pressed(&sim->state.touching[contact]);
+}
+
+/* The contact state in which a set of stops is held, and closed contacts and friction points slip if
+ * they have a velocity and friction. */
 static void modes_holding(Simulation *sim, const HoldingSet *holding, const double *q,
                           const double *v, ContactMode *modes) {
     size_t mark = sim->scratch.used;
     const System *system = system_of(sim);
     Complex *e = directions_at(sim, q);
     for (int contact = 0; contact < contact_count(sim); contact++) {
-        bool open = is_stop(system, contact) &&
+        bool open = is_stop(system, contact) && !presses(sim, contact) &&
                     !has_contact(holding->count, holding->stops, contact);
         modes[contact] = open ? CONTACT_OPEN : CONTACT_FRICTIONLESS;
         if (!open && friction_of(sim, contact) > 0.0) {
@@ -77,7 +81,7 @@ static bool obeys_coulomb(Simulation *sim, int contact, double slack, const Comp
     const Evaluation *tried = &sim->trial.evaluation;
     ContactMode mode = sim->trial.contacts.modes[contact];
     if (mode == CONTACT_STICK) {
-        double limit = friction_limit(equations, e, tried->lam, contact);
+        double limit = friction_limit(equations, e, tried, contact);
         return fabs(stick_force(equations, tried->lam, contact)) <=
                limit + greater(FRICTION_EXCESS_RTOL * limit, slack);
     }
@@ -96,14 +100,15 @@ static bool modes_agree(Simulation *sim, const double *q, const double *v,
     double *row = take(&sim->scratch, (size_t)system_of(sim)->n);
     double zero = zero_acceleration(&sim->configuration);
     Complex *e = directions_at(sim, q);
-    bool ok = evaluate_equations(equations, sim->state.front_time, q, v, NULL,
+    bool ok = evaluate_equations(equations, sim->state.front_time, q, v,
+                                 extra_states(sim, sim->state.front), NULL,
                                  &sim->trial.evaluation, problem);
     *result = ok;
     for (int k = 0; *result && k < touching->count; k++) {
         int i = touching->stops[k];
-        *result = sim->trial.contacts.modes[i] != CONTACT_OPEN
+        *result = is_held(&sim->trial.contacts, i)
                       ? stop_force(equations, tried->lam, i) > 0.0
-                      : !(gap_acceleration(equations, i, sim->state.front_time, e, v, tried->a) <
+                      : !(gap_acceleration(equations, i, sim->state.front_time, e, v, tried) <
                           -zero);
     }
     for (int j = 0; *result && j < rest->count; j++) {
@@ -119,7 +124,8 @@ static bool modes_agree(Simulation *sim, const double *q, const double *v,
  * that was released because its force was round-off, and then penetrated, was pressed. */
 static double least_pressing(Simulation *sim, int stop, const double *q) {
     size_t mark = sim->scratch.used;
-    double distance = gap(&sim->equations, stop, sim->state.front_time, directions_at(sim, q));
+    double distance = gap(&sim->equations, stop, sim->state.front_time, directions_at(sim, q),
+                          extra_states(sim, sim->state.front));
     const Configuration *configuration = &sim->configuration;
     sim->scratch.used = mark;
     const Touching *touching = &sim->state.touching[stop];
@@ -274,7 +280,12 @@ static bool stick_or_slip(Simulation *sim, const RestContacts *rest, const RestF
     return ok;
 }
 
-/* Collect the given stops, and the contacts with friction at rest.  Contacts that cannot move
+/* Whether a compliant stop is pressed and not free of force. */
+static bool rubs_pressed(const Simulation *sim, int contact) {
+    return presses(sim, contact) && sim->state.touching[contact].phase != PHASE_FREE;
+}
+
+/* Collect the given stops, and the contacts with friction at rest, pressed stops among them.  Contacts that cannot move
  * independently are left out: loops and held stops carry their load.  sliding: the modes of the
  * contacts with friction that slide. */
 static bool find_rest(Simulation *sim, const HoldingSet *stops, const FrictionEvent *event,
@@ -283,9 +294,10 @@ static bool find_rest(Simulation *sim, const HoldingSet *stops, const FrictionEv
     bool ok = true, mobile = false;
     rest->stop_count = rest->count = 0;
     for (int contact = 0; ok && contact < contact_count(sim); contact++) {
-        bool stop = is_stop(system_of(sim), contact);
+        bool stop = is_stop(system_of(sim), contact) &&
+                    has_contact(stops->count, stops->stops, contact);
         sliding[contact] = CONTACT_FRICTIONLESS;
-        if (stop && !has_contact(stops->count, stops->stops, contact)) {
+        if (is_stop(system_of(sim), contact) && !stop && !rubs_pressed(sim, contact)) {
             continue;
         }
         if (friction_of(sim, contact) > 0.0) {
@@ -309,9 +321,11 @@ static bool friction_jams(const Simulation *sim, const HoldingSet *touching, Pro
     int all[CONTACTS_MAX], count = 0;
     for (int contact = 0; contact < contact_count(sim); contact++) {
         bool stop = is_stop(system_of(sim), contact);
+        bool rough = friction_of(sim, contact) > 0.0;
         all[count] = contact;
-        count += stop ? has_contact(touching->count, touching->stops, contact)
-                      : friction_of(sim, contact) > 0.0;
+        count += stop ? has_contact(touching->count, touching->stops, contact) ||
+                            (rough && rubs_pressed(sim, contact))
+                      : rough;
     }
     return contacts_fail(sim, &JAMMED, count, all, problem);
 }
@@ -338,7 +352,7 @@ static bool modes_by_forces(Simulation *sim, const HoldingSet *stops, const Hold
         return true;
     }
     for (int i = 0; i < system->s; i++) {
-        modes[i] = CONTACT_OPEN;
+        modes[i] = presses(sim, i) ? modes[i] : CONTACT_OPEN;
     }
     try_contacts(sim, modes);
     if (!rest_forces(sim, q, v, &rest, &found, problem)) {
@@ -400,8 +414,8 @@ static bool slide_acceleration(Simulation *sim, int contact, double *result, Pro
     const System *system = system_of(sim);
     Evaluation *evaluation = &sim->at_front;
     const double *q = sim->state.front, *v = q + system->n;
-    if (!evaluate_equations(&sim->equations, sim->state.front_time, q, v, NULL, evaluation,
-                            problem)) {
+    if (!evaluate_equations(&sim->equations, sim->state.front_time, q, v, extra_states(sim, q),
+                            NULL, evaluation, problem)) {
         return false;
     }
     double *row = take(&sim->scratch, (size_t)system->n);
@@ -438,14 +452,14 @@ static int resting_candidates(Simulation *sim, const int *touching, int touching
     int count = 0;
     Complex *e = directions_at(sim, sim->state.front);
     for (int i = 0; i < system->s; i++) {
-        if (sim->state.modes[i] != CONTACT_OPEN) {
+        if (held_stop(&sim->equations, i)) {
             candidates[count++] = i;
         }
     }
     for (int k = 0; k < touching_count; k++) {
         int i = touching[k];
-        if (sim->state.modes[i] == CONTACT_OPEN && gap(&sim->equations, i, t, e) <= near &&
-            gap_rate(&sim->equations, i, t, e, v) <= bound) {
+        if (sim->state.modes[i] == CONTACT_OPEN && gap(&sim->equations, i, t, e, NULL) <= near &&
+            gap_rate(&sim->equations, i, t, e, v, NULL) <= bound) {
             candidates[count++] = i;
         }
     }
@@ -463,7 +477,8 @@ static bool choose_modes(Simulation *sim, const HoldingSet *touching, const Fric
         return false;
     }
     for (int contact = 0; contact < contact_count(sim); contact++) {
-        bool open = is_stop(system, contact) && !has_contact(holding.count, holding.stops, contact);
+        bool open = is_stop(system, contact) && !presses(sim, contact) &&
+                    !has_contact(holding.count, holding.stops, contact);
         modes[contact] = open ? CONTACT_OPEN : CONTACT_FRICTIONLESS;
     }
     return settle_friction(sim, &holding, touching, event, modes, problem);
@@ -525,10 +540,11 @@ PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const
 PRBM void gaps_and_rates(Simulation *sim, double *gaps, double *rates) {
     size_t mark = sim->scratch.used;
     double *front = sim->state.front, t = sim->state.front_time;
+    const double *extra = extra_states(sim, front);
     Complex *e = directions_at(sim, front);
     for (int i = 0; i < system_of(sim)->s; i++) {
-        gaps[i] = gap(&sim->equations, i, t, e);
-        rates[i] = gap_rate(&sim->equations, i, t, e, front + system_of(sim)->n);
+        gaps[i] = gap(&sim->equations, i, t, e, extra);
+        rates[i] = gap_rate(&sim->equations, i, t, e, front + system_of(sim)->n, extra);
     }
     sim->scratch.used = mark;
 }
@@ -541,7 +557,7 @@ static int release_moving(Simulation *sim) {
     double gaps[STOPS_MAX], rates[STOPS_MAX], bound = zero_speed(&sim->configuration);
     gaps_and_rates(sim, gaps, rates);
     for (int i = 0; i < system->s; i++) {
-        bool closed = sim->state.modes[i] != CONTACT_OPEN;
+        bool closed = held_stop(&sim->equations, i);
         bool compliant = system->mechanism->stops[i].compliant;
         if (closed && fabs(rates[i]) > bound) {
             set_mode(sim, i, CONTACT_OPEN);

@@ -12,11 +12,11 @@
 /* --- guards ----------------------------------------------------------------------------------- */
 
 PRBM double gap_guard(const Equations *equations, const Instant *at, int contact) {
-    return gap(equations, contact, at->time, at->e);
+    return gap(equations, contact, at->time, at->e, at->extra);
 }
 
 static double gap_rate_guard(const Equations *equations, const Instant *at, int contact) {
-    return gap_rate(equations, contact, at->time, at->e, at->v);
+    return gap_rate(equations, contact, at->time, at->e, at->v, at->extra);
 }
 
 PRBM double indentation_guard(const Equations *equations, const Instant *at, int contact) {
@@ -46,12 +46,12 @@ PRBM double switching_guard(const Equations *equations, const Instant *at, int c
 
 /* The second derivative of the indentation, with which the reference speed rises. */
 static double rising_guard(const Equations *equations, const Instant *at, int contact) {
-    return -gap_acceleration(equations, contact, at->time, at->e, at->v, at->a);
+    return -gap_acceleration(equations, contact, at->time, at->e, at->v, at->found);
 }
 
 PRBM double release_guard(const Equations *equations, const Instant *at, int contact) {
     const Touching *touching = &equations->contacts.touching[contact];
-    double force = stop_force(equations, at->lam, contact);
+    double force = stop_force(equations, at->found->lam, contact);
     if (touching->phase != PHASE_SETTLED) {
         return force;
     }
@@ -60,8 +60,8 @@ PRBM double release_guard(const Equations *equations, const Instant *at, int con
 }
 
 PRBM double slip_guard(const Equations *equations, const Instant *at, int contact) {
-    double friction = fabs(stick_force(equations, at->lam, contact));
-    double limit = friction_limit(equations, at->e, at->lam, contact);
+    double friction = fabs(stick_force(equations, at->found->lam, contact));
+    double limit = friction_limit(equations, at->e, at->found, contact);
     return (1.0 + FRICTION_EXCESS_RTOL) * limit - friction;
 }
 
@@ -73,8 +73,7 @@ PRBM double reversal_guard(const Equations *equations, const Instant *at, int co
 /* --- contacts and steps in which events may occur --------------------------------------------- */
 
 PRBM bool held_stop(const Equations *equations, int contact) {
-    return is_stop(equations->system, contact) &&
-           equations->contacts.modes[contact] != CONTACT_OPEN;
+    return is_stop(equations->system, contact) && is_held(&equations->contacts, contact);
 }
 
 PRBM bool sticking_contact(const Equations *equations, int contact) {
@@ -82,20 +81,17 @@ PRBM bool sticking_contact(const Equations *equations, int contact) {
 }
 
 PRBM bool slipping_contact(const Equations *equations, int contact) {
-    const System *system = equations->system;
     return slip_sign(equations->contacts.modes[contact]) != 0 &&
-           (is_stop(system, contact) || equations->rub_law[3 * (contact - system->s)] > 0.0);
+           (held_stop(equations, contact) || friction_coefficient(equations, contact) > 0.0);
 }
 
 PRBM bool open_stop(const Equations *equations, int contact) {
     return is_stop(equations->system, contact) &&
-           equations->contacts.modes[contact] == CONTACT_OPEN &&
-           equations->contacts.touching[contact].phase == PHASE_NONE;
+           equations->contacts.modes[contact] == CONTACT_OPEN;
 }
 
 PRBM bool pressed_stop(const Equations *equations, int contact) {
     return is_stop(equations->system, contact) &&
-           equations->contacts.modes[contact] == CONTACT_OPEN &&
            is_pressed(&equations->contacts.touching[contact]);
 }
 
@@ -160,7 +156,11 @@ static double gap_reach(const Simulation *sim, int stop, const Complex *e, const
     const System *system = system_of(sim);
     const Complex *row = system->gaps + stop * system->d;
     const Wall *wall = &sim->state.walls[stop];
-    double reach = fabs(wall->rate) * sim->state.arc.h + 2.0 * fabs(wall->offset) +
+    const Stop *own = &system->mechanism->stops[stop];
+    const double *extra = extra_states(sim, sim->state.arc.y);
+    double given = own->compliant ? extra[own->extra + EXTRA_GIVE_RATE] * sim->state.arc.h : 0.0;
+    double reach = fabs(given);
+    reach += fabs(wall->rate) * sim->state.arc.h + 2.0 * fabs(wall->offset) +
                    fabs(wall->excess) * wall->span;
     for (int j = 0; j < system->d; j++) {
         reach += (fabs(row[j].re) + fabs(row[j].im)) * arms[j];
@@ -183,8 +183,12 @@ PRBM bool impact_near(Simulation *sim) {
     bound_arms(sim, arms);
     for (int s = 0; s < system->s; s++) {
         double near = TOUCHING_RTOL * system->length;
-        if (open_stop(&sim->equations, s) && !(gap(&sim->equations, s, sim->state.arc.start, e) >
-                                               near + gap_reach(sim, s, e, arms))) {
+        if (!open_stop(&sim->equations, s)) {
+            continue;
+        }
+        double start = sim->state.arc.start;
+        double distance = gap(&sim->equations, s, start, e, extra_states(sim, sim->state.arc.y));
+        if (!(distance > near + gap_reach(sim, s, e, arms))) {
             return true;
         }
     }
@@ -236,17 +240,17 @@ static double guard_at(const ArcGuard *guard, double t) {
     const System *system = system_of(sim);
     Located *located = &sim->stepping.located;
     double *y = located->y;
-    Instant at = {t, y, y + system->n, located->e, NULL, NULL};
+    Instant at = {t, y, y + system->n, extra_states(sim, y), located->e, NULL};
     arc_at(sim, t, y);
     if (guard->forces) {
         Problem problem;
         Evaluation *evaluation = &located->evaluation;
-        if (!evaluate_equations(&sim->equations, t, y, y + system->n, NULL, evaluation, &problem)) {
+        if (!evaluate_equations(&sim->equations, t, y, at.v, at.extra, NULL, evaluation,
+                                &problem)) {
             return no_guard(search, problem.text);
         }
         at.e = evaluation->at.e;
-        at.lam = evaluation->lam;
-        at.a = evaluation->a;
+        at.found = evaluation;
     } else {
         directions(system, y, located->e);
     }
@@ -348,8 +352,8 @@ static bool polish_impact(const Search *search, double apex, double *time) {
             return false;
         }
         directions(system_of(sim), y, e);
-        double distance = sign * gap(&sim->equations, stop, t, e);
-        double speed = sign * gap_rate(&sim->equations, stop, t, e, y + n);
+        double distance = sign * gap(&sim->equations, stop, t, e, extra_states(sim, y));
+        double speed = sign * gap_rate(&sim->equations, stop, t, e, y + n, extra_states(sim, y));
         double change = -distance / speed;
         if (speed >= 0.0 || fabs(distance) <= EVENT_TIME_ATOL * fabs(speed) ||
             fabs(change) > EVENT_CORRECTION_RTOL * located->h) {
@@ -367,18 +371,25 @@ static double sample_time(const Simulation *sim, int k) {
     return sim->state.arc.start + sim->state.arc.h * ((double)k / (double)GUARD_INTERVALS);
 }
 
-/* Compute positions, rates and directions at the samples of the step. */
+/* The number of states that are computed at a sample: positions, rates and, with compliant stops,
+ * all others. */
+static int sample_size(const Simulation *sim) {
+    bool compliant = system_of(sim)->mechanism->compliant_count > 0;
+    return compliant ? state_size(sim) : 2 * system_of(sim)->n;
+}
+
+/* Compute states and directions at the samples of the step. */
 PRBM void sample_arc(Simulation *sim) {
     const Arc *arc = &sim->state.arc;
     Stepping *stepping = &sim->stepping;
-    int n = system_of(sim)->n, ny = state_size(sim);
+    int size = sample_size(sim), ny = state_size(sim);
     for (int k = 0; k <= GUARD_INTERVALS; k++) {
-        double *y = stepping->sample_y + k * 2 * n;
-        zeros(2 * n, y);
+        double *y = stepping->sample_y + k * size;
+        zeros(size, y);
         for (int i = 0; i < STAGES; i++) {
-            add_scaled(2 * n, stepping->weights[k][i], arc->k + i * ny, y);
+            add_scaled(size, stepping->weights[k][i], arc->k + i * ny, y);
         }
-        for (int j = 0; j < 2 * n; j++) {
+        for (int j = 0; j < size; j++) {
             y[j] = arc->y[j] + arc->h * y[j];
         }
         directions(system_of(sim), y, stepping->sample_e + k * system_of(sim)->d);
@@ -387,9 +398,9 @@ PRBM void sample_arc(Simulation *sim) {
 
 static Instant sample(const Simulation *sim, int k) {
     int n = system_of(sim)->n;
-    const double *y = sim->stepping.sample_y + k * 2 * n;
+    const double *y = sim->stepping.sample_y + k * sample_size(sim);
     const Complex *e = sim->stepping.sample_e + k * system_of(sim)->d;
-    Instant at = {sample_time(sim, k), y, y + n, e, NULL, NULL};
+    Instant at = {sample_time(sim, k), y, y + n, extra_states(sim, y), e, NULL};
     return at;
 }
 

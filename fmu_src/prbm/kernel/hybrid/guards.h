@@ -5,12 +5,13 @@
 
 #include "hybrid/state.h"
 
-/* A state at which guards are evaluated; lam may be NULL for guards without forces. */
+/* A state at which guards are evaluated.  found: the evaluation there; NULL for guards without
+ * forces. */
 typedef struct {
     double time;
-    const double *q, *v;
+    const double *q, *v, *extra;
     const Complex *e;
-    const double *lam, *a;
+    const Evaluation *found;
 } Instant;
 
 typedef double GuardValue(const Equations *equations, const Instant *at, int contact);

@@ -45,15 +45,18 @@ static void output_stops(const Simulation *sim, double *out) {
     const System *system = system_of(sim);
     const Complex *e = sim->present.e;
     const double *v = sim->present.y + system->n;
+    const double *extra = extra_states(sim, sim->present.y), none[EXTRA_STATES] = {0.0};
     Rows gaps = gap_rows(system);
     for (int i = 0; i < system->s; i++) {
+        const Stop *stop = &system->mechanism->stops[i];
+        const double *given = stop->compliant ? extra + stop->extra : none;
         double *values = out + PER_STOP * i;
         WallMotion wall = wall_motion(&sim->state.walls[i], sim->state.time);
         double value = row_value(&gaps, i, e) + gaps.c[i], rate = row_rate(&gaps, i, e, v);
-        values[STOP_GAP] = value + wall.x;
-        values[STOP_GAP_RATE] = rate + wall.v;
+        values[STOP_GAP] = value + wall.x + given[EXTRA_GIVE];
+        values[STOP_GAP_RATE] = rate + wall.v + given[EXTRA_GIVE_RATE];
         values[STOP_POINT_DISPLACEMENT] =
-            -value - field_value(sim, system->mechanism->stops[i].position);
+            -value - field_value(sim, stop->position);
         values[STOP_POINT_VELOCITY] = -rate;
     }
 }
@@ -69,9 +72,8 @@ static void output_compliant(Simulation *sim, double *out, double *latched) {
         out[COMPLIANT_INDENTATION] = depth;
         out[COMPLIANT_CONTACT_DURATION] = sim->state.latched[i].contact_duration;
         out += PER_COMPLIANT;
-        latched[PER_LATCHED * i + LATCHED_CONTACT] = sim->state.touching[i].phase != PHASE_NONE;
         latched[PER_LATCHED * i + LATCHED_IMPULSE_SUM] =
-            sim->present.y[extra_index(sim, i) + EXTRA_IMPULSE];
+            extra_of(sim, sim->present.y, i)[EXTRA_IMPULSE];
     }
 }
 
@@ -131,8 +133,8 @@ static bool output_motion(Simulation *sim, bool near, Problem *problem) {
     const Equations *q = &sim->equations;
     Present *present = &sim->present;
     double *out = present->outputs, *v = present->y + system_of(sim)->n;
-    if (!evaluate_equations(q, sim->state.time, present->y, v, near ? &present->reference : NULL,
-                            &present->evaluation, problem)) {
+    if (!evaluate_equations(q, sim->state.time, present->y, v, extra_states(sim, present->y),
+                            near ? &present->reference : NULL, &present->evaluation, problem)) {
         return false;
     }
     for (int i = 0; i < system_of(sim)->s; i++) {
@@ -189,7 +191,8 @@ static void output_energies(Simulation *sim) {
     out[ENERGY_ELASTIC] = elastic_energy(n, system->K, deflection);
     for (int i = 0; i < system->s; i++) {
         if (sim->state.touching[i].phase != PHASE_NONE) {
-            double distance = gap(&sim->equations, i, sim->state.time, sim->present.e);
+            double distance = gap(&sim->equations, i, sim->state.time, sim->present.e,
+                                  extra_states(sim, sim->present.y));
             out[ENERGY_ELASTIC] += contact_energy(&sim->equations.laws[i], distance);
         }
     }

@@ -129,7 +129,7 @@ PRBM void restart_peaks_from(Simulation *sim, const Evaluation *at) {
 static bool evaluate_front(Simulation *sim, Problem *problem) {
     const double *y = sim->state.front;
     return evaluate_equations(&sim->equations, sim->state.front_time, y, y + system_of(sim)->n,
-                              NULL, &sim->at_front, problem);
+                              extra_states(sim, y), NULL, &sim->at_front, problem);
 }
 
 PRBM bool restart_peaks(Simulation *sim, Problem *problem) {

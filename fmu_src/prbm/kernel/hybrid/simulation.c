@@ -25,6 +25,10 @@ PRBM int state_size(const Simulation *sim) {
     return 2 * m->coordinate_count + 2 + EXTRA_STATES * m->compliant_count;
 }
 
+PRBM const double *extra_states(const Simulation *sim, const double *y) {
+    return y + 2 * system_of(sim)->n + 2;
+}
+
 PRBM int contact_count(const Simulation *sim) {
     const Mechanism *m = sim->configuration.mechanism;
     return m->stop_count + m->friction_count;
@@ -113,7 +117,7 @@ static void place_stepping(Stepping *stepping, const System *system, Memory *mem
     stepping->end = place(memory, ny, d);
     stepping->error = place(memory, ny, d);
     stepping->coarse_error = place(memory, ny, d);
-    stepping->sample_y = place(memory, samples * 2 * n, d);
+    stepping->sample_y = place(memory, samples * ny, d);
     stepping->sample_e = place(memory, samples * (size_t)system->d, sizeof(Complex));
     stepping->located.y = place(memory, ny, d);
     stepping->located.e = place(memory, (size_t)system->d, sizeof(Complex));
@@ -397,7 +401,7 @@ static bool check_walls(Simulation *sim, Problem *problem) {
     const double *front = sim->state.front, t = sim->state.front_time;
     Complex *e = directions_at(sim, front);
     for (int i = 0; i < system_of(sim)->s; i++) {
-        double distance = gap(&sim->equations, i, t, e);
+        double distance = gap(&sim->equations, i, t, e, NULL);
         if (sim->configuration.mechanism->stops[i].compliant && distance < 0.0) {
             continue; /* A preload. */
         }
@@ -410,7 +414,7 @@ static bool check_walls(Simulation *sim, Problem *problem) {
                         name, -distance, name, wall, wall - distance);
         }
         if (struck < 0 && distance <= RELEASE_PENETRATION_ATOL &&
-            gap_rate(&sim->equations, i, t, e, front + n) < 0.0) {
+            gap_rate(&sim->equations, i, t, e, front + n, NULL) < 0.0) {
             struck = i;
         }
     }
@@ -432,7 +436,7 @@ static bool release_mechanism(Simulation *sim, Problem *problem) {
     set_inputs(sim);
     return start_state(sim, problem) &&
            project(&sim->equations, state->time, state->front, &sim->scratch, problem) &&
-           reject_unsupported(sim, problem) && check_walls(sim, problem) &&
+           check_walls(sim, problem) &&
            rephase(sim, problem) && settle(sim, rigid, count, NULL, problem) &&
            find_fastest(sim, problem);
 }

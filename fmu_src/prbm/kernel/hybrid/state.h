@@ -153,7 +153,7 @@ typedef struct {
     double *end;           /* (ny,) */
     double *error, *coarse_error; /* (ny,) */
     double weights[GUARD_INTERVALS + 1][STAGES]; /* of the dense output at the samples */
-    double *sample_y;      /* (2 n,) of each sample */
+    double *sample_y;      /* (2 n,) of each sample, or (ny,) with compliant stops */
     Complex *sample_e;     /* (d,) of each sample */
     Located located;
     Node middle;           /* of the latest step */

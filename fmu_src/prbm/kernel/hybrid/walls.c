@@ -44,14 +44,14 @@ PRBM double push_wall(Simulation *sim, int i, double P) {
  * following step is longer, so that a jump is not extrapolated beyond its own size.  Before the
  * first step, the velocity of a wall is that of its reference.  A wall whose hit point moves by a
  * change of stop.offset joins its reference anew.  set: whether parameters have been set. */
-PRBM void join_walls(Simulation *sim, double time, bool set, Wall *joined) {
+PRBM void join_walls(Simulation *sim, double time, bool set, const Wall *present, Wall *joined) {
     State *state = &sim->state;
     double now = state->time, last = now - state->point, following = time - now;
     double H = pass_point(sim, time);
     double share = lesser(H / following, 1.0), least = WALL_PATH_RTOL * system_of(sim)->length;
     for (int i = 0; i < system_of(sim)->s; i++) {
         const Stop *stop = &sim->configuration.mechanism->stops[i];
-        Wall wall = state->walls[i], line = given_reference(sim, i);
+        Wall wall = present[i], line = given_reference(sim, i);
         WallMotion here = wall_motion(&wall, now);
         double off = line.position - wall.position - wall.rate * (now - wall.since);
         double moved = off - (set ? field_change(sim, stop->position) : 0.0);
