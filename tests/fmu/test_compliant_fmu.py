@@ -7,7 +7,6 @@ from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 
 from point_mass import point_mass
-from prbm.base.errors import MechanismError
 from prbm.fmu import native_fmu, python_fmu
 from prbm.hybrid.simulation import Simulation
 
@@ -41,7 +40,8 @@ def test_fmus_with_a_compliant_stop_simulate_like_the_engine(path, events):
     if events and description.fmiVersion != "3.0":
         pytest.skip("FMI 3.0 only")
     assert not validate_fmu(path)
-    assert description.modelExchange is None
+    python = description.coSimulation.needsExecutionTool
+    assert (description.modelExchange is None) == bool(python)
     found = simulate_fmu(
         path, stop_time=END, output_interval=STEP, output=list(OUTPUTS),
         use_event_mode=events, early_return_allowed=events,
@@ -100,7 +100,29 @@ def test_a_state_saved_in_contact_restores_in_an_fmu(path, tmp_path):
     fmu.freeInstance()
 
 
+@pytest.mark.fmu
+@pytest.mark.native
+@pytest.mark.parametrize("friction", [0.0, 0.3])
 @pytest.mark.parametrize("version", [2, 3])
-def test_a_native_fmu_with_friction_at_a_compliant_stop_is_rejected(version):
-    with pytest.raises(MechanismError, match="use the Python engine or a Python FMU"):
-        native_fmu.build(point_mass(friction=0.2), {}, version)
+def test_model_exchange_with_a_compliant_stop_is_the_motion_of_the_engine(
+    version, friction, tmp_path
+):
+    own = point_mass(stiffness=1e5, restitution=0.5, friction=friction, direction=25.0)
+    path = tmp_path / "PointMass.fmu"
+    path.write_bytes(native_fmu.build(own, {}, version))
+    found = simulate_fmu(
+        str(path), fmi_type="ModelExchange", solver="CVode", stop_time=END, output_interval=STEP,
+        relative_tolerance=1e-8, output=list(OUTPUTS), record_events=False,
+    )  # fmt: skip
+    sim = Simulation(own)
+    for row in found:
+        sim.advance(float(row["time"]))
+        expected = sim.outputs()
+        for name in OUTPUTS:
+            rough = name in ("stop.peak_force", "stop.indentation")
+            size = max(abs(float(expected[name])), 1e-2 * float(abs(found[name]).max()), 1e-9)
+            assert abs(float(row[name]) - expected[name]) < (2e-2 if rough else 1e-4) * size, (
+                row,
+                name,
+            )
+    assert expected["stop.impact_count"] == 1

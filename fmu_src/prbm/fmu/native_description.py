@@ -76,34 +76,11 @@ def description(
     return _fmi3(heading, mechanism, interface)
 
 
-def exchangeable(mechanism: Mechanism) -> bool:
-    """Return whether a native FMU has model exchange: not with compliant stops."""
-    return not any(stop.compliant for stop in mechanism.stops)
-
-
 def _capabilities(
     root: Element, kind: str, identifier: str, capabilities: Iterable[str]
 ) -> Element:
     attributes = {"modelIdentifier": identifier} | dict.fromkeys(capabilities, "true")
     return SubElement(root, kind, attributes)
-
-
-def _kinds(
-    root: Element,
-    mechanism: Mechanism,
-    identifier: str,
-    exchange: Iterable[str],
-    simulation: Iterable[str],
-) -> list[Element]:
-    """Add the kinds of the FMU with their capabilities, and return their elements."""
-    kinds = [("ModelExchange", exchange)] if exchangeable(mechanism) else []
-    kinds.append(("CoSimulation", simulation))
-    return [_capabilities(root, kind, identifier, flags) for kind, flags in kinds]
-
-
-def _indicators(mechanism: Mechanism, interface: NativeInterface) -> tuple[str, ...]:
-    """Return the names of the event indicators of model exchange."""
-    return interface.indicators if exchangeable(mechanism) else ()
 
 
 # --- FMI 2.0 ------------------------------------------------------------------------------------
@@ -112,9 +89,9 @@ def _indicators(mechanism: Mechanism, interface: NativeInterface) -> tuple[str, 
 def _fmi2(heading: Heading, mechanism: Mechanism, interface: NativeInterface, source: str) -> bytes:
     version = {"fmiVersion": "2.0", "modelName": heading.name, "guid": heading.guid}
     root = Element("fmiModelDescription", version | heading.attributes())
-    if exchangeable(mechanism):
-        root.set("numberOfEventIndicators", str(len(interface.indicators)))
-    for element in _kinds(root, mechanism, heading.name, EXCHANGE_2, SIMULATION_2):
+    root.set("numberOfEventIndicators", str(len(interface.indicators)))
+    for kind, capabilities in (("ModelExchange", EXCHANGE_2), ("CoSimulation", SIMULATION_2)):
+        element = _capabilities(root, kind, heading.name, capabilities)
         SubElement(SubElement(element, "SourceFiles"), "File", {"name": source})
     add_units(root, interface.variables)
     add_types(root, interface.variables)
@@ -160,7 +137,8 @@ def _fmi3(heading: Heading, mechanism: Mechanism, interface: NativeInterface) ->
     token = {"instantiationToken": heading.guid}
     version = {"fmiVersion": "3.0", "modelName": heading.name} | token
     root = Element("fmiModelDescription", version | heading.attributes())
-    _kinds(root, mechanism, heading.name, EXCHANGE_3, SIMULATION_3)
+    _capabilities(root, "ModelExchange", heading.name, EXCHANGE_3)
+    _capabilities(root, "CoSimulation", heading.name, SIMULATION_3)
     add_units(root, interface.variables)
     types = SubElement(root, "TypeDefinitions")
     for name, attributes in used_types(interface.variables):
@@ -190,7 +168,7 @@ def _fmi3(heading: Heading, mechanism: Mechanism, interface: NativeInterface) ->
         add_moving("ContinuousStateDerivative", name)
     for v in initial_unknowns(interface):
         add("InitialUnknown", v.name, initial_dependencies(v, interface.variables))
-    for name in _indicators(mechanism, interface):
+    for name in interface.indicators:
         add_moving("EventIndicator", name)
     return serialized(root)
 

@@ -23,7 +23,7 @@ LATCHED = (
 )  # fmt: skip
 """Latched outputs of all stops."""
 COMPLIANT = ("peak_force", "indentation", "contact_duration")
-"""Further outputs of compliant stops."""
+"""Further latched outputs of compliant stops."""
 
 
 def all_outputs(
@@ -71,6 +71,7 @@ def all_outputs(
         out |= {f"{stop.name}.{name}": getattr(latched[i], name) for name in names}
         if stop.compliant:
             out[f"{stop.name}.impulse_sum"] = float(extras[own.index(i, Extra.IMPULSE)])
+            out[f"{stop.name}.contact_loss"] = float(extras[own.index(i, Extra.LOSS)])
     out |= _links(system, q, v)
     out |= _stress(equations, peaks, q, v, evaluation)
     out |= others

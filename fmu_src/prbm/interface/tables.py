@@ -183,7 +183,7 @@ def _groups(mechanism: Mechanism, independent: Sequence[int]) -> dict[str, Itera
         ],
         "frequency": ["mode.frequency"],
         "calculated": [f"{name}.gamma0" for name in several],
-        "derivatives": state_derivatives(coordinates, independent),
+        "derivatives": state_derivatives(mechanism, coordinates, independent),
         "indicators": [
             *(f"{stop}.{kind}_indicator" for stop in stops for kind in INDICATORS),
             *(f"{friction.name}.slip_indicator" for friction in mechanism.frictions),

@@ -40,7 +40,9 @@ LATCHED = (
     "contact", "impact_count", "impact_time", "approach_speed", "rebound_speed", "impulse",
     "energy_lost", "modal_restitution", "impulse_sum",
 )  # fmt: skip
-COMPLIANT_OUTPUTS = ("peak_force", "indentation", "contact_duration")  # Of compliant stops only.
+COMPLIANT_OUTPUTS = ("peak_force", "indentation", "contact_duration", "contact_loss")
+"""Further outputs of compliant stops."""
+COMPLIANT_STORED = ("impulse_sum", "contact_loss")  # Those that are integrated, hence states.
 LINK_OUTPUTS = ("angle", "omega")
 STRETCH_OUTPUTS = ("strain", "strain_rate")
 FLEXURE_ANGLE = re.compile(r"^(link\[\d+\]|\w+\.(bend\[\d+\]|start|end))\.angle$")
@@ -524,6 +526,15 @@ def _of_compliant_stop(rigid: Iterator[Variable], stop: str, nominal: Scales) ->
         "settles; 0 until then", nominal, minimum=0.0,
     )  # fmt: skip
     yield replace(duration, variability="discrete")
+    yield _output(
+        f"{stop}.contact_loss", "J", "Energy lost in the contacts of the stop so far", nominal
+    )
+
+
+def compliant_states(mechanism: Mechanism) -> tuple[str, ...]:
+    """Return the outputs of compliant stops that are states of model exchange."""
+    stops = (stop.name for stop in mechanism.stops if stop.compliant)
+    return tuple(f"{stop}.{name}" for stop in stops for name in COMPLIANT_STORED)
 
 
 def _base(nominal: Scales) -> Iterator[Variable]:

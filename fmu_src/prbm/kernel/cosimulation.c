@@ -112,7 +112,7 @@ static bool goes_on(const Simulation *sim) {
 }
 
 /* Compute the walls with the displacements by forces of compliant stops in their motion. */
-static bool present_walls(Simulation *sim, Wall *walls, Problem *problem) {
+static bool fold_present(Simulation *sim, Wall *walls, Problem *problem) {
     size_t mark = sim->scratch.used;
     bool ok = true, any = false;
     memcpy(walls, sim->state.walls, (size_t)system_of(sim)->s * sizeof(Wall));
@@ -146,7 +146,7 @@ static bool begin_step(Simulation *sim, double time, Problem *problem) {
         return true;
     }
     bool set = values_changed(sim);
-    if (!present_walls(sim, present, problem)) {
+    if (!fold_present(sim, present, problem)) {
         return false;
     }
     sim->untouched = true;

@@ -295,8 +295,9 @@ typedef enum {
     COMPLIANT_PEAK_FORCE = 0,
     COMPLIANT_INDENTATION = 1,
     COMPLIANT_CONTACT_DURATION = 2,
+    COMPLIANT_CONTACT_LOSS = 3,
 } CompliantOutput;
-enum { PER_COMPLIANT = 3 };
+enum { PER_COMPLIANT = 4 };
 typedef enum {
     LINK_ANGLE = 0,
     LINK_OMEGA = 1,
@@ -323,6 +324,7 @@ typedef enum {
     STRESS_PEAK_STRESS_POSITION = 5,
 } StressOutput;
 enum { PER_STRESS = 6 };
+enum { EXCHANGED_STATES = 2 };
 typedef enum {
     INDICATOR_IMPACT = 0,
     INDICATOR_RELEASE = 1,

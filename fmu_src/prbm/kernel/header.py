@@ -25,6 +25,7 @@ from ..interface.variables import (
     BASE_OUTPUTS,
     BODY_OUTPUTS,
     COMPLIANT_OUTPUTS,
+    COMPLIANT_STORED,
     ENERGIES,
     INDICATORS,
     LATCHED,
@@ -189,6 +190,7 @@ def _groups() -> Iterator[str]:
     ):
         yield _enumeration(f"{name.capitalize()}Output", name, _numbers(outputs))
         yield _constant(f"PER_{name}", len(outputs))
+    yield _constant("EXCHANGED_STATES", len(COMPLIANT_STORED))  # Of a compliant stop.
     yield _enumeration("StopIndicator", "INDICATOR", _numbers(INDICATORS))
     yield _constant("STOP_INDICATORS", len(INDICATORS))
 

@@ -64,6 +64,7 @@
 #include "tangent.c"
 #include "tangent_indicators.c"
 #include "tangent_stress.c"
+#include "tangent_contact.c"
 #ifdef PRBM_ENGINE
 #include "engine.c"
 #else

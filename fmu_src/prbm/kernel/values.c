@@ -16,9 +16,6 @@ PRBM bool simulation_start(Simulation *simulation, double start_time, double tol
     Simulation *sim = simulation;
     SimulationMode mode = {exchange, exchange ? LOWEST_BOUNCE_RTOL : 0.0};
     keep_backup(sim);
-    if (exchange && sim->configuration.mechanism->compliant_count > 0) {
-        return fail(problem, "compliant stops are simulated in co-simulation only");
-    }
     bool ok = start_motion(sim, start_time, tolerance, mode, problem);
     if (ok && exchange) {
         exchange_begin(sim);
@@ -68,7 +65,11 @@ static bool get_derivative(Simulation *sim, int k, double *x, Problem *problem) 
     if (!present_moment(sim, &now, problem)) {
         return false;
     }
-    *x = now.rates[k < count ? n + m->independent[k] : 2 * n + k - count];
+    int contact = k - count - 2, stored = contact % EXCHANGED_STATES;
+    int extra = EXTRA_STATES * (contact / EXCHANGED_STATES) + EXTRA_IMPULSE + stored;
+    *x = now.rates[k < count     ? n + m->independent[k]
+                   : contact < 0 ? 2 * n + k - count
+                                 : 2 * n + 2 + extra];
     return true;
 }
 

@@ -48,3 +48,14 @@ PRBM double contact_energy(const ComplianceLaw *law, double d) {
 PRBM double contact_tangent(const ComplianceLaw *law, double d) {
     return law->exponent * elastic_force(law, d) / d;
 }
+
+PRBM double contact_stiffness(const ComplianceLaw *law, double d) {
+    if (law->exponent == 1.0) {
+        return law->stiffness;
+    }
+    return d == 0.0 ? 0.0 : contact_tangent(law, d);
+}
+
+PRBM double damping_slope(const ComplianceLaw *law, const Touching *touching) {
+    return touching->phase == PHASE_RISING ? 0.0 : law->damping / touching->reference_speed;
+}

@@ -16,5 +16,8 @@ PRBM double contact_force(const ComplianceLaw *law, const Touching *touching, do
                           double rate);
 PRBM double contact_energy(const ComplianceLaw *law, double d);
 PRBM double contact_tangent(const ComplianceLaw *law, double d); /* d > 0 */
+PRBM double contact_stiffness(const ComplianceLaw *law, double d); /* any d */
+/* Change of the damping ratio per change of the rate of the indentation. */
+PRBM double damping_slope(const ComplianceLaw *law, const Touching *touching);
 
 #endif

@@ -9,8 +9,8 @@
  * independently of other contacts. */
 PRBM int slip_sign(ContactMode mode); /* Sign of the sliding velocity: -1, 0 or +1. */
 
-/* A contact at a compliant stop.  Its phase is PHASE_NONE at other stops.  A settled stop whose mode
- * is CONTACT_OPEN has no force; this occurs only while modes are tried. */
+/* A contact at a compliant stop.  Its phase is PHASE_NONE at other stops.  A settled stop whose
+ * mode is CONTACT_OPEN has no force; this occurs only while modes are tried. */
 typedef struct {
     Phase phase;
     double reference_speed, depth;

@@ -543,8 +543,8 @@ RARE void add_pressure(const Equations *q, Evaluation *result) {
     }
 }
 
-/* Add pressed stops and their friction, slipping friction points, and the accelerations of the walls
- * of held stops. */
+/* Add pressed stops and their friction, slipping friction points, and the accelerations of the
+ * walls of held stops. */
 RARE void add_contacts_and_walls(const Equations *q, Evaluation *result) {
     add_pressure(q, result);
     for (int k = q->slipping_stops; k < q->slipping_count; k++) {

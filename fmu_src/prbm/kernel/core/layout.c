@@ -349,7 +349,7 @@ PRBM void lay_out_slots(Mechanism *m) {
         [SLOTS_STRESSES] = PER_STRESS * m->stressed_count,
         [SLOTS_FREQUENCY] = 1,
         [SLOTS_CALCULATED] = calculated_count(m),
-        [SLOTS_DERIVATIVES] = m->independent_count + 2,
+        [SLOTS_DERIVATIVES] = m->independent_count + 2 + EXCHANGED_STATES * m->compliant_count,
         [SLOTS_INDICATORS] = STOP_INDICATORS * m->stop_count + m->friction_count,
         [SLOTS_TIME] = 1,
     };

@@ -1,6 +1,7 @@
 /* Contacts at compliant stops: first touch, phases, settling, separation, and their outputs: the
  * twin of hybrid/compliant.py. */
 #include <math.h>
+#include <string.h>
 
 #include "core/matrix.h"
 #include "core/modal.h"
@@ -211,8 +212,8 @@ static bool modal_ratio(Simulation *sim, int stop, double *result, Problem *prob
     size_t mark = sim->scratch.used;
     const System *system = system_of(sim);
     int n = system->n;
-    const double *front = sim->state.front, *after = front + n, *before = first_state(sim, stop) + n;
-    const double *first = before + n;
+    const double *front = sim->state.front, *after = front + n;
+    const double *before = first_state(sim, stop) + n, *first = before + n;
     double *phi = take(&sim->scratch, (size_t)n), *M = take_matrix(&sim->scratch, n, n);
     double arriving = dot(n, first, before), leaving = 0.0, size = 0.0;
     bool ok = fundamental_at(system, front, phi, M, &sim->scratch, problem);
@@ -361,72 +362,126 @@ PRBM void fold_gives(Simulation *sim) {
     }
 }
 
-/* Settle a calm contact if its force as a constraint is close to its elastic force.  A contact that
- * is stuck does not move: it stays a force. */
-static bool try_to_settle(Simulation *sim, int stop, double depth, Problem *problem) {
+/* A contact, its wall and its states before an attempt to settle it. */
+typedef struct {
+    Touching touching;
+    ContactMode mode;
+    Wall wall;
+    double give, give_rate;
+    bool has_k1;
+} Unsettled;
+
+/* Make a pressed stop a constraint. */
+static Unsettled hold_contact(Simulation *sim, int stop, double depth) {
     State *state = &sim->state;
+    double *extra = extra_of(sim, state->front, stop);
+    Unsettled before = {state->touching[stop], state->modes[stop],     state->walls[stop],
+                        extra[EXTRA_GIVE],     extra[EXTRA_GIVE_RATE], state->has_k1};
+    fold_give(&state->walls[stop], state->front_time, extra);
+    set_phase(sim, stop, PHASE_SETTLED, before.touching.reference_speed, depth);
+    return before;
+}
+
+/* Undo hold_contact. */
+static void press_again(Simulation *sim, int stop, const Unsettled *before) {
+    State *state = &sim->state;
+    double *extra = extra_of(sim, state->front, stop);
+    state->walls[stop] = before->wall;
+    extra[EXTRA_GIVE] = before->give;
+    extra[EXTRA_GIVE_RATE] = before->give_rate;
+    state->modes[stop] = before->mode;
+    set_phase(sim, stop, before->touching.phase, before->touching.reference_speed, 0.0);
+    state->has_k1 = before->has_k1;
+}
+
+/* Make a calm contact a constraint if its force is then close to its elastic force; *held: whether
+ * it is.  A contact that is stuck does not move: it stays a force. */
+static bool hold_if_balanced(Simulation *sim, int stop, double depth, Unsettled *before,
+                             bool *held, Problem *problem) {
+    const double *q = sim->state.front, *v = q + system_of(sim)->n;
     bool stuck;
+    *held = false;
     if (!is_stuck(sim, stop, &stuck, problem)) {
         return false;
     }
     if (stuck) {
         return true;
     }
-    const double *q = state->front, *v = q + system_of(sim)->n;
-    Touching before = state->touching[stop];
-    ContactMode mode = state->modes[stop];
-    double *extra = extra_of(sim, state->front, stop);
-    double give = extra[EXTRA_GIVE], give_rate = extra[EXTRA_GIVE_RATE];
-    Wall wall = state->walls[stop];
-    bool has_k1 = state->has_k1;
-    fold_give(&state->walls[stop], state->front_time, extra);
-    set_phase(sim, stop, PHASE_SETTLED, before.reference_speed, depth);
-    if (!evaluate_equations(&sim->equations, state->front_time, q, v, extra_states(sim, q), NULL,
-                            &sim->at_front, problem)) {
+    *before = hold_contact(sim, stop, depth);
+    if (!evaluate_equations(&sim->equations, sim->state.front_time, q, v, extra_states(sim, q),
+                            NULL, &sim->at_front, problem)) {
         return false;
     }
     double elastic = elastic_force(&sim->equations.laws[stop], depth);
     double force = stop_force(&sim->equations, sim->at_front.lam, stop);
-    if (fabs(force - elastic) > SETTLING_FACTOR * SETTLED_FORCE_RTOL * elastic) {
-        state->walls[stop] = wall;
-        extra[EXTRA_GIVE] = give;
-        extra[EXTRA_GIVE_RATE] = give_rate;
-        state->modes[stop] = mode;
-        set_phase(sim, stop, before.phase, before.reference_speed, 0.0);
-        state->has_k1 = has_k1;
+    *held = fabs(force - elastic) <= SETTLING_FACTOR * SETTLED_FORCE_RTOL * elastic;
+    if (!*held) {
+        press_again(sim, stop, before);
+    }
+    return true;
+}
+
+/* Record since when a contact is calm; *due: whether it has been calm for a contact time. */
+static bool watch_contact(Simulation *sim, int stop, double gap_now, double rate, bool *due,
+                          Problem *problem) {
+    Touch *begun = &sim->state.touches[stop];
+    double inverse_mass;
+    *due = false;
+    if (!is_pressed(&sim->state.touching[stop])) {
         return true;
     }
-    state->arc.valid = false;
-    return stop_motion(sim, stop, problem) && end_impact(sim, stop, problem) &&
-           settle(sim, NULL, 0, NULL, problem);
+    if (!is_calm(sim, stop, gap_now, rate)) {
+        begun->calm = false;
+        begun->calm_since = 0.0;
+        return true;
+    }
+    begun->calm_since = begun->calm ? begun->calm_since : sim->state.front_time;
+    begun->calm = true;
+    if (!point_mobility(sim, stop, &inverse_mass, problem)) {
+        return false;
+    }
+    double stiffness = contact_tangent(&sim->equations.laws[stop], -gap_now);
+    double time = 0.5 * TWO_PI / sqrt(stiffness * inverse_mass);
+    *due = sim->state.front_time - begun->calm_since >= time;
+    return true;
 }
 
 PRBM bool settle_calm(Simulation *sim, Problem *problem) {
-    double gaps[STOPS_MAX], rates[STOPS_MAX], inverse_mass;
+    double gaps[STOPS_MAX], rates[STOPS_MAX];
     if (!latch_peaks(sim, sim->state.front_time, problem)) {
         return false;
     }
     gaps_and_rates(sim, gaps, rates);
     for (int i = 0; i < system_of(sim)->s; i++) {
-        Touch *begun = &sim->state.touches[i];
-        if (!is_pressed(&sim->state.touching[i])) {
-            continue;
-        }
-        if (!is_calm(sim, i, gaps[i], -rates[i])) {
-            begun->calm = false;
-            begun->calm_since = 0.0;
-            continue;
-        }
-        begun->calm_since = begun->calm ? begun->calm_since : sim->state.front_time;
-        begun->calm = true;
-        if (!point_mobility(sim, i, &inverse_mass, problem)) {
+        Unsettled before;
+        bool due, held = false;
+        if (!watch_contact(sim, i, gaps[i], -rates[i], &due, problem) ||
+            (due && !hold_if_balanced(sim, i, -gaps[i], &before, &held, problem))) {
             return false;
         }
-        double stiffness = contact_tangent(&sim->equations.laws[i], -gaps[i]);
-        double time = 0.5 * TWO_PI / sqrt(stiffness * inverse_mass);
-        if (sim->state.front_time - begun->calm_since >= time &&
-            !try_to_settle(sim, i, -gaps[i], problem)) {
+        sim->state.arc.valid = sim->state.arc.valid && !held;
+        if (held && !(stop_motion(sim, i, problem) && end_impact(sim, i, problem) &&
+                      settle(sim, NULL, 0, NULL, problem))) {
             return false;
+        }
+    }
+    return true;
+}
+
+PRBM bool settles_here(Simulation *sim, bool *result, Problem *problem) {
+    double gaps[STOPS_MAX], rates[STOPS_MAX];
+    gaps_and_rates(sim, gaps, rates);
+    *result = false;
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        Unsettled before;
+        bool due, held = false;
+        if (!watch_contact(sim, i, gaps[i], -rates[i], &due, problem) ||
+            (due && !hold_if_balanced(sim, i, -gaps[i], &before, &held, problem))) {
+            return false;
+        }
+        if (held) {
+            press_again(sim, i, &before);
+            *result = true;
         }
     }
     return true;
@@ -490,6 +545,64 @@ PRBM void peaks_until(Simulation *sim, int stop, double time, double *depth, dou
         *depth = greater(*depth, largest_value(sim, stop, false, arc->start, end));
         *force = greater(*force, largest_value(sim, stop, true, arc->start, end));
     }
+}
+
+static Dent dent_now(Simulation *sim, int stop, double gap_now, double rate,
+                     const Evaluation *at) {
+    size_t mark = sim->scratch.used;
+    const Equations *q = &sim->equations;
+    const ComplianceLaw *law = &q->laws[stop];
+    const Touching *touching = &q->contacts.touching[stop];
+    const double *front = sim->state.front;
+    double t = sim->state.front_time;
+    Dent dent = {1.0, t, -gap_now, rate, at->pressure[stop], 0.0};
+    if (touching->phase != PHASE_FREE) {
+        double bend = -gap_acceleration(q, stop, t, directions_at(sim, front),
+                                        front + system_of(sim)->n, at);
+        dent.force_rate = contact_stiffness(law, dent.depth) * rate *
+                              damping_ratio(law, touching, rate) +
+                          elastic_force(law, dent.depth) * damping_slope(law, touching) * bend;
+    }
+    sim->scratch.used = mark;
+    return dent;
+}
+
+/* Return the largest value of a cubic from (0, a) to (h, b) with the rates u and w there. */
+static double largest_of_cubic(double h, double a, double u, double b, double w) {
+    double c3 = 2.0 * (a - b) / h + u + w, c2 = 3.0 * (b - a) / h - 2.0 * u - w;
+    double best = greater(a, b), root = c2 * c2 - 3.0 * c3 * u;
+    if (root > 0.0) { /* s = t/h at the maximum: 3 c3 s^2 + 2 c2 s + u = 0. */
+        double s = u / (sqrt(root) - c2);
+        double value = a + h * s * (u + s * (c2 + s * c3));
+        best = s > 0.0 && s < 1.0 ? greater(best, value) : best;
+    }
+    return best;
+}
+
+PRBM bool latch_present(Simulation *sim, const Evaluation *at, bool smooth, Problem *problem) {
+    double gaps[STOPS_MAX], rates[STOPS_MAX];
+    bool ok = true;
+    gaps_and_rates(sim, gaps, rates);
+    for (int k = 0; ok && k < sim->equations.pressed_count; k++) {
+        int i = sim->equations.pressed[k];
+        Latched *latched = &sim->state.latched[i];
+        double *stored = sim->state.dents + DENT_NUMBERS * (stop_of(sim, i)->extra / EXTRA_STATES);
+        Dent last, now = dent_now(sim, i, gaps[i], -rates[i], at);
+        memcpy(&last, stored, sizeof last);
+        double h = now.time - last.time;
+        if (smooth && last.known > 0.0 && h > 0.0) {
+            double depth = largest_of_cubic(h, last.depth, last.depth_rate, now.depth, -rates[i]);
+            double force =
+                largest_of_cubic(h, last.force, last.force_rate, now.force, now.force_rate);
+            latched->indentation = greater(latched->indentation, depth);
+            latched->peak_force = greater(latched->peak_force, force);
+        }
+        latched->indentation = greater(latched->indentation, now.depth);
+        latched->peak_force = greater(latched->peak_force, now.force);
+        memcpy(stored, &now, sizeof now);
+        ok = check_depth(sim, i, now.depth, now.time, problem);
+    }
+    return ok;
 }
 
 PRBM bool latch_peaks(Simulation *sim, double time, Problem *problem) {

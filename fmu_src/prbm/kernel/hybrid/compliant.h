@@ -17,6 +17,11 @@ PRBM void unsettle(Simulation *sim);
 PRBM bool press_released(Simulation *sim);
 /* Settle the contacts at the front that have been calm for a contact time. */
 PRBM bool settle_calm(Simulation *sim, Problem *problem);
+/* Whether settle_calm would settle a contact in model exchange, where the front is the present. */
+PRBM bool settles_here(Simulation *sim, bool *result, Problem *problem);
+/* Add force and indentation at the front to the maxima; at: an evaluation there.  If the motion is
+ * smooth since the last sample, cubics through both give the maxima between them. */
+PRBM bool latch_present(Simulation *sim, const Evaluation *at, bool smooth, Problem *problem);
 /* Compute the largest indentation and force of a stop up to a time of the latest step. */
 PRBM void peaks_until(Simulation *sim, int stop, double time, double *depth, double *force);
 /* Add the maxima up to a time of the latest step to the latched values. */

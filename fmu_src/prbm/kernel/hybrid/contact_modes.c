@@ -46,8 +46,8 @@ static bool presses(const Simulation *sim, int contact) {
     return is_stop(system_of(sim), contact) && is_pressed(&sim->state.touching[contact]);
 }
 
-/* The contact state in which a set of stops is held, and closed contacts and friction points slip if
- * they have a velocity and friction. */
+/* The contact state in which a set of stops is held, and closed contacts and friction points slip
+ * if they have a velocity and friction. */
 static void modes_holding(Simulation *sim, const HoldingSet *holding, const double *q,
                           const double *v, ContactMode *modes) {
     size_t mark = sim->scratch.used;
@@ -285,9 +285,9 @@ static bool rubs_pressed(const Simulation *sim, int contact) {
     return presses(sim, contact) && sim->state.touching[contact].phase != PHASE_FREE;
 }
 
-/* Collect the given stops, and the contacts with friction at rest, pressed stops among them.  Contacts that cannot move
- * independently are left out: loops and held stops carry their load.  sliding: the modes of the
- * contacts with friction that slide. */
+/* Collect the given stops, and the contacts with friction at rest, pressed stops among them.
+ * Contacts that cannot move independently are left out: loops and held stops carry their load.
+ * sliding: the modes of the contacts with friction that slide. */
 static bool find_rest(Simulation *sim, const HoldingSet *stops, const FrictionEvent *event,
                       const ContactMode *modes, RestContacts *rest,
                       ContactMode *sliding, Problem *problem) {

@@ -45,7 +45,7 @@ PRBM double switching_guard(const Equations *equations, const Instant *at, int c
 }
 
 /* The second derivative of the indentation, with which the reference speed rises. */
-static double rising_guard(const Equations *equations, const Instant *at, int contact) {
+PRBM double rising_guard(const Equations *equations, const Instant *at, int contact) {
     return -gap_acceleration(equations, contact, at->time, at->e, at->v, at->found);
 }
 

@@ -71,6 +71,7 @@ static void output_compliant(Simulation *sim, double *out, double *latched) {
         out[COMPLIANT_PEAK_FORCE] = force;
         out[COMPLIANT_INDENTATION] = depth;
         out[COMPLIANT_CONTACT_DURATION] = sim->state.latched[i].contact_duration;
+        out[COMPLIANT_CONTACT_LOSS] = extra_of(sim, sim->present.y, i)[EXTRA_LOSS];
         out += PER_COMPLIANT;
         latched[PER_LATCHED * i + LATCHED_IMPULSE_SUM] =
             extra_of(sim, sim->present.y, i)[EXTRA_IMPULSE];

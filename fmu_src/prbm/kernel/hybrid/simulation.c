@@ -58,10 +58,12 @@ static void place_numbers(State *state, const Mechanism *m, Memory *memory) {
         {&state->arc.y, ny},         {&state->arc.k, STAGES * ny},
         {&state->arc.before.y, 2 * n}, {&state->arc.before.a, n},
         {&state->first, 3 * n * (size_t)m->compliant_count},
+        {&state->dents, DENT_NUMBERS * (size_t)m->compliant_count},
         {&state->fastest, n},
         {&state->peaks, PEAK_NUMBERS * (size_t)m->stressed_count},
         {&state->floors, s},         {&state->accepted, n},
-        {&state->states, 2 * (size_t)m->independent_count + 2},
+        {&state->states, 2 * (size_t)m->independent_count + 2 +
+                             EXCHANGED_STATES * (size_t)m->compliant_count},
     };
     state->number_count = 0;
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {

@@ -54,6 +54,14 @@ typedef struct {
     double *y, *a; /* (2 n,) angles and rates, (n,) accelerations */
 } Node;
 
+/* Indentation and force of a stop, and their rates, at the end of a step of model exchange.  known:
+ * whether there has been one. */
+typedef struct {
+    double known, time, depth, depth_rate, force, force_rate;
+} Dent;
+
+enum { DENT_NUMBERS = sizeof(Dent) / sizeof(double) };
+
 /* The latest step with its dense output. */
 typedef struct {
     bool valid;
@@ -106,6 +114,7 @@ typedef struct {
     double *received;                     /* (3 per force): impulses that have acted */
     double *front, *k1;                   /* (ny,): state at the end of the last step, its rates */
     double *first;                        /* (c, 3 n): q, v and M phi at first touch */
+    double *dents;                        /* (c, DENT_NUMBERS): the latest samples, see Dent */
     double *fastest;                      /* (n,): shape of the fastest mode */
     double *peaks;                        /* (stressed flexures, PEAK_NUMBERS), see peaks.c */
     double *floors;                       /* (s,): depth below zero at which gaps close */
