@@ -134,3 +134,14 @@ def test_a_change_of_the_position_in_contact_is_work_of_the_wall(engine, time):
         assert energy_balance(sim.outputs()) == pytest.approx(start, abs=1e-6 * abs(start) + 1e-12)
     assert sim.outputs()["energy.work"] != before
     assert sim.outputs()["stop.contact"]
+
+
+@pytest.mark.parametrize("engine", [Simulation, KernelSimulation])
+def test_a_contact_does_not_shorten_the_steps_of_the_flight_after_it(engine):
+    steps, count = {}, 0
+    for own in (mechanism("PRBDM"), guide("PRBDM", 6e7)):
+        sim = engine(own)
+        sim.advance(0.2)
+        steps[own.stops[0].law], count = sim.step_count, sim.outputs()["stop.impact_count"]
+    assert count == 4
+    assert steps["compliant"] - steps["rigid"] <= 13 * count

@@ -408,16 +408,25 @@ def _largest(value: Callable[[float], float], start: float, end: float) -> float
 # --- steps ------------------------------------------------------------------------------------
 
 
-def shortened(controller: StepSizeController, front: Front, stop: int) -> StepSizeController:
+def shortened(
+    controller: StepSizeController, front: Front, stop: int
+) -> tuple[StepSizeController, Front]:
     """Return the controller of the first step of a contact, if a stop has been touched.
 
-    This step is a fraction of the depth of a free hit divided by its speed.
+    This step is a fraction of the depth of a free hit divided by its speed.  The front keeps the
+    step size so far.
     """
-    touching = front.contacts.touching[stop]
-    if touching is None:
-        return controller
+    touching, touch = front.contacts.touching[stop], front.touches[stop]
+    if touching is None or touch is None:
+        return controller, front
     law = front.equations.compliant.laws[stop]
     speed, power = touching.reference_speed, law.exponent + 1.0
     work = 0.5 * power * speed**2 / (law.stiffness * point_mobility(front, stop))
     h = rounded_step(TOUCH_STEP_FACTOR * math.pow(work, 1.0 / power) / speed)
-    return replace(controller, h=h) if h < controller.h else controller
+    front = front.with_touch(stop, replace(touch, step=controller.h))
+    return replace(controller, h=min(h, controller.h)), front
+
+
+def lengthened(controller: StepSizeController, touch: Touch | None) -> StepSizeController:
+    """Return the controller of the first step after a contact: the contact does not shorten it."""
+    return replace(controller, h=max(controller.h, touch.step)) if touch else controller

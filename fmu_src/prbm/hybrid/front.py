@@ -46,6 +46,8 @@ class Touch:
         M phi of the fundamental mode phi at first touch.
     calm_since : float or None
         Time from which the contact has been calm enough to settle [s].
+    step : float
+        Size of the integration steps before the contact, with which the next flight begins [s].
     """
 
     time: float
@@ -56,6 +58,7 @@ class Touch:
     v: tuple[float, ...] = ()
     momentum: tuple[float, ...] = ()
     calm_since: float | None = None
+    step: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -310,7 +310,11 @@ class Simulation:
         front = compliant.latched_until(self.configuration, self.front, self.arc, event.time)
         self._set_front(*events.apply(self.configuration, front, event))
         if event.kind is EventKind.IMPACT:
-            self.controller = compliant.shortened(self.controller, self.front, event.contact)
+            self.controller, self.front = compliant.shortened(
+                self.controller, self.front, event.contact
+            )
+        elif event.kind is EventKind.SEPARATION:
+            self.controller = compliant.lengthened(self.controller, front.touches[event.contact])
 
     def _set_front(self, front: Front, counted: list[Impact]) -> None:
         """Continue from a front without the step that led there."""

@@ -130,7 +130,7 @@ static bool begin_contact(Simulation *sim, int stop, double speed, bool counted,
     double least = greater(rest_speed_of(sim, stop), zero_speed(&sim->configuration));
     double *first = first_state(sim, stop);
     Touch begun = {sim->state.front_time, counted, extra[EXTRA_IMPULSE], extra[EXTRA_LOSS], false,
-                   0.0};
+                   0.0, 0.0};
     bool ok = true;
     sim->state.touches[stop] = begun;
     copy(2 * n, front, first);
@@ -255,6 +255,8 @@ PRBM bool separate(Simulation *sim, int stop, Problem *problem) {
     if (!end_impact(sim, stop, problem)) {
         return false;
     }
+    /* The contact does not shorten the steps after it. */
+    sim->state.step_size = greater(sim->state.step_size, sim->state.touches[stop].step);
     set_phase(sim, stop, PHASE_NONE, 0.0, 0.0);
     return settle(sim, NULL, 0, NULL, problem);
 }
@@ -287,9 +289,8 @@ static bool shorten_step(Simulation *sim, int stop, Problem *problem) {
     }
     double work = 0.5 * rise * (speed * speed) / (law->stiffness * inverse_mass);
     double h = rounded_step(TOUCH_STEP_FACTOR * power(work, 1.0 / rise) / speed);
-    if (h < sim->state.step_size) {
-        sim->state.step_size = h;
-    }
+    sim->state.touches[stop].step = sim->state.step_size;
+    sim->state.step_size = lesser(h, sim->state.step_size);
     return true;
 }
 

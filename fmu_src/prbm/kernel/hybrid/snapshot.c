@@ -9,7 +9,7 @@
 #include "hybrid/snapshot.h"
 
 /* Numbers of a simulation, of a stop, and further ones of a compliant stop. */
-enum { SCALARS = 25, PER_STOP_STATE = 16, PER_CONTACT_STATE = 12 };
+enum { SCALARS = 25, PER_STOP_STATE = 16, PER_CONTACT_STATE = 13 };
 
 PRBM size_t simulation_state_count(const Simulation *simulation) {
     const Mechanism *m = simulation->configuration.mechanism;
@@ -43,6 +43,7 @@ static double *put_contact(const State *state, int i, double *to) {
         touching->phase,  touching->reference_speed, touching->depth,
         begun->time,      begun->counted,            begun->impulse,
         begun->loss,      begun->calm,               begun->calm_since,
+        begun->step,
     };
     memcpy(to, contact, sizeof contact);
     return to + PER_CONTACT_STATE;
@@ -141,6 +142,7 @@ static void get_contact(State *state, int i, StateReader *reader) {
     begun->loss = get_number(reader);
     begun->calm = get_flag(reader);
     begun->calm_since = get_number(reader);
+    begun->step = get_number(reader);
 }
 
 static void get_stop(State *state, int i, StateReader *reader) {

@@ -46,6 +46,7 @@ typedef struct {
     double impulse, loss; /* states of the stop before the contact */
     bool calm;            /* whether the contact is calm enough to settle */
     double calm_since;
+    double step;          /* size of the steps before the contact */
 } Touch;
 
 /* A state of the motion through which an interpolation passes. */
