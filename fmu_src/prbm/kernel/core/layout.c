@@ -376,4 +376,5 @@ PRBM void lay_out_slots(Mechanism *m) {
         .count = at[SLOTS_GROUPS - 1] + counts[SLOTS_GROUPS - 1],
     };
     m->slots = slots;
+    m->state_count = 2 * m->coordinate_count + 2 + EXTRA_STATES * m->compliant_count;
 }

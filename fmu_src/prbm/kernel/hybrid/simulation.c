@@ -21,8 +21,7 @@ PRBM const System *system_of(const Simulation *sim) {
 }
 
 PRBM int state_size(const Simulation *sim) {
-    const Mechanism *m = sim->configuration.mechanism;
-    return 2 * m->coordinate_count + 2 + EXTRA_STATES * m->compliant_count;
+    return sim->configuration.mechanism->state_count;
 }
 
 PRBM const double *extra_states(const Simulation *sim, const double *y) {
@@ -45,7 +44,7 @@ PRBM Complex *directions_at(Simulation *sim, const double *q) {
 /* Place the arrays of numbers of the state one after another. */
 static void place_numbers(State *state, const Mechanism *m, Memory *memory) {
     size_t n = (size_t)m->coordinate_count, s = (size_t)m->stop_count;
-    size_t ny = 2 * n + 2 + EXTRA_STATES * (size_t)m->compliant_count;
+    size_t ny = (size_t)m->state_count;
     size_t np = (size_t)m->parameter_count, nu = (size_t)m->input_count;
     struct {
         double **array;
@@ -110,7 +109,7 @@ static void place_scratch(Scratch *scratch, const Mechanism *m, Memory *memory) 
 
 static void place_stepping(Stepping *stepping, const System *system, Memory *memory) {
     size_t n = (size_t)system->n, s = (size_t)system->s, d = sizeof(double);
-    size_t ny = 2 * n + 2 + EXTRA_STATES * (size_t)system->mechanism->compliant_count;
+    size_t ny = (size_t)system->mechanism->state_count;
     size_t samples = GUARD_INTERVALS + 1;
     evaluation_place(&stepping->evaluation, system, memory);
     reference_place(&stepping->reference, system, memory);
@@ -136,8 +135,8 @@ static void place_stepping(Stepping *stepping, const System *system, Memory *mem
 }
 
 static void place_present(Simulation *sim, const System *system, Memory *memory) {
-    size_t n = (size_t)system->n, d = sizeof(double);
-    size_t ny = 2 * n + 2 + EXTRA_STATES * (size_t)system->mechanism->compliant_count;
+    size_t d = sizeof(double);
+    size_t ny = (size_t)system->mechanism->state_count;
     Present *present = &sim->present;
     present->y = place(memory, ny, d);
     present->e = place(memory, (size_t)system->d, sizeof(Complex));
