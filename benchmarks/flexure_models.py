@@ -20,12 +20,14 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fmu_src"))
 
 from prbm import Mechanism, load
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.modal import modal_restitution, modes
+from prbm.mechanics.sections import static_section_loads
 from prbm.mechanics.statics import equilibrium, free_displacement
 from prbm.mechanics.system import System
 from prbm.mechanism import flexure
@@ -318,6 +320,55 @@ def heavy_table() -> str:
     return table(head, rows, ".4f")
 
 
+STRESS_STROKES = (0.01, 0.018)  # m
+
+
+def leaf_stress(displacement: float) -> float:
+    """Return the stress at the clamps of a fixed-guided leaf without axial force [Pa].
+
+    Each half of it is a cantilever with an end force.
+    """
+    v = load("PRBDM2R").values()
+    half, h = 0.5 * v["flexure.length"], v["flexure.thickness"]
+    target = 0.5 * displacement / half
+    force = float(brentq(lambda x: end_force(x).z.imag - target, 1e-3, 20.0, xtol=1e-12))
+    return force * end_force(force).z.real * v["flexure.youngs_modulus"] * h / 2 / half
+
+
+def held_stresses(model: str, displacement: float, height: float | None = None) -> Real:
+    """Return the stress by bending at the starts of both leaves [Pa], and the tension of the left.
+
+    The guide is held at its centre of mass, or at a height [m] above the leaves, without gravity.
+    """
+    mechanism = guide(model)
+    changes = {"gravity.x": 0.0} | ({} if height is None else {"shuttle.com_height": height})
+    system = assemble(mechanism, mechanism.values(changes))
+    loads = static_section_loads(system, equilibrium(system, displacement))
+    return np.array([*(-x.bending[0] / x.modulus[0] for x in loads), loads[0].tension[0]])
+
+
+def unloaded_height(model: str, displacement: float) -> float:
+    """Return the height at which the guide is held without axial forces in its leaves [m]."""
+    return float(
+        brentq(lambda y: held_stresses(model, displacement, y)[2], -0.022, -0.015, xtol=1e-9)
+    )
+
+
+def stress_table() -> str:
+    """Return the table of errors of the stress at the clamps of leaves [%]."""
+    rows = []
+    for model in (*MODELS[:3], "beam 3", "beam 5", *MODELS[4:]):
+        cells: list[Cell] = []
+        for x in STRESS_STROKES:
+            free = unloaded_height(model, x)
+            cells.append(100 * (float(held_stresses(model, x, free)[0]) / leaf_stress(x) - 1))
+        for x in STRESS_STROKES:
+            cells += list(100 * (held_stresses(model, x)[:2] / held_stresses("beam 7", x)[:2] - 1))
+        rows.append((model.replace("beam ", "beam, order "), cells))
+    head = ["model", "leaf, 10 mm", "18 mm", "left, 10 mm", "right", "left, 18 mm", "right"]
+    return table(head, rows, ".3f")
+
+
 TABLES: dict[str, Callable[[], str]] = {
     "beams": beam_table,
     "end force": force_table,
@@ -326,6 +377,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "guide": guide_table,
     "restitution": restitution_table,
     "heavy flexures": heavy_table,
+    "stress": stress_table,
 }
 MARKED = r"(<!-- table: {} -->\n)(.*?)(<!-- end -->)"
 

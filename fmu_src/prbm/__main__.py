@@ -8,9 +8,10 @@ MISTAKE, INTERRUPTED = 2, 130
 def main() -> int:
     """Run the command; return its exit status."""
     try:
-        from .commands.program import limit_threads
+        from .commands.program import escape_output, limit_threads
 
         limit_threads()
+        escape_output()
         from .commands.command_line import main as command  # imported here, to catch Ctrl-C
 
         return command()

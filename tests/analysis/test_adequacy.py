@@ -21,6 +21,9 @@ from prbm.analysis.adequacy import (
 )
 from prbm.analysis.flexure_models import stretching, with_flexures
 from prbm.files.mechanism_file import read_mechanism, shipped
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.modal import modes
+from prbm.mechanics.statics import equilibrium
 from support import SUPPORT, mechanism
 
 FINGER = read_mechanism(SUPPORT / "finger.toml")
@@ -62,6 +65,7 @@ def test_frequencies_of_the_finger_agree_with_finite_elements_only_if_it_stretch
     assert not found(stretching(FINGER), shapes=[Vibration()])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axial", [False, True])
 def test_restitution_of_the_finger_agrees_with_finite_elements_only_with_more_pivots(axial):
     pytest.importorskip("exudyn", reason="finite elements need exudyn: pip install exudyn")
@@ -145,6 +149,7 @@ def test_position_and_offset_of_an_impact_replace_those_of_the_stop():
     assert "displaced by 1 mm" in str(by_shape)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("choice", [{"model": "nR", "n": FINE_LINKS},
                                     {"model": "beam", "order": FINE_ORDER}], ids=str)  # fmt: skip
 def test_chains_of_many_links_and_beams_of_a_high_order_are_their_own_reference(choice):
@@ -173,6 +178,18 @@ def test_a_beam_of_a_low_order_is_compared_with_a_higher_one():
     assert result[STOP].better == pytest.approx(-0.182, abs=2e-3)
 
 
+def test_a_curved_beam_of_a_low_order_is_compared_with_a_higher_one():
+    """The finer model keeps the rise of the beams; order 3 has the frequency within a percent."""
+    bistable = mechanism("CurvedBistable")
+    result = found(with_flexures(bistable, "beam", axial=True, order=2), shapes=[Vibration()])
+    assert {one.cause for one in result.values()} == {Cause.PIVOTS}
+    assert {one.choice for one in result.values()} == {'model = "beam", order = 3, axial = true'}
+    (finding,) = result.values()
+    system = assemble(bistable, bistable.values())
+    own = modes(system, equilibrium(system)).frequency[finding.mode - 1]
+    assert finding.better == pytest.approx(own, rel=0.01)
+
+
 def test_a_mechanism_of_many_flexures_is_skipped_with_a_reason():
     """The finer model would have too many coordinates."""
     first = FINGER.flexures[0]
@@ -199,6 +216,7 @@ def test_frequencies_that_are_round_off_are_not_compared():
     assert not differ({key: 1.0}, second, key)
 
 
+@pytest.mark.slow
 def test_of_several_places_the_largest_difference_is_kept():
     shapes = [Impact(0, wall) for wall in (1e-3, 3e-3, 2e-3)]
     result = [one for one in check(FINGER, {}, shapes) if one.quantity is Quantity.RESTITUTION]

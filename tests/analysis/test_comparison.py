@@ -28,6 +28,7 @@ def guide():
     return compare(mechanism("PRBDM2R"), elements=8, measured=MEASURED)
 
 
+@pytest.mark.slow
 def test_a_chain_of_40_links_agrees_with_finite_elements():
     """Every quantity is within 0.9 %."""
     pytest.importorskip("exudyn", reason="finite elements need exudyn: pip install exudyn")

@@ -127,6 +127,7 @@ def test_the_closed_form_is_rejected_at_a_stop_on_a_moving_body():
         impact_map.closed_form(moving)
 
 
+@pytest.mark.slow
 def test_the_2r_with_stretching_flexures_agrees_with_finite_elements():
     """The error at the 25 points of the thesis is below 0.005; without stretch it exceeds 0.03."""
     pytest.importorskip(

@@ -63,7 +63,7 @@ def test_response_without_impacts_is_that_of_an_oscillator(kind):
     x = np.array(found.result["proof.x"])
     t = np.array(found.result["time"])
     rows = range(20, len(t), 150)
-    expected = [per_acceleration * oscillation(omega, 0.02, pulse, float(t[k])) for k in rows]
+    expected = [per_acceleration * oscillation(omega, 0.1, pulse, float(t[k])) for k in rows]
     assert x[rows] - x[0] == pytest.approx(expected, abs=2e-3 * np.abs(x).max())
 
 
@@ -89,17 +89,33 @@ def test_bump_stops_limit_the_displacement_and_are_hit():
     assert found.safety == pytest.approx(7e8 / found.peak_stress)
 
 
+def weak_springs():
+    """Return a small accelerometer without stops that yields at 50 MPa."""
+    mechanism = prbm.load(str(ROOT / "tests" / "support" / "accelerometer_1r.toml"))
+    kinds = tuple(replace(kind, yield_strength=5e7) for kind in mechanism.flexure_types)
+    return replace(mechanism, flexure_types=kinds, stops=())
+
+
 def test_safety_factor_at_the_level_of_failure_is_one():
-    weak = accelerometer()
-    kinds = tuple(replace(kind, yield_strength=5e7) for kind in weak.flexure_types)
-    weak = replace(weak, flexure_types=kinds, stops=())
-    pulse = Pulse("sawtooth", 1.0, 0.2e-3)
+    weak, pulse = weak_springs(), Pulse("sawtooth", 1.0, 0.2e-3)
     peaks = [20 * 9.80665, 100 * 9.80665, 400 * 9.80665]
-    found, level = fragility(weak, pulse, peaks, stop_time=0.5e-3)
-    assert [one.safety < 1.0 for one in found] == sorted(one.safety < 1.0 for one in found)
+    _, found, level = fragility(weak, pulse, peaks, stop_time=0.5e-3)
+    assert [one.safety < 1.0 for one in found] == [False, False, True]
     at = replace(pulse, peak=level)
     again = shock(weak, {at.input: at.signal}, duration=at.duration, stop_time=0.5e-3)
     assert again.safety == pytest.approx(1.0, rel=3e-3)
+
+
+@pytest.mark.parametrize("first", [60.0, 800.0])
+def test_search_for_the_level_of_failure_starts_on_either_side_of_it(first):
+    """Without stops the stress is in proportion to the peak, up to the stiffening at 30 um."""
+    pulse = Pulse("half-sine", first * 9.80665, 0.2e-3)
+    peaks, found, level = fragility(weak_springs(), pulse, stop_time=0.4e-3)
+    assert peaks == sorted(peaks)
+    fails = [one.safety < 1.0 for one in found]
+    assert fails in ([False] * (len(found) - 1) + [True], [False] + [True] * (len(found) - 1))
+    linear = pulse.peak * found[peaks.index(pulse.peak)].safety
+    assert level == pytest.approx(linear, rel=0.02)
 
 
 @pytest.mark.parametrize(
@@ -130,6 +146,9 @@ def run(line: str) -> int:
         ('--duration 1ms --peak "1 g" --set release.displacement=1mm', "a shock acts on the"),
         ('--record r.csv --peak "1 g"', "--record excludes --peak"),
         ('--duration 1ms --peaks 1 2 g --height "1 m"', "--peaks excludes"),
+        ("--sweep peak", "--duration is missing"),
+        ("--duration 1ms --sweep peak", "has no yield_strength: add it to the material"),
+        ("--record r.csv --sweep peak", "--record excludes --sweep"),
         ('--duration 0 --peak "1 g"', "duration = 0 s"),
     ],
 )
@@ -149,6 +168,7 @@ def test_the_command_prints_hits_stress_and_level_and_writes_files(tmp_path, cap
     }  # fmt: skip
     assert run(f"{line} --peaks 50 100 g") == cli.OK
     assert "at none of these peaks" in capsys.readouterr().out
+    assert (tmp_path / "Accelerometer-fragility.png").stat().st_size > 10_000
 
 
 def test_a_record_replaces_the_pulse(tmp_path, capsys):

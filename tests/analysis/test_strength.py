@@ -54,6 +54,7 @@ def test_life_passes_both_points_of_the_material():
     assert cycles_to_failure(0.9 * 1.2e9, 1.2e9, 4e8, 1e7) == pytest.approx(1e3)
     assert cycles_to_failure(4e8, 1.2e9, 4e8, 1e7) == pytest.approx(1e7)
     assert cycles_to_failure(0.0, 1.2e9, 4e8, 1e7) == math.inf
+    assert cycles_to_failure(1e-30, 1.2e9, 4e8, 1e7) == math.inf
 
 
 def test_tensile_mean_shortens_the_life_and_compressive_mean_does_not():
@@ -66,6 +67,22 @@ def test_damage_of_whole_cycles_is_their_number_over_the_life():
     history = [4e8, -4e8] * 50 + [4e8]
     assert damage(history, STEEL) == pytest.approx(50 / 1e7, rel=1e-9)
     assert damage(history, replace(STEEL, fatigue_strength=None)) is None
+
+
+def test_damage_of_three_blocks_is_that_of_the_problem_of_the_textbook():
+    """Shigley, 8th edition, problem 6-30: steel of 76 kpsi with an endurance limit of 30 kpsi.
+
+    It survives 4,000 reversed cycles of 48 kpsi, then 60,000 of 38 kpsi, then 209,160 of 32 kpsi.
+    A hundredth of each block has a hundredth of the damage.
+    """
+    steel = replace(
+        STEEL, yield_strength=None, tensile_strength=76.0, fatigue_strength=30.0, fatigue_cycles=1e6
+    )
+    for amplitude, life in ((48.0, 19_460), (38.0, 137_880), (32.0, 582_150)):
+        assert cycles_to_failure(amplitude, 76.0, 30.0, 1e6) == pytest.approx(life, rel=1e-3)
+    blocks = [(48.0, 40), (38.0, 600), (32.0, 2092)]
+    history = [x for amplitude, count in blocks for x in [amplitude, -amplitude] * count]
+    assert damage(history, steel) == pytest.approx(0.01, rel=5e-3)
 
 
 def test_half_cycles_count_half():

@@ -94,6 +94,7 @@ SELECTED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.native
 @pytest.mark.parametrize("options", SELECTED)
 def test_options_select_the_kinds_of_fmus(options, tmp_path, monkeypatch):
@@ -102,6 +103,7 @@ def test_options_select_the_kinds_of_fmus(options, tmp_path, monkeypatch):
     assert {p.name for p in (tmp_path / "dist").iterdir()} == SELECTED[options]
 
 
+@pytest.mark.slow
 @pytest.mark.native
 def test_the_variant_with_a_clock_is_simulated_in_event_mode(tmp_path):
     done = build(tmp_path, "--model", "PRBDM", "--clock", "--simulate")
@@ -124,7 +126,7 @@ def test_without_a_compiler_only_the_python_fmus_are_built(tmp_path, monkeypatch
     assert cli.main(["--model", "PRBDM"]) == cli.FAILED
     printed = capsys.readouterr()
     assert [p.name for p in (tmp_path / "dist").rglob("*.fmu")] == ["PRBDM.fmu"]
-    assert printed.err.startswith("build_fmu.py: only the Python FMUs were built: native FMUs need")
+    assert printed.err.startswith("build_fmu.py: only the Python FMUs were built: the kernel needs")
     assert "pip install ziglang" in printed.err
     assert printed.err.count("\n") == 1
 
@@ -308,6 +310,7 @@ def test_list_prints_the_shipped_mechanisms(capsys):
     assert all(len(line) < 120 for line in lines)
 
 
+@pytest.mark.slow
 def test_fmus_of_a_mechanism_file_have_the_name_of_the_mechanism(tmp_path):
     text = (ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml").read_text()
     (tmp_path / "mine.toml").write_text(text.replace('name = "PRBDM"', 'name = "Mine"'))
@@ -374,6 +377,7 @@ def test_a_folder_with_the_name_of_an_output_file_is_reported(name, tmp_path, mo
     assert f"{name}: it is a folder" in printed.err
 
 
+@pytest.mark.slow
 def test_an_unwritable_figure_is_reported_after_the_summary(fmus, tmp_path, capsys):
     assert report.main([str(fmus["PRBDM"]), str(tmp_path)]) == cli.MISTAKE
     printed = capsys.readouterr()
@@ -411,6 +415,7 @@ def summary_of(mechanisms, tmp_path, **changes: float) -> str:
     return "\n".join(report.summary(report.simulate(fmu, lambda fraction: None)))
 
 
+@pytest.mark.slow
 def test_an_impact_at_the_start_is_counted(mechanisms, tmp_path):
     summary = summary_of(
         mechanisms, tmp_path,
@@ -420,6 +425,7 @@ def test_an_impact_at_the_start_is_counted(mechanisms, tmp_path):
     assert "came to rest         at t = 0.000 s" in summary
 
 
+@pytest.mark.slow
 def test_an_unstable_equilibrium_is_reported_without_a_rest_position(mechanisms, tmp_path):
     """The flexures buckle under the weight of the shuttle."""
     summary = summary_of(
@@ -430,6 +436,7 @@ def test_an_unstable_equilibrium_is_reported_without_a_rest_position(mechanisms,
     assert "Hz" not in summary
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="sends a signal to a group of processes")
 @pytest.mark.parametrize("moment", [0.3, 1.3], ids=["importing", "simulating"])
 def test_ctrl_c_ends_a_simulation_without_a_summary(fmus, tmp_path, moment):

@@ -24,14 +24,14 @@ def completed(line: str) -> list[str]:
     )
     done = subprocess.run(["bash", "-c", program], capture_output=True, text=True, check=True)
     assert done.stderr == ""
-    return done.stdout.split()
+    return done.stdout.splitlines()
 
 
 @pytest.mark.parametrize(
     ("line", "words"),
     [
         ("prbm simu", ["simulate"]),
-        ("prbm m", ["modes", "measure"]),
+        ("prbm mo", ["modes", "modelica"]),
         ("prbm measure yo", ["youngs-modulus"]),
         ("prbm measure youngs-modulus --le", ["--length"]),
         ("prbm simulate --sto", ["--stop-time"]),
@@ -42,7 +42,7 @@ def completed(line: str) -> list[str]:
         ("prbm impact-map --h", ["--help"]),
         ("prbm completion ", ["--help", "bash"]),
         ("prbm study PRBDM --mi", ["--minimise"]),
-        ("prbm nonsense --s", []),
+        ("prbm nonsense --s", [""]),
     ],
 )
 def test_words_are_completed(line, words):
@@ -56,6 +56,28 @@ def test_mechanism_files_of_the_folder_are_proposed(tmp_path, monkeypatch):
     assert completed("prbm modes mi") == ["mine.toml"]
     names = [word for word in completed("prbm modes ") if not word.startswith("--")]
     assert names == [*shipped(), "mine.toml"]
+
+
+def test_names_with_blanks_stay_whole_and_folders_are_proposed(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("my guide.toml").write_text("")
+    Path("my parts").mkdir()
+    Path("my parts", "inner.toml").write_text("")
+    assert completed("prbm modes my") == ["my guide.toml", "my parts"]
+    assert completed("prbm modes 'my parts/'") == ["my parts/inner.toml"]
+
+
+def test_the_shell_escapes_blanks_of_file_names_alone(tmp_path, monkeypatch):
+    """The option ``filenames`` of bash is on if a file is proposed, and off for words."""
+    monkeypatch.chdir(tmp_path)
+    Path("my guide.toml").write_text("")
+    for word, options in (("my", "-o filenames"), ("PRBDM2R", "")):
+        program = (
+            f'{script(parser())}\ncompopt() {{ echo "$*"; }}\n'
+            f"COMP_WORDS=(prbm modes {word}); COMP_CWORD=2; _prbm"
+        )
+        done = subprocess.run(["bash", "-c", program], capture_output=True, text=True, check=True)
+        assert done.stdout.strip() == options
 
 
 def test_the_command_prints_the_script(capsys):

@@ -29,9 +29,9 @@ from support import ROOT, SUPPORT
 
 PAGE = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")
 COMMANDS = (
-    "list", "modes", "equilibrium", "simulate", "stress", "shock", "fit", "impact-map", "contact",
-    "sweep", "study", "picture", "animate", "explore", "validate", "measure youngs-modulus",
-    "measure calibration",
+    "list", "parameters", "modes", "equilibrium", "simulate", "stress", "shock", "fit",
+    "impact-map", "contact", "sweep", "study", "picture", "animate", "explore", "modelica",
+    "validate", "measure youngs-modulus", "measure calibration",
     "measure frequency", "measure restitution", "completion",
 )  # fmt: skip
 
@@ -55,6 +55,7 @@ def _empty_folder(tmp_path, monkeypatch):
 # --- page and help ----------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_signal_of_the_command_line_is_that_of_python(capsys):
     shock = "half-sine(20 g, 2 ms, 3 ms)"
     line = f"simulate PRBDM --input 'base.acceleration.x = {shock}' --stop-time 8ms --out ."
@@ -199,6 +200,7 @@ def test_written_simulation_obeys_the_impact_law_and_keeps_the_energy(capsys):
     assert np.ptp(energy) < 1e-7 * abs(energy).max()
 
 
+@pytest.mark.slow
 def test_spectrum_after_the_last_impact_peaks_at_a_mode(capsys):
     """The hammer vibrates freely after its last hit, at the frequency of the second mode."""
     line = "simulate ImpactOscillator --stop-time 0.45 --spectrum last --out ."
@@ -775,6 +777,7 @@ def environment() -> dict[str, str]:
     return os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, paths))}
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for single processes")
 def test_ctrl_c_ends_a_simulation_without_a_traceback():
     """The signal is sent after the first line of progress, during the simulation."""
@@ -818,6 +821,15 @@ def test_the_message_after_ctrl_c_names_the_command(monkeypatch, capsys):
     monkeypatch.setattr(cli, "_function", lambda _: ends)
     assert run("simulate PRBDM") == cli.INTERRUPTED
     assert capsys.readouterr().err == "prbm simulate: interrupted\n"
+
+
+def test_a_lack_of_memory_is_reported_in_one_sentence(monkeypatch, capsys):
+    def allocates(_: object) -> None:
+        np.empty(2**59)
+
+    monkeypatch.setattr(cli, "_function", lambda _: allocates)
+    assert run("simulate PRBDM") == cli.FAILED
+    assert capsys.readouterr().err.startswith("prbm simulate: there is not enough memory; choose ")
 
 
 @pytest.mark.parametrize(("command", "status"), [("--help", cli.OK), ("list", cli.FAILED)])

@@ -1,6 +1,8 @@
-"""The commands use one thread for linear algebra unless the environment sets a number."""
+"""Threads and output of the commands."""
 
+import io
 import os
+import sys
 from contextlib import suppress
 
 import pytest
@@ -22,3 +24,15 @@ def test_threads_of_linear_algebra_default_to_one(main, given, monkeypatch, caps
         main()
     assert capsys.readouterr().out.strip()
     assert {os.environ[name] for name in THREADS} == {given or "1"}
+
+
+@pytest.mark.parametrize("main", [__main__.main, build_fmu.main])
+def test_characters_that_the_output_cannot_encode_are_printed_as_escapes(main, monkeypatch):
+    printed = io.BytesIO()
+    monkeypatch.setattr("sys.stdout", io.TextIOWrapper(printed, encoding="ascii"))
+    monkeypatch.setattr("sys.argv", ["prbm", "--version"])
+    with suppress(SystemExit):
+        main()
+    print("3 \N{MICRO SIGN}m", flush=True)
+    assert printed.getvalue().splitlines()[-1] == rb"3 \xb5m"
+    sys.stdout.detach()

@@ -77,6 +77,7 @@ def test_damping_below_its_uncertainty_is_too_small_to_measure(zeta):
     assert count >= 17, "at 95 %, one interval in forty is above zero"
 
 
+@pytest.mark.slow
 def test_uncertainties_cover_the_true_values():
     """Each interval includes its true value in 68.3 % of 200 draws, -+ 3 standard deviations."""
     rng = np.random.default_rng(1)

@@ -72,6 +72,7 @@ def test_files_that_the_page_names_exist():
         assert any((folder / name).exists() for folder in folders), name
 
 
+@pytest.mark.slow
 def test_names_in_the_page_occur_in_the_sources():
     sources = [*PACKAGE.rglob("*.py"), *PACKAGE.rglob("*.[ch]"), *(ROOT / "tests").rglob("*.py")]
     text = "\n".join(path.read_text(encoding="utf-8") for path in sources)

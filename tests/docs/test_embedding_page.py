@@ -39,6 +39,7 @@ def printed(tmp_path, monkeypatch, capsys) -> str:
     return capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_coupling_errors_of_the_page_halve_with_the_step_and_masters_agree(printed):
     """The energies converge to the result of one solver as the step becomes shorter."""
     assert re.search(r"^base\.acceleration\.x \[m/s2\]: ", printed, re.MULTILINE)

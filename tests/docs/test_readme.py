@@ -29,6 +29,7 @@ def _built(fmus, native, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.fmu
 @pytest.mark.native
 @pytest.mark.usefixtures("_built")

@@ -16,6 +16,7 @@ PAGE = (ROOT / "docs" / "sweeps.md").read_text(encoding="utf-8")
 pytestmark = [pytest.mark.fmu, pytest.mark.native]
 
 
+@pytest.mark.slow
 def test_code_and_command_of_the_page_give_equal_results(native, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     Path("dist/fmi2").mkdir(parents=True)

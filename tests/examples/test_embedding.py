@@ -91,6 +91,7 @@ def test_voice_coil_rejects_an_invalid_stop_time(time, capsys):
     assert f"--stop-time {time}: must be finite and at least 0.0001 s" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_harvester_with_impacts_has_the_power_of_one_solver():
     """The mass hits each stop once per period.
 
@@ -190,6 +191,7 @@ def test_drop_test_rejects_an_invalid_height(capsys):
     assert "--heights: must be above 0 and at most 100 m" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_cosimulation_is_of_first_order_and_event_mode_has_no_delay(capsys, monkeypatch):
     """The order is one before an impact and, with event mode, also after two impacts."""
     run = example("model_exchange")
@@ -212,6 +214,7 @@ def test_cosimulation_is_of_first_order_and_event_mode_has_no_delay(capsys, monk
     assert is_picture("model_exchange.png")
 
 
+@pytest.mark.slow
 def test_escapement_conserves_momentum_and_converges_to_one_mechanism():
     """Momentum is exact to rounding, energy to the tolerance, times to the square of the step."""
     run = example("escapement")
@@ -230,6 +233,7 @@ def test_escapement_conserves_momentum_and_converges_to_one_mechanism():
     assert math.log2(time[0] / time[2]) / 2 == pytest.approx(2.0, abs=0.5)
 
 
+@pytest.mark.slow
 def test_escapement_prints_and_plots(capsys, monkeypatch):
     run = example("escapement")
     run.main.__globals__["STEPS"] = (2e-3, 1e-3)

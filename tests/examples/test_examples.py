@@ -33,6 +33,7 @@ def is_picture(path: str) -> bool:
         return image.format == "PNG" and min(image.size) > 300
 
 
+@pytest.mark.slow
 def test_quickstart_frequency_agrees_with_finite_elements_and_experiment(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -76,6 +77,7 @@ def test_quickstart_names_the_file_that_it_cannot_write() -> None:
         example("quickstart.py").main([])
 
 
+@pytest.mark.slow
 def test_quickstart_writes_a_film_of_a_motion_without_rest(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -90,6 +92,7 @@ def test_quickstart_writes_a_film_of_a_motion_without_rest(
     assert Path("quickstart.gif").exists()
 
 
+@pytest.mark.slow
 def test_parameter_study_agrees_with_the_scalar_equation() -> None:
     """The model rests earlier than the equation: bounces below the rest speed v_r are left out.
 
@@ -114,6 +117,7 @@ def test_scalar_equation_of_the_parameter_study_has_known_impact_times() -> None
     assert rest_time(0.6, release=-0.010, K_theta=2.5449) == pytest.approx(0.18034, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_parameter_study_writes_its_table_and_figure(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -142,6 +146,7 @@ def test_sweep_has_the_standard_deviation_of_first_order_propagation(
     assert capsys.readouterr().out == printed
 
 
+@pytest.mark.slow
 def test_stroke_controller_reaches_its_stroke_and_energies_balance(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -162,6 +167,7 @@ def test_stroke_controller_reaches_its_stroke_and_energies_balance(
     assert 10.0 < rate < 20.0
 
 
+@pytest.mark.slow
 def test_stroke_controller_prints_and_plots(capsys: pytest.CaptureFixture[str]) -> None:
     example("stroke_controller/run.py").main(["--stop-time", "1.0"])
     printed = capsys.readouterr().out
@@ -179,6 +185,7 @@ def test_stroke_controller_rejects_an_invalid_stop_time(
     assert f"--stop-time {time}: must be finite and at least 0.0005 s" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_stroke_controller_reports_too_few_impacts(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -221,3 +228,22 @@ def test_stroke_controller_pushes_in_the_direction_of_the_velocity(tmp_path: Pat
     controller.velocity = -0.1
     controller.do_step(0.0, 1e-3)
     assert controller.force == pytest.approx(-25.0 * 5e-3)
+
+
+def test_haptic_button_clicks_with_the_force_of_the_boundary_value_problem(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    example("haptic_button/run.py").main([])
+    printed = capsys.readouterr().out
+    lines = printed.splitlines()
+    peak, valley = map(float, re.findall(r"([\d.]+) N", lines[0]))
+    assert [peak, valley] == pytest.approx(
+        list(map(float, re.findall(r"([\d.]+) N", lines[1]))), rel=5e-3
+    )
+    assert valley < 0.5 * peak
+    static = float(re.findall(r"([\d.]+) MPa", lines[2])[0])
+    for line in lines[4:]:
+        stress, safety = map(float, re.findall(r"([\d.]+) MPa, safety factor ([\d.]+)", line)[0])
+        assert static < stress < 1.2 * static
+        assert safety == pytest.approx(830.0 / stress, rel=3e-3)
+    assert is_picture("haptic_button.png")

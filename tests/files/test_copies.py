@@ -419,6 +419,67 @@ centre = ["span/2 + {shift}", "50 mm"]
     assert joint.end.rpartition(".")[0] == owner
 
 
+BEADS = """
+[ground]
+root = [0, 0]
+foot = ["span/2", "-40 mm"]
+
+[[bodies]]
+name = "bead"
+mass = "1 g"
+inertia = "0.2 kg.mm2"
+centre = ["10 mm", 0]
+points.left = ["5 mm", 0]
+points.right = ["15 mm", 0]
+points.low = ["10 mm", "-5 mm"]
+repeat = { count = 4, step = ["span/2", 0] }
+
+[[flexures]]
+name = "first"
+type = "leaf"
+start = "ground.root"
+end = "bead.left"
+mirror = "x = 0.75*span + 10 mm"
+
+[[flexures]]
+name = "string"
+type = "leaf"
+start = "bead.right"
+end = "bead_2.left"
+repeat = { count = 3, step = ["span/2", 0] }
+
+[[flexures]]
+name = "leg"
+type = "leaf"
+start = "ground.foot"
+end = "bead_2.low"
+repeat = { count = 2, step = ["span/2", 0] }
+"""
+
+
+def test_copies_join_the_bodies_at_the_image_of_the_centre_whatever_their_names(tmp_path):
+    beads = read(tmp_path, BEADS, '[release]\nbody = "bead"\n')
+    joined = {f.name: (f.start, f.end.rpartition(".")[0]) for f in beads.flexures}
+    assert joined == {
+        "first": ("ground.root", "bead"),
+        "first_mirrored_x": ("ground.root_mirrored_x", "bead_4"),
+        "string": ("bead.right", "bead_2"),
+        "string_2": ("bead_2.right", "bead_3"),
+        "string_3": ("bead_3.right", "bead_4"),
+        "leg": ("ground.foot", "bead_2"),
+        "leg_2": ("ground.foot_2", "bead_3"),
+    }
+    assert all(len(body.points) == 3 for body in beads.bodies)
+
+
+def test_copies_join_the_same_body_if_two_bodies_may_be_the_image(tmp_path):
+    ring = '[[bodies]]\nname = "ring"\nmass = "1 g"\ninertia = "1 kg.mm2"\n'
+    start, end = (BEADS.index(f'[[flexures]]\nname = "{name}"') for name in ("string", "leg"))
+    parts = BEADS[:start] + BEADS[end:] + ring + 'centre = ["10 mm + span", 0]\n'
+    beads = read(tmp_path, parts, '[release]\nbody = "bead"\n')
+    assert [f.end for f in beads.flexures if f.name == "leg_2"] == ["bead_2.low_2"]
+
+
 def test_points_of_copies_can_be_used_by_other_parts(tmp_path: Path) -> None:
     stop = '\n[[stops]]\nname = "stop"\nbody = "right_arm"\npoint = "right_arm.left_end"\n'
     assert read(tmp_path, MIRRORED + stop).stops[0].point == ("0.5*span + 0.01", 0.05)

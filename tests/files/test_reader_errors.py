@@ -98,18 +98,21 @@ def evaluate(path: Path) -> None:
                 record.series(name, unit)
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(changed([EXAMPLE]))
 def test_changed_mechanism_files_are_read_or_rejected(text):
     read(read_mechanism, text)
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(changed([text for text, _ in LAYOUTS.values()]))
 def test_changed_records_are_read_or_rejected(text):
     read(evaluate, text)
 
 
+@pytest.mark.slow
 @settings(max_examples=500, deadline=None)
 @given(changed(UNIT_TEXTS), st.sampled_from(["m", "", "kg.m2", "rad"]))
 def test_changed_quantities_are_read_or_rejected(text, unit):

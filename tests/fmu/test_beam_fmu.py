@@ -40,6 +40,7 @@ def fmu(request, fmus, native):
     return fmus[GUIDE.name] if request.param == "python" else native[GUIDE.name, request.param]
 
 
+@pytest.mark.slow
 def test_fmus_of_beams_are_valid_and_simulate_like_the_engine(fmu, expected):
     """The angles of the coefficients, the motion and the count of impacts are compared."""
     assert not validate_fmu(str(fmu))
@@ -101,6 +102,7 @@ def notched():
     return replace(thesis, name="NotchedGuide", flexure_types=tuple(kinds))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["python", "fmi2", "fmi3"])
 def test_dimensions_of_a_notch_are_parameters_of_fmus(kind, tmp_path):
     """They have units and bounds; the motion with other dimensions is that of the engine."""
@@ -128,6 +130,7 @@ def test_dimensions_of_a_notch_are_parameters_of_fmus(kind, tmp_path):
     assert abs(plain.outputs()["shuttle.x"] - exact) > 1e-5
 
 
+@pytest.mark.slow
 def test_an_fmu_rejects_a_notch_that_is_longer_than_its_flexure(tmp_path, capfd):
     path = tmp_path / "NotchedGuide.fmu"
     path.write_bytes(native_fmu.build(notched(), {}, 3))

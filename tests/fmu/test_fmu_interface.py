@@ -26,7 +26,7 @@ from prbm.fmu.python_fmu import interface, start_sample
 from prbm.fmu.slave.resolved import mechanism_from, resolved
 from prbm.interface.units import UNITS
 from prbm.interface.variables import variables, with_starts
-from prbm.runs.experiment import Experiment
+from prbm.runs.experiment import Experiment, experiment
 from support import GUIDES, ROOT, case, each_shipped
 
 pytestmark = pytest.mark.fmu
@@ -144,12 +144,13 @@ def test_velocities_are_declared_as_derivatives(fmus, model):
 @each_shipped
 def test_capabilities_and_the_default_experiment_are_declared(fmus, model):
     description = read_model_description(str(fmus[model]))
-    cs, experiment = description.coSimulation, description.defaultExperiment
+    cs, declared = description.coSimulation, description.defaultExperiment
+    expected = experiment(case(model).mechanism)
     assert cs.canGetAndSetFMUstate
     assert cs.canSerializeFMUstate
     assert cs.canHandleVariableCommunicationStepSize
-    assert (experiment.startTime, experiment.stopTime) == ("0.0", "1.0")
-    assert (float(experiment.stepSize), float(experiment.tolerance)) == (1e-3, 1e-8)
+    assert (declared.startTime, float(declared.stopTime)) == ("0.0", expected.stop_time)
+    assert (float(declared.stepSize), float(declared.tolerance)) == (expected.step, 1e-8)
     assert description.generationDateAndTime.endswith("Z")
 
 
@@ -274,6 +275,7 @@ def test_an_fmu_contains_documentation_icon_and_licences_but_no_bytecode(fmus, m
         )
         bundled = archive.read("documentation/licenses/pythonfmu.txt").decode()
         assert archive.read("model.png").startswith(b"\x89PNG")
+        assert archive.read("documentation/icon.svg").endswith(b"</svg>\n")
     installed = importlib.metadata.distribution("pythonfmu")
     license_file = next(f for f in installed.files if f.name == "LICENSE")
     assert bundled.split() == license_file.read_text().split()
@@ -307,6 +309,7 @@ for name, module in sys.modules.items():
 """
 
 
+@pytest.mark.slow
 def test_an_fmu_contains_exactly_the_modules_that_it_imports(fmus, tmp_path):
     with zipfile.ZipFile(fmus["PRBDM2R"]) as archive:
         archive.extractall(tmp_path)

@@ -231,6 +231,7 @@ def python(script: str, *arguments: object) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_the_process_survives_repeated_errors(fmus):
     """Every case runs in a new instance, which works again after a reset."""
     done = python(SURVIVAL, fmus["PRBDM"], CYCLES)

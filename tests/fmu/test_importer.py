@@ -59,6 +59,7 @@ def assert_close(rows: np.ndarray, expected: list[dict], model: str, tolerance: 
         assert np.abs(rows[name] - wanted).max() <= (tolerance * scale).max(), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("fmi", "kind"), INTERFACES[:3])
 @pytest.mark.parametrize("model", [*SHIPPED, TWO_STOPS])
 def test_a_c_importer_reads_the_values_of_the_python_engine(model, fmi, kind):
@@ -115,6 +116,7 @@ def test_a_runge_kutta_importer_of_model_exchange_computes_the_same_motion(model
         assert rows["stop.contact"][-1] == 1.0
 
 
+@pytest.mark.slow
 def test_a_runge_kutta_importer_converges_at_fourth_order_across_impacts():
     """The classical Runge-Kutta method has order 4, also across impacts with friction."""
     points, steps = POINTS[:61], 2e-5 / 2 ** np.arange(4)

@@ -12,6 +12,7 @@ import pytest
 from fmpy import simulate_fmu
 
 from browser import NARROW, WIDE, chromium
+from prbm.analysis.strength import with_stress
 from prbm.files.mechanism_file import load, shipped
 from prbm.fmu.explorer import explorer
 from prbm.fmu.native_fmu import build
@@ -166,6 +167,22 @@ def test_the_saved_table_has_the_values_of_the_native_library(browser, guide, tm
     names = ["shuttle.x", "energy.elastic", "stop.impact_count"]
     expected = np.array(simulation.sample(found["time"][1:], names))
     assert np.array_equal(np.array([found[name][1:] for name in names]).T, expected)
+
+
+def test_the_saved_table_has_the_stress_and_its_peaks(browser, tmp_path):
+    chosen = with_stress(mechanism("GuideBeam"))
+    page, folder = written(tmp_path, chosen), {"behavior": "allow", "downloadPath": str(tmp_path)}
+    assert browser.open(page)["state"] == "done"
+    browser.driver.execute_cdp_cmd("Browser.setDownloadBehavior", folder)
+    browser.find("#download").click()
+    browser.wait(lambda data: (tmp_path / "GuideBeam.csv").exists())
+    found = np.genfromtxt(tmp_path / "GuideBeam.csv", delimiter=",", names=True, deletechars="")
+    outputs = ("stress_start", "stress_end", "stress", "peak_stress", "peak_stress_position")
+    names = [f"left_flexure.{name}" for name in outputs]
+    expected = np.array(KernelSimulation(chosen).sample(found["time"][1:], names))
+    assert np.array_equal(np.array([found[name][1:] for name in names]).T, expected)
+    assert expected[:, 3].max() > 1e8
+    assert browser.errors() == []
 
 
 def test_texts_with_markup_are_shown_as_text(browser, tmp_path):

@@ -14,6 +14,7 @@ from prbm.kernel.simulation import KernelSimulation
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.modal import modes
 from prbm.mechanics.statics import equilibrium
+from prbm.mechanism.parts import Body, Flexure
 from prbm.runs.experiment import experiment
 from support import each_shipped, mechanism
 
@@ -105,6 +106,50 @@ def test_drawings_equal_those_of_the_python_package(chosen):
         assert around(shapes.body(body.name, e)) == around(np.array(drawn) @ [1, 1j])
     for i, wall in enumerate(found["walls"]):
         assert abs(complex(*wall["point"]) - shapes.wall(i, 0.0, e)[:2].mean()) < 1e-12
+
+
+def beside(chain, taper):
+    """Return a mechanism with a tapered, curved beam on a body that a flexure of links carries."""
+    guide = mechanism("PRBDM2R")
+    body, leaf = guide.bodies[0], guide.flexure_types[0]
+    kind = replace(
+        leaf, name="blade", model="beam", profile="taper" if taper else "leaf", coefficients={},
+        end_thickness=2e-3 if taper else None, curvature=10.0,
+    )  # fmt: skip
+    tip = Body("tip", 0.01, 1e-6, (0.0, 0.09), {"foot": (0.0, 0.08)})
+    blade = Flexure("blade", "blade", "shuttle.left", "tip.foot")
+    return replace(
+        guide, name="Beside", bodies=(body, tip), flexure_types=(leaf, kind),
+        flexures=(*guide.flexures[: 1 if chain else 2], blade), stops=(), frictions=(), forces=(),
+        gravity=(0.0, 0.0),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "chosen",
+    [*map(mechanism, ("NotchGuide", "CurvedBistable")), beside(False, True), beside(True, False)],
+    ids=lambda chosen: chosen.name,
+)
+def test_profiles_and_the_straight_shape_equal_those_of_the_python_package(chosen):
+    found = simulated(chosen, ["energy.kinetic"], steps=3, drawing=True)
+    system = assemble(chosen, chosen.values())
+    shapes, e = Shapes(system), system.directions(np.array(found["q"]))
+    lines = zip(shapes.flexures, found["edges"], found["straight"], strict=True)
+    for line, edge, straight in lines:
+        assert bool(edge) == line.shaped
+        close = 2e-3 * system.length
+        if line.shaped:
+            assert gap(np.array(edge) @ [1, 1j], line.drawn(e)) < close
+            assert gap(line.edge(e), np.array([*edge, edge[0]]) @ [1, 1j]) < close
+        assert gap(np.array(straight) @ [1, 1j], line.drawn(shapes.straight)) < close
+
+
+def gap(points, line):
+    """Return the largest distance of points from a line of straight sides."""
+    start, side = line[:-1], np.diff(line)
+    start, side = start[side != 0.0], side[side != 0.0]
+    share = np.clip(((points[:, None] - start) / side).real, 0.0, 1.0)
+    return abs(points[:, None] - start - share * side).min(axis=1).max()
 
 
 def around(points):

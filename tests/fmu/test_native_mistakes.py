@@ -742,6 +742,7 @@ def python(script: str, *arguments: object) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @interfaces
 def test_the_process_survives_thousands_of_invalid_calls(native, fmi, kind):
     """All interfaces together make ten thousand calls, of every function and in every state.

@@ -15,6 +15,7 @@ from prbm.base.atomic import write
 from prbm.fmu import native_fmu
 from prbm.fmu.native_fmu import described
 from prbm.hybrid.simulation import Simulation
+from prbm.runs.experiment import experiment
 from support import (
     COSTLY_MODELS,
     GUIDES,
@@ -176,6 +177,7 @@ def test_event_mode_computes_the_same_trajectory(native, model, kind):
             assert_equal(instance, row, run.listed)
 
 
+@pytest.mark.slow
 @each_shipped
 def test_a_native_fmu_equals_the_python_fmu(fmus, native, model):
     """Positions agree within 1e-7 m and the times of all impacts within 1e-7 s in FMPy.
@@ -203,15 +205,15 @@ def test_a_native_fmu_equals_the_python_fmu(fmus, native, model):
 @each_shipped
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_the_default_experiment_in_fmpy_conserves_energy(native, model, fmi):
-    """All values are finite, and energy is constant within 2e-6 of the elastic energy at release.
+    """All values are finite, and energy is constant within 2e-6 of the largest elastic energy.
 
     The tolerance of the integration refers to angles of 1 rad and stretches of 1.
     """
     found = simulate_fmu(str(native[model, fmi]))
-    assert found["time"][-1] == pytest.approx(1.0)
+    assert found["time"][-1] == pytest.approx(experiment(mechanism(model)).stop_time)
     assert all(np.isfinite(found[name]).all() for name in found.dtype.names)
     balance = energy_balance(found)
-    assert np.abs(balance - balance[0]).max() < 2e-6 * found["energy.elastic"][0]
+    assert np.abs(balance - balance[0]).max() < 2e-6 * found["energy.elastic"].max()
     assert case(model).impacts(found[-1]) >= len(record(model)) > 0
 
 
@@ -324,7 +326,7 @@ def test_model_exchange_with_runge_kutta_steps_equals_the_engine(native, model, 
     """
     run, it, errors = engine_run(model), case(model), []
     share = 1e-6 if model in GUIDES else max(1e-6, 1e-9 * fastest(model))
-    step = it.substep(4e-5 if model in GUIDES else 2e-5)
+    step = it.substep(4e-5 if model in GUIDES else 1e-5)
     for h in (step, step / 2):
         with Instance(native[model, fmi], "me", substep=h).initialize() as instance:
             for row in run.rows[1:4]:
@@ -877,6 +879,7 @@ def test_instances_in_threads_do_not_disturb_each_other(native, fmi, kind):
     assert all(rows == expected for rows in found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_hundreds_of_consecutive_and_simultaneous_instances_run(native, fmi):
     """A hundred instances load and unload the library; then two hundred exist together."""

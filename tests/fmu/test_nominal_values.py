@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from native_host import Instance
-from support import case, each_shipped
+from support import case, each_shipped, record
 
 pytestmark = [pytest.mark.fmu, pytest.mark.native]
 
@@ -15,7 +15,7 @@ KINDS = {
     "angle": r"\.angle$", "rate": r"\.(omega|strain_rate)$", "strain": r"\.strain$",
     "energy": r"^energy\.dissipated$",
 }  # fmt: skip
-RATIO_MAX = 100.0  # Impacts excite rates that a smooth motion of the same amplitude does not have.
+RATIO_MAX = 100.0
 
 
 def kind_of(name: str) -> str:
@@ -24,19 +24,24 @@ def kind_of(name: str) -> str:
 
 @each_shipped
 def test_nominal_values_are_of_the_order_of_the_motion(native, model):
-    """Each is compared with the largest change of a state of the same kind."""
+    """Each is compared with the largest change of a state of the same kind.
+
+    Rates are compared up to the first impact, which excites modes of high frequency.
+    """
     it = case(model)
-    rows = []
+    smooth = record(model)[0].time
+    rows, times = [], np.linspace(0.0, it.end, 301)[1:]
     with Instance(native[model, 3], "cs").initialize() as instance:
         states = [u.variable.derivative for u in instance.description.derivatives]
         names = [s.name for s in states]
-        for time in np.linspace(0.0, it.end, 301)[1:]:
+        for time in times:
             rows.append(instance.get(*names))
             instance.advance(time)
     nominal, moved = defaultdict(list), defaultdict(list)
-    for state, change in zip(states, np.ptp(rows, axis=0), strict=True):
-        nominal[kind_of(state.name)].append(float(state.nominal))
-        moved[kind_of(state.name)].append(change)
+    for state, column in zip(states, np.transpose(rows), strict=True):
+        kind = kind_of(state.name)
+        nominal[kind].append(float(state.nominal))
+        moved[kind].append(np.ptp(column[times < smooth] if kind == "rate" else column))
     for kind in nominal.keys() - {"work"}:
         (value,) = {*nominal[kind]}
         assert 1 / RATIO_MAX < max(moved[kind]) / value < RATIO_MAX, kind

@@ -120,6 +120,7 @@ STUCK = {"friction.coefficient": 0.5, "friction.normal_force": 20.0, "stop.posit
          "release.displacement": 0.0}  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["PRBDM", "PRBDM2R"])
 @pytest.mark.parametrize(
     "kind", [Simulation, pytest.param(KernelSimulation, marks=pytest.mark.native)]

@@ -65,6 +65,7 @@ def test_the_shipped_mechanisms_need_few_steps_in_a_default_communication_step()
         Simulation(mechanism(name)).check_effort(10 * 1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["package", "kernel"])
 def test_the_effort_of_one_communication_step_is_limited(monkeypatch, engine):
     """A long step fails and changes nothing; shorter steps succeed."""

@@ -119,6 +119,7 @@ def test_normal_force_grows_towards_the_neutral_position():
     assert sim.outputs()["energy.dissipated"] > 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
 def test_a_stop_carries_the_load_of_a_body_at_rest_with_friction(model):
     """The stop force is constant, and the friction point of a body at rest is frictionless."""
@@ -200,6 +201,7 @@ def test_a_moving_wall_hits_a_shuttle_at_rest_by_newtons_law():
     assert energy_balance(out) == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
 def test_a_shuttle_at_rest_follows_a_slowly_accelerated_wall(model):
     """The contact remains closed, without impacts, and the wall does the work."""
@@ -360,6 +362,7 @@ def test_a_rejected_change_does_not_change_any_value():
     assert sim.values["stop.restitution"] == 0.6
 
 
+@pytest.mark.slow
 def test_endless_chatter_is_an_error():
     """Endless elastic bounces of half a microsecond under a huge force."""
     values = WEIGHTLESS_UNDAMPED | {

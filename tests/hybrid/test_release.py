@@ -64,6 +64,15 @@ def test_the_kernel_releases_as_the_engine_does(name):
             assert found[key] == pytest.approx(expected[key], rel=1e-7, abs=1e-10), (key, t)
 
 
+@pytest.mark.parametrize("simulation", [Simulation, KernelSimulation])
+@pytest.mark.parametrize("angle", [-3.0, math.pi, 6.0])
+def test_a_body_is_released_from_a_rotation_near_half_a_turn_or_a_turn(simulation, angle):
+    """The sine of the remaining angle also vanishes at half a turn."""
+    model = mechanism("Cantilever")
+    model = replace(model, release=Release("tip", angle=angle), stops=())
+    assert simulation(model).outputs()["tip.angle"] == pytest.approx(angle, rel=1e-12)
+
+
 @pytest.mark.parametrize("degrees", [-20.0, 5.0, 60.0])
 @pytest.mark.parametrize("model", [PIVOT, stretching(PIVOT)])
 def test_a_moment_holds_the_body_at_the_angle(model, degrees):

@@ -97,6 +97,7 @@ def obeys_coulomb(settled: Simulation) -> bool:
     return right
 
 
+@pytest.mark.slow
 def test_friction_at_stop_and_friction_point_obeys_coulombs_law():
     """A stop that would have to pull opens in the first step."""
     rng, found = np.random.default_rng(0), 0

@@ -29,6 +29,7 @@ def checked_run(guide, values=None, time=0.3, step=1e-3):
     return sim, out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
 @pytest.mark.parametrize("position", [0.0, -0.006])
 def test_converging_bounces_on_two_stops_end_in_rest(model, position):
@@ -70,6 +71,7 @@ def test_energy_lost_at_each_of_two_stops_follows_from_its_impulse(model):
         assert results[0][1] == pytest.approx(results[1][1], rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 @pytest.mark.parametrize("lever", [0.01, 0.03])
 def test_a_closed_stop_takes_part_in_an_impact_at_another_stop(friction, lever):
@@ -135,6 +137,7 @@ def test_converging_bounces_of_the_2r_guide_end_in_rest(rest_speed, position, of
     assert sim.outputs()["stop.contact"]
 
 
+@pytest.mark.slow
 def test_a_wall_that_pushes_a_body_with_friction_does_its_work():
     """At constant speed the stop force grows by mu N, and mu N times the path is dissipated."""
     still = {"damping.beta": 0.0}

@@ -11,7 +11,7 @@ from prbm.hybrid.simulation import Simulation
 from prbm.kernel.simulation import KernelSimulation
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.statics import equilibrium
-from prbm.mechanics.stress import static_stresses
+from prbm.mechanics.stress import section_positions, static_stresses
 
 ENGINES = pytest.mark.parametrize("engine", [Simulation, KernelSimulation])
 THROWN = {"release.displacement": 0.0, "release.velocity": -0.5, "gravity.x": 0.0}
@@ -154,3 +154,50 @@ def test_stress_in_a_hit_of_a_compliant_stop_has_a_peak(engine):
     expected = Simulation(mechanism, values).sample(times[::10], names).T
     for mine, theirs in zip((stress, force, peak), expected, strict=True):
         assert mine[::10] == pytest.approx(theirs, rel=1e-5, abs=1e-5 * theirs.max())
+
+
+@ENGINES
+@pytest.mark.parametrize(("model", "changes"), [("beam", {"order": 3}), ("2R", {})])
+def test_stress_in_the_sections_has_the_outputs_as_its_ends_and_its_maximum(engine, model, changes):
+    simulation = engine(guide(model, **changes), THROWN)
+    simulation.advance(0.033)
+    out, found = simulation.outputs(), simulation.section_stresses()
+    positions = section_positions(simulation.system)
+    assert found.keys() == positions.keys() == {"left_flexure", "right_flexure"}
+    for name, (left, right) in found.items():
+        assert left.shape == right.shape == positions[name].shape
+        assert (left[0], left[-1]) == (out[f"{name}.stress_start"], out[f"{name}.stress_end"])
+        assert max(np.abs(left).max(), np.abs(right).max()) == out[f"{name}.stress"]
+        assert np.all(np.diff(positions[name]) > 0.0)
+        assert positions[name][[0, -1]] == pytest.approx([0.0, 0.04])
+
+
+def test_engines_agree_on_the_stress_in_the_sections():
+    mechanism = prbm.load("NotchGuide")
+    kinds = tuple(replace(k, stress=True) for k in mechanism.flexure_types)
+    mechanism = replace(mechanism, flexure_types=kinds)
+    one, other = Simulation(mechanism), KernelSimulation(mechanism)
+    for simulation in (one, other):
+        simulation.advance(1e-3)
+    found = other.section_stresses()
+    for name, faces in one.section_stresses().items():
+        for x, y in zip(faces, found[name], strict=True):
+            assert y == pytest.approx(x, rel=1e-5, abs=1e-5 * np.abs(x).max())
+
+
+def test_stress_after_one_damped_impact_converges_with_the_order():
+    """The steel guide with stretching beams, struck at 0.3 m/s at -10 mm."""
+    peaks = []
+    for order in (3, 5):
+        mechanism = guide(order=order, axial=True)
+        changes = {
+            "stop.position": -0.01, "release.displacement": -0.0101, "release.velocity": 0.3,
+            "gravity.x": 0.0,
+        }  # fmt: skip
+        simulation = KernelSimulation(mechanism, changes)
+        simulation.advance(3e-3)
+        out = simulation.outputs()
+        assert out["stop.impact_count"] == 1
+        peaks.append(out["left_flexure.peak_stress"])
+    assert peaks[0] == pytest.approx(peaks[1], rel=0.025)
+    assert peaks[1] > 1.2 * 349.96e6  # The static stress there.

@@ -27,6 +27,7 @@ def vice():
     return replace(guide, name="Vice", stops=(replace(stop, name="left"), other))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("k", [2, 20])
 def test_walls_that_close_in_are_rejected(k):
     """Two opposite walls approach a rigid body: no impulses open both gaps."""
@@ -147,6 +148,7 @@ def rods(tmp_path_factory):
     return {fmi: folder / f"{fmi}.fmu" for fmi in (2, 3)}
 
 
+@pytest.mark.slow
 @pytest.mark.fmu
 @pytest.mark.native
 @pytest.mark.parametrize(("fmi", "kind"), INTERFACES)
@@ -196,6 +198,7 @@ def test_many_contacts_at_rest_bear_the_force_of_one_stop():
         assert abs(out["shuttle.vy"]) < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.fmu
 @pytest.mark.native
 @pytest.mark.parametrize("fmi", [2, 3])
@@ -260,11 +263,13 @@ SINGULAR = (
 )
 
 
+@pytest.mark.slow
 def test_eigenvalues_without_convergence_are_rejected():
     with pytest.raises(KernelMistake, match="the eigenvalues of a matrix did not converge"):
         KernelSimulation(mechanism("PRBDM2R"), changes=(SWEEPS,))
 
 
+@pytest.mark.slow
 def test_a_guard_that_cannot_be_evaluated_is_an_error():
     """If the guard returned zero instead of an error, the engine would locate a release."""
     rubs = {"release.displacement": 0.0, "stop.friction": 0.5}
@@ -275,6 +280,7 @@ def test_a_guard_that_cannot_be_evaluated_is_an_error():
     assert sim.outputs() == before
 
 
+@pytest.mark.slow
 def test_too_many_events_at_one_time_are_rejected_in_model_exchange():
     sim = KernelSimulation(mechanism("PRBDM"), {"release.displacement": 0.0}, exchange=True,
                            changes=(EVENTS,))  # fmt: skip

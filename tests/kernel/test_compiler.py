@@ -105,7 +105,7 @@ def test_a_library_is_reproducible_and_contains_no_path(cache, monkeypatch):
 def test_error_without_a_compiler_names_the_packages_to_install(cache, monkeypatch):
     monkeypatch.setenv("PATH", "")
     without_ziglang(monkeypatch)
-    with pytest.raises(NoCompilerError, match=r"need a C compiler.*gcc.*pip install ziglang"):
+    with pytest.raises(NoCompilerError, match=r"needs a C compiler.*gcc.*pip install ziglang"):
         libraries([HOST])
 
 

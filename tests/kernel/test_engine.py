@@ -198,6 +198,7 @@ def vice():
     return replace(guide, name="Vice", stops=(replace(stop, name="left"), other))
 
 
+@pytest.mark.slow
 def test_a_failed_step_has_the_same_message_and_leaves_the_simulation_unchanged():
     closing = {"left.velocity": -0.5, "right.velocity": -0.5}
     python, kernel = both(vice())
@@ -280,6 +281,7 @@ def test_samples_end_at_the_time_of_an_error(engine):
     assert sim.time == 0.02
 
 
+@pytest.mark.slow
 def test_memory_is_freed_with_the_simulation_and_with_the_mechanism(monkeypatch):
     closed = []
     for name in ("prbm_close", "prbm_mechanism_close"):
@@ -436,6 +438,8 @@ def test_the_order_of_names_in_a_saved_state_has_no_effect():
     assert kernel.given["force.x"] == 0.5
     with pytest.raises(ParameterError, match="damaged"):
         kernel.restore({**kernel.snapshot(), "given": {}})
+    with pytest.raises(ParameterError, match="damaged: 'numbers'"):
+        kernel.restore({"engine": "kernel"})
     with pytest.raises(ParameterError, match="another mechanism"):
         kernel.restore({**kernel.snapshot(), "numbers": [[]] * len(kernel.snapshot()["numbers"])})
 

@@ -172,6 +172,7 @@ def exported():
     return compiled(flags=("-O0",), text="\n".join(lines)), macros, arrays
 
 
+@pytest.mark.slow
 def test_tolerances_of_c_equal_those_of_python_bit_by_bit(exported):
     library, macros, _ = exported
     for name, value in vars(tolerances).items():

@@ -118,6 +118,7 @@ def test_steps_in_parts_have_the_same_bits_as_whole_steps(name, driven):
     assert in_parts._library.unfinished > 1
 
 
+@pytest.mark.slow
 def test_a_failure_of_memory_for_the_record_changes_nothing(tmp_path, monkeypatch):
     sources = kernel()
     for old, new in [

@@ -126,6 +126,7 @@ HAMMERED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", HAMMERED)
 def test_impacts_and_rest_between_bodies_in_the_kernel_equal_those_in_the_engine(name):
     """A hammer hits a moving stage, rests and slides on it; the flexures stretch."""
@@ -134,6 +135,7 @@ def test_impacts_and_rest_between_bodies_in_the_kernel_equal_those_in_the_engine
     assert found["face.impact_count"] + found["face.contact"] > 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "guide", [elastic(), beams(), profiles()], ids=["links", "beams", "profiles"]
 )
@@ -202,10 +204,10 @@ def test_a_damaged_state_is_rejected_and_a_valid_one_can_still_be_restored():
 
 @each_shipped
 def test_an_instance_takes_less_than_256_kib(model):
-    """With many coordinates the limit is 512 bytes times the square of their number."""
+    """With many directions the limit is 512 bytes times the square of their number."""
     kernel, guide = KernelSimulation(mechanism(model)), mechanism(model)
-    coordinates = assemble(guide, guide.values()).n
-    assert library().simulation_bytes(kernel.inner) < max(256 * 1024, 512 * coordinates**2)
+    directions = assemble(guide, guide.values()).H.shape[0]
+    assert library().simulation_bytes(kernel.inner) < max(256 * 1024, 512 * directions**2)
 
 
 @pytest.mark.parametrize(

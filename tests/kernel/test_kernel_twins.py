@@ -318,17 +318,28 @@ def test_beams_are_the_same():
         assert_same(P, beam.orthogonal(order, x, peak / peak.sum()), 1e-9)
 
 
+@twin(concentration=profile.concentration)
+def test_factors_of_the_stress_at_waists_agree() -> None:
+    pulled, bent = np.zeros(1), np.zeros(1)
+    for ratio in (1e-9, 9e-4, 0.1, 1.0, 30.0):
+        kernel().concentration(ratio, 1.0, pulled, bent)
+        expected = profile.concentration(ratio, 1.0)
+        assert (pulled[0], bent[0]) == pytest.approx(expected, rel=1e-9)  # Differences at 9e-4.
+
+
 @twin(notch_panels=profile.notch_panels, tangent=profile.Line.tangent)
 def test_panels_and_lines_are_the_same():
     shapes = [(1e-3, 8e-3, (4e-3, 2e-3), H, w) for H in (5e-3, 3e-3, 9e-3) for w in (None, 6e-3)]
     for shape in shapes:
         notch = profile.Notch(*shape)
+        # As long as the flexure, apart from round-off, or shorter.
+        L = math.nextafter(notch.length, 0.0) if shape[3] == 3e-3 else 0.02
         ours = structures()["Notch"](
             *shape[:2], *shape[2], shape[3], shape[4] or 0.0, bool(shape[4])
         )
-        expected = profile.notch_panels("neck", notch, 0.02, 7)
+        expected = profile.notch_panels("neck", notch, L, 7)
         panels = (structures()["Panel"] * len(expected))()
-        kernel().notch_panels(b"neck", ours, 0.02, 7, ctypes.addressof(panels))
+        kernel().notch_panels(b"neck", ours, L, 7, ctypes.addressof(panels))
         for panel, other in zip(panels, expected, strict=True):
             assert panel.nodes == other.nodes
             for x in (-1.0, -0.4, 0.0, 1.0):
@@ -896,6 +907,7 @@ def test_impacts_with_friction_are_the_same():
         assert_same([P_n[0], P_t[0]], expected)
 
 
+@pytest.mark.slow
 @twin(several=contact.several)
 @pytest.mark.parametrize("k", [2, 3])
 def test_simultaneous_impacts_with_friction_are_the_same(k):
@@ -960,7 +972,7 @@ def test_equilibria_are_the_same(name, displacement):
         held = displacement is not None
         kernel().equilibrium(ours.structure, held, displacement or 0.0, found)
         size = np.abs(system.K).max() / system.length  # Size of the balanced forces.
-        assert_same(q, expected.q)
+        assert_same(q, expected.q, scale=1.0)  # rad; undeformed shapes have angles of rounding.
         assert_same(lam, expected.lam, scale=size)
         assert_same(found.force, expected.force, scale=size)
 

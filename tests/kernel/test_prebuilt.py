@@ -59,7 +59,7 @@ def test_error_for_a_damaged_package_names_the_file_and_the_remedy(package, file
         prebuilt.prebuilt(NAME, SOURCES)
 
 
-def test_exports_use_the_libraries_of_the_package_unless_cc_is_set(tmp_path, monkeypatch):
+def test_cc_replaces_the_library_of_the_package_for_this_machine_alone(tmp_path, monkeypatch):
     made = {f"{p.name}/prbm_fmu{p.suffix}": p.name.encode() for p in PLATFORMS.values()}
     for name, content in prebuilt.package_files(made, "a compiler", compiler.kernel()).items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
@@ -74,6 +74,8 @@ def test_exports_use_the_libraries_of_the_package_unless_cc_is_set(tmp_path, mon
     assert libraries(["host"]) == {here: here.name.encode()}
     monkeypatch.setenv("CC", "cc")
     assert libraries(["host"]) == {here: b"compiled"}
+    found = libraries(["all"])
+    assert {p.name: content for p, content in found.items()} == {p: p.encode() for p in PLATFORMS}
 
 
 def test_live_pages_use_the_module_of_the_package_even_if_cc_is_set(tmp_path, monkeypatch):

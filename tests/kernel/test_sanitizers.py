@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from c_importer import ANVIL, TWO_STOPS, Job, described, kernel_library, native, needs, run
+from c_importer import Job, described, kernel_library, native, needs, run
 from fuzzing import (
     ENVIRONMENT,
     MODELS,
@@ -16,15 +16,10 @@ from fuzzing import (
     search_calls,
 )
 
-pytestmark = pytest.mark.native
+pytestmark = [pytest.mark.native, pytest.mark.slow]
 
 INTERFACES = ((2, "cs"), (3, "cs"), (3, "events"), (2, "me"), (3, "me"))
 POINTS = 1e-3 * np.arange(301)  # s; the default experiment bounces until 0.243 s, then rests.
-QUICK_MODELS = [
-    model if model in (TWO_STOPS, ANVIL) else pytest.param(model, marks=pytest.mark.slow)
-    for model in MODELS
-]
-"""The models of the tests have all features of the guides; the guides are marked as slow."""
 VALGRIND = ("valgrind", "--quiet", "--error-exitcode=9", "--leak-check=full")
 
 
@@ -50,7 +45,7 @@ def sanitized(job: Job, *words: object) -> bytes:
 
 
 @pytest.mark.parametrize(("fmi", "kind"), INTERFACES)
-@pytest.mark.parametrize("model", QUICK_MODELS)
+@pytest.mark.parametrize("model", MODELS)
 def test_sanitizers_find_nothing_in_a_run_with_changes(model, fmi, kind):
     """The results with sanitizers equal those without bit by bit."""
     job = Job(native(model, fmi), kind, POINTS, changes=changes(model))
@@ -72,7 +67,6 @@ def test_sanitizers_find_nothing_in_hundreds_of_instances(fmi):
     sanitized(job, "threads", 4)
 
 
-@pytest.mark.slow
 def test_sanitizers_find_nothing_in_ten_thousand_instances():
     for fmi in (2, 3):
         for kind in ("cs", "me"):
@@ -80,7 +74,6 @@ def test_sanitizers_find_nothing_in_ten_thousand_instances():
             sanitized(job, "cycles", 2500, 1)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("fmi", "kind"), INTERFACES)
 def test_valgrind_finds_nothing(fmi, kind):
     """A run to the first impact, a restored state, and a hundred instances."""
@@ -91,7 +84,6 @@ def test_valgrind_finds_nothing(fmi, kind):
         assert not run(job, *words, before=VALGRIND).errors
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("fmi", "kind"), [(2, "cs"), (2, "me"), (3, "cs"), (3, "me")])
 def test_valgrind_finds_nothing_in_ten_thousand_instances(fmi, kind):
     """Each is instantiated, initialized, advanced by a step and freed."""
@@ -108,7 +100,7 @@ def test_arbitrary_calls_neither_crash_nor_leak(tmp_path, model, fmi):
     assert found.status == 0, found.output
 
 
-@pytest.mark.parametrize("seconds", [2, pytest.param(8, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seconds", [2, 8])
 def test_arbitrary_tables_neither_crash_nor_leak(tmp_path, seconds):
     """A part of the changed tables is accepted and simulated; otherwise little is tested."""
     found = fuzz_tables(tmp_path, seconds=seconds, seed=0)
@@ -118,14 +110,12 @@ def test_arbitrary_tables_neither_crash_nor_leak(tmp_path, seconds):
     assert started > tried / 20
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_a_search_for_calls_that_crash_finds_none(tmp_path, fmi):
     found = search_calls(tmp_path, "PRBDM", fmi, seconds=15, seed=0)
     assert found.status == 0, found.output[-8000:]
 
 
-@pytest.mark.slow
 def test_a_search_for_tables_that_crash_finds_none(tmp_path):
     found = fuzz_tables(tmp_path, seconds=30, seed=1)
     assert found.status == 0, found.output[-8000:]

@@ -38,6 +38,7 @@ def rest_and_frequencies_by_elements(description, elements):
     return np.array([fe.displacement(shape.q), *fe.modes(shape).frequency[:5]])
 
 
+@pytest.mark.slow
 def test_the_guide_on_beams_converges_to_finite_elements_at_rest():
     """Orders 3, 5, 7: each error falls by 9 or more, down to that of the elements.
 
@@ -59,6 +60,7 @@ def at_the_wall(description):
     return hit.restitution, hit.frequency[:3]
 
 
+@pytest.mark.slow
 def test_the_finger_on_beams_has_the_restitution_of_finite_elements_at_the_wall():
     """The restitution is -0.182; the orders 3, 4 and 6 give -0.187, -0.177 and -0.181.
 

@@ -7,9 +7,11 @@ import math
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 from elastica import Leaf, platform
 from prbm.mechanics.assembly import assemble
+from prbm.mechanics.beam import integrals
 from prbm.mechanics.modal import modes
 from prbm.mechanics.statics import equilibrium
 from prbm.mechanism.description import Mechanism
@@ -145,6 +147,44 @@ def test_a_parallelogram_on_beams_moves_and_turns_like_its_two_leaves(force, mom
 
 
 BUCKLING = -2 * math.pi**2  # Axial force at which two leaves between parallel clamps buckle.
+
+
+@pytest.mark.parametrize(("share", "across"), [(0.5, 12j), (0.8, 3j), (0.85, 0.2j), (0.85, 3j)])
+def test_a_compressed_parallelogram_is_as_accurate_as_without_compression(share, across):
+    """The limits are those of the test without compression, up to 0.85 of the buckling load."""
+    displacement, shortening, rotation = map(abs, errors(share * BUCKLING + across, 0.0, 3))
+    assert max(displacement, shortening) < 2e-4
+    assert rotation < 5e-3
+
+
+def buckling_error(order):
+    """Return the relative error of the buckling load of a leaf between parallel clamps.
+
+    The curvature is a polynomial with odd terms only, by symmetry, and the load is the minimum of
+    integral kappa^2 / integral theta^2 (Ritz).
+    """
+    x, weights = np.polynomial.legendre.leggauss(order + 3)
+    odd = range(1, order + 1, 2)
+    theta = np.array([integrals(order, x)[:, k] for k in odd])
+    bending = np.diag([2.0 / (2 * k + 1) for k in odd])
+    load = eigh(bending, (theta * weights) @ theta.T, eigvals_only=True)[0]
+    return load / math.pi**2 - 1.0
+
+
+@pytest.mark.parametrize("order", [3, 5])
+def test_the_error_near_buckling_is_that_of_the_buckling_load_over_the_distance_to_it(order):
+    """Small displacements are proportional to 1/(1 - P/P_b) near the buckling load P_b.
+
+    With P_b too high by the share e, they are too small by e/(1 - P/P_b); farther from P_b by less.
+    """
+    across, error = 1e-6, buckling_error(order)
+    for share in (0.5, 0.8, 0.9, 0.96, 0.98, 0.99):
+        k = math.pi * math.sqrt(share)
+        exact = across / 2 * (2 * math.tan(k / 2) - k) / k**3
+        _, moved, _ = loaded(assembled(*pair(CLAMPED), order), share * BUCKLING + 1j * across)
+        missing = (1.0 - moved.imag / exact) * (1.0 - share) / error
+        assert missing < 1.0
+        assert share < 0.9 or missing > share**7
 
 
 @pytest.mark.parametrize(("share", "across"), [(0.8, 5j), (0.9, 2j), (0.96, 1j), (0.98, 0.2j)])

@@ -154,6 +154,7 @@ def test_newton_and_stronge_agree_if_sliding_does_not_reverse():
     assert (np.array([-1.0, 5.0]) + W @ P)[0] == pytest.approx(0.7, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_simultaneous_impacts_with_friction_are_symmetric_and_do_not_gain_energy():
     """Impulses are in the friction cone, gaps do not close; swapped stops swap their impulses."""
     for _ in range(150):

@@ -68,6 +68,7 @@ def test_restitution_is_above_minus_one_if_the_fundamental_mode_moves_towards_th
     assert -1.0 <= found <= 1.0 / math.sqrt(share)
 
 
+@pytest.mark.slow
 def test_restitution_is_bounded_by_the_share_of_the_fundamental_mode():
     """With the share p of the energy before the impact, R^2 <= 1/p: an impact gains no energy."""
     sim = Simulation(mechanism("PRBDM3R"), OFFSET)

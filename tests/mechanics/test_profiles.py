@@ -10,14 +10,20 @@ from scipy.integrate import quad, solve_ivp
 from scipy.linalg import eigh
 from scipy.optimize import newton
 
+import plane_stress
 from prbm.base.errors import MechanismError, ParameterError
+from prbm.hybrid.simulation import Simulation
+from prbm.kernel.simulation import KernelSimulation
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.modal import modes
+from prbm.mechanics.profile import concentration
 from prbm.mechanics.sections import static_section_loads
 from prbm.mechanics.statics import equilibrium
 from prbm.mechanics.stress import faces, stress
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.parts import Body, Flexure, FlexureType, Force, Release
+from prbm.references.notches import paros_weisbord
+from support import mechanism
 
 L, WIDTH, E, RHO = 0.03, 0.01, 70e9, 2700.0
 
@@ -325,6 +331,38 @@ def test_mistakes_in_profiles_are_rejected_with_a_remedy(mistake):
     assert words in str(error.value)
 
 
+@pytest.mark.parametrize("x", [0.0, 0.013, 0.1])
+def test_a_notch_between_its_edges_has_the_stiffness_of_its_sections_wherever_it_is_drawn(x):
+    """The distance of the ends is that of the edges, apart from round-off."""
+    hinge = kind(profile="notch", notch_radius=4e-3)
+    description = Mechanism(
+        name="Hinge",
+        title="A hinge",
+        ground={"clamp": (x, 0.0)},
+        bodies=(Body("tip", 1e-3, 1e-7, (x + 0.008, 0.0), {"end": (x + 0.008, 0.0)}),),
+        flexure_types=(hinge,),
+        flexures=(Flexure("beam", hinge.name, "ground.clamp", "tip.end"),),
+        forces=(Force("force", "tip"),),
+        release=Release("tip", direction=90.0),
+    )
+    _, slope = tip(assemble(description, description.values()), moment=1e-3)
+    exact = paros_weisbord(4e-3, hinge.thickness, hinge.width, hinge.youngs_modulus)
+    assert slope == pytest.approx(1e-3 / exact, rel=1e-6)
+
+
+@pytest.mark.parametrize("engine", [Simulation, KernelSimulation])
+def test_a_notch_may_be_as_long_as_its_flexure_apart_from_round_off(engine):
+    """Ends at 47 and 53 mm are nearer than 6 mm by round-off."""
+    guide = mechanism("NotchGuide")
+    found = [
+        engine(guide, {"notch.length": 8e-3 * (1.0 + change)}).outputs()["energy.elastic"]
+        for change in (-1e-12, 1e-12)
+    ]
+    assert found[0] == pytest.approx(found[1], rel=1e-9)
+    with pytest.raises(ParameterError, match="is longer than the flexure"):
+        engine(guide, {"notch.length": 8e-3 * (1.0 - 1e-6)})
+
+
 def test_a_low_order_between_two_clamps_is_rejected_except_for_hinges():
     for k in (kind(order=2), kind(order=2, profile="taper", end_thickness=1e-3)):
         with pytest.raises(MechanismError, match="too stiff with an order below 3"):
@@ -432,6 +470,13 @@ def sections_of(system, force, moment):
     return static_section_loads(system, shape, {"force.x": force.real, "force.y": force.imag})[0]
 
 
+def waist_factors(k):
+    """Return the factors of the stress at the waist of a type of flexures; 1 for a taper."""
+    if k.profile != "notch":
+        return 1.0, 1.0
+    return concentration(k.thickness, k.notch_radius**2 / (k.notch_depth or k.notch_radius))
+
+
 def exact_loads(name, force, moment, position):
     """Return normal force and bending moment of a straight cantilever at positions [N], [N m]."""
     y = np.array([elastica(name, force, moment)[1], 0.0, 0.0])
@@ -473,8 +518,9 @@ def test_sections_of_a_profile_carry_the_loads_of_the_boundary_value_problem(nam
     bent, exact = bent[order] / found.modulus[order], bending / found.modulus[order]
     np.testing.assert_allclose(bent, exact, atol=1e-3 * abs(exact).max())
     h, b = (np.array([f(name, s) for s in position]) for f in (thickness, width))
-    np.testing.assert_allclose(found.area[order], b * h, rtol=1e-6)
-    np.testing.assert_allclose(found.modulus[order], b * h**2 / 6, rtol=1e-6)
+    pulled, turned = np.where(waist, np.array(waist_factors(k))[:, None], 1.0)
+    np.testing.assert_allclose(found.area[order], b * h / pulled, rtol=1e-6)
+    np.testing.assert_allclose(found.modulus[order], b * h**2 / 6 / turned, rtol=1e-6)
 
 
 @pytest.mark.parametrize("backwards", [False, True])
@@ -503,11 +549,50 @@ def test_a_notch_under_a_moment_has_the_largest_stress_at_its_waist(name, nodes)
     moment = 0.3 / weakness(name, lambda s: 1.0)
     loads = sections_of(cantilever(k), 0j, moment)
     found = stress(loads)
-    assert found.largest == pytest.approx(6 * moment / (WIDTH * 5e-4**2), rel=1e-9)
+    factor = waist_factors(k)[1]
+    assert found.largest == pytest.approx(factor * 6 * moment / (WIDTH * 5e-4**2), rel=1e-9)
     assert found.position == pytest.approx(0.5 * (L - (k.waist_length or 0.0)), abs=1e-12)
     left, right = faces(loads)
     np.testing.assert_allclose(left, -right, rtol=1e-9)
     assert np.all(np.diff(loads.position) > 0.0)
+
+
+@pytest.mark.parametrize(
+    ("axes", "ratio", "bent", "pulled"),
+    [
+        ((1.0, 1.0), 0.1, 0.004, 0.004),
+        ((1.0, 1.0), 0.5, 0.006, 0.015),
+        ((1.0, 1.0), 2.0, 0.006, 0.035),
+        ((1.0, 0.5), 0.5, 0.006, 0.015),
+        ((1.0, 2.0), 0.5, 0.01, 0.015),
+    ],
+)
+def test_factors_at_the_waist_of_a_notch_are_those_of_plane_elasticity(axes, ratio, bent, pulled):
+    """The ratio is that of the waist to the half axis along the flexure."""
+    factors = concentration(ratio, axes[0] ** 2 / axes[1])
+    mesh = plane_stress.notched(axes, ratio)
+    assert factors[1] == pytest.approx(plane_stress.concentration(mesh, bending=True), rel=bent)
+    assert factors[0] == pytest.approx(plane_stress.concentration(mesh, bending=False), rel=pulled)
+
+
+@pytest.mark.parametrize(("ratio", "excess"), [(0.1, 0.015), (0.5, 0.035), (1.0, 0.05)])
+def test_factors_at_fillets_are_slightly_above_those_of_plane_elasticity(ratio, excess):
+    mesh = plane_stress.notched((1.0, 1.0), ratio, length=2 * ratio)
+    for bending, factor in zip((False, True), concentration(ratio, 1.0), strict=True):
+        found = plane_stress.concentration(mesh, bending)
+        assert found < factor < (1 + excess) * found
+
+
+def test_factors_of_slender_and_of_sharp_notches():
+    """A slender waist has none; those of a sharp one rise with the root of its sharpness."""
+    assert concentration(1e-12, 1.0) == pytest.approx((1.0, 1.0), abs=1e-11)
+    x = 1e8
+    sharp = concentration(2 * x, 1.0)
+    assert sharp == pytest.approx(
+        (4 / math.pi * math.sqrt(x), 8 / (3 * math.pi) * math.sqrt(x)), rel=1e-3
+    )
+    below, above = concentration(2 * (1e-6 - 1e-18), 1.0), concentration(2 * (1e-6 + 1e-18), 1.0)
+    assert below == pytest.approx(above, rel=1e-9)
 
 
 @pytest.mark.parametrize("name", CURVED)

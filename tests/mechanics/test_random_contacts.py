@@ -28,6 +28,7 @@ def test_100_000_random_contacts_satisfy_their_laws_or_are_rejected(kind, engine
     check(random_contacts.search(engine, kind, 100_000, seed=1), ERRORS[kind])
 
 
+@pytest.mark.slow
 def test_rejected_problems_have_no_solution_in_any_combination_of_modes():
     """Each combination of modes is checked independently as a linear program."""
     rng, rejected, second_paths = np.random.default_rng(0), 0, 0

@@ -232,6 +232,7 @@ def test_rest_position_and_frequencies_of_the_steel_guide_are_those_of_other_pro
         assert math.isnan(x) if expected is None else abs(x - expected) <= 1.01 * half
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("axial", "ns"), [(False, (5, 10, 20, 40)), (True, (5, 10, 20, 40, 80))])
 def test_a_chain_guide_converges_at_second_order(axial, ns):
     """The errors are relative to the Richardson limit of the chains.
@@ -358,6 +359,7 @@ def unit_of_last_digit(number):
 
 TABLES = (
     "beams", "end force", "end moment", "frequencies", "guide", "restitution", "heavy flexures",
+    "stress",
 )  # fmt: skip
 
 
@@ -391,6 +393,7 @@ def test_the_block_of_the_page_runs(capsys):
     assert re.fullmatch(r"f1 = \d\.\d{3} Hz\n", capsys.readouterr().out)
 
 
+@pytest.mark.slow
 def test_the_figures_are_drawn(tmp_path, monkeypatch):
     models = script()
     monkeypatch.setattr(models, "FIGURE", tmp_path / "figures" / "models.png")

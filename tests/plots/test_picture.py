@@ -1,7 +1,11 @@
 """Pictures of mechanisms: positions, names, modes, icons, and the command that draws them."""
 
+import math
+import re
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -10,7 +14,7 @@ from PIL import Image
 
 from prbm.base.errors import ParameterError
 from prbm.commands.command_line import main
-from prbm.drawing.icon import icon, shape
+from prbm.drawing.icon import BODY, POINTS, SVG, icon, shape, vector_icon
 from prbm.drawing.shapes import Shapes, box, corners, hull
 from prbm.drawing.style import png
 from prbm.files.mechanism_file import load, read_mechanism, shipped
@@ -126,6 +130,47 @@ def test_a_body_is_the_hull_of_its_points_around_the_centre_of_mass() -> None:
     area = 0.5 * abs(np.sum(triangle.real * np.roll(triangle.imag, -1)
                             - triangle.imag * np.roll(triangle.real, -1)))  # fmt: skip
     assert area == pytest.approx(0.5)
+
+
+def test_the_edge_of_a_notch_is_to_scale() -> None:
+    """Its area is that of the notch, and its width at the waist the thickness, in any shape."""
+    shapes, _ = shapes_of(mechanism("NotchGuide"))
+    length, radius, thickness = 0.01, 4e-3, 1e-3
+    exact = length * (thickness + 2 * radius) - math.pi * radius**2
+    for E in (shapes.straight, shapes_of(mechanism("NotchGuide"), 4e-3)[1]):
+        for line in shapes.flexures:
+            z = line.edge(E)
+            area = 0.5 * (z.conj() * np.roll(z, -1)).imag.sum()
+            assert area == pytest.approx(exact, rel=5e-3)
+            across = np.abs(z - z[::-1])[: len(z) // 2]
+            assert across.min() == pytest.approx(thickness, rel=1e-9)
+            assert across[[0, -1]] == pytest.approx(thickness + 2 * radius, rel=1e-9)
+
+
+def test_the_ground_is_normal_to_the_end_of_a_curved_flexure() -> None:
+    """The ends of the beams of the bistable are horizontal, their chords are not."""
+    shapes, _ = shapes_of(mechanism("CurvedBistable"))
+    places = [z[:2].mean() for z in shapes.ground()]
+    expected = [x + 1j * y for x in (-0.05, 0.05) for y in (-0.01, 0.01)]
+    np.testing.assert_allclose(sorted(places, key=np.angle), sorted(expected, key=np.angle))
+    for z in shapes.ground():
+        assert abs((z[1] - z[0]).real) < 0.02 * abs(z[1] - z[0])
+
+
+@pytest.mark.parametrize("name", ["PRBDM2R", "GuideBeam"])
+def test_the_ground_and_the_pins_of_flexures_that_end_on_the_ground(name: str) -> None:
+    """They do not depend on which end of a flexure is its start."""
+    found = []
+    for backwards in (False, True):
+        chosen = mechanism(name)
+        flexures = [replace(f, ends=("pin", "clamp")) for f in chosen.flexures]
+        if backwards:
+            flexures = [replace(f, start=f.end, end=f.start, ends=f.ends[::-1]) for f in flexures]
+        shapes, E = shapes_of(replace(chosen, flexures=tuple(flexures)))
+        found.append((np.array(shapes.ground()), shapes.pins(E)))
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-12)
+    assert abs(found[0][0][:, :2].mean(axis=1) - found[0][1]).max() < 1e-12
 
 
 def test_stretches_follow_from_recorded_outputs() -> None:
@@ -291,6 +336,49 @@ def test_the_icon_shows_the_shape_at_release(name: str) -> None:
     first, again = icon(chosen, sample), icon(chosen, sample)
     assert first == again
     assert first.startswith(b"\x89PNG")
+
+
+def bodies_of(drawing: bytes) -> list[np.ndarray]:
+    """Return the corners of areas with the colour of bodies, the largest first, without holes.
+
+    They are shares of the size of the SVG icon.
+    """
+    paths = ElementTree.fromstring(drawing).findall(f"{{{SVG}}}path")
+    outlines = (path.get("d", "").split("Z")[0] for path in paths if path.get("fill") == BODY)
+    numbers = (re.findall(r"-?\d+\.\d+", outline) for outline in outlines)
+    areas = [np.array(x, float).reshape(-1, 2) / POINTS for x in numbers]
+    return sorted(areas, key=lambda xy: -np.prod(np.ptp(xy, axis=0)))
+
+
+@pytest.mark.parametrize("name", list(shipped()))
+def test_the_svg_icon_has_the_parts_of_the_png_at_the_same_places(name: str) -> None:
+    """Halfway from the middle of each body to its corners, the PNG has the colour of bodies."""
+    chosen = mechanism(name)
+    sample = start_sample(chosen, {})
+    drawing = vector_icon(chosen, sample)
+    assert drawing == vector_icon(chosen, sample)
+    found = bodies_of(drawing)[: len(chosen.bodies)]
+    assert len(found) == len(chosen.bodies)
+    with Image.open(BytesIO(icon(chosen, sample))) as image:
+        pixels = np.array(image.convert("RGB"))
+    color = [int(BODY[k : k + 2], 16) for k in (1, 3, 5)]
+    for corners_of_body in found:
+        assert corners_of_body.min() > 0.0
+        assert corners_of_body.max() < 1.0
+        inside = corners_of_body.mean(axis=0) * 0.5 + corners_of_body * 0.5
+        x, y = (inside * len(pixels)).astype(int).T
+        matches = (np.abs(pixels[y, x].astype(int) - color).max(axis=1) < 8).mean()
+        assert matches >= 0.5, (name, matches)
+
+
+def test_the_title_of_an_icon_is_text() -> None:
+    """Quotes, markup and control characters of a title do not change the structure of the SVG."""
+    title = "</title><script>alert('a & \"b\"')</script>\x07"
+    chosen = replace(mechanism("PRBDM"), title=title)
+    plain = ElementTree.fromstring(vector_icon(mechanism("PRBDM"), start_sample(chosen, {})))
+    named = ElementTree.fromstring(vector_icon(chosen, start_sample(chosen, {})))
+    assert [element.tag for element in named.iter()] == [element.tag for element in plain.iter()]
+    assert named.findtext(f"{{{SVG}}}title") == title.replace("\x07", " ")
 
 
 # --- command ----------------------------------------------------------------------------------

@@ -38,6 +38,7 @@ def test_the_picture_and_the_page_describe_every_package(drawn):
     assert re.findall(r"^\| `(\w+)` \|", PAGE, re.MULTILINE) == layered
 
 
+@pytest.mark.slow
 def test_drawing_twice_gives_the_same_bytes(tmp_path):
     for name in ("a.png", "b.png"):
         SCRIPT["main"]([str(tmp_path / name)])

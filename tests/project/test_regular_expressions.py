@@ -127,6 +127,7 @@ def test_no_regular_expression_takes_more_than_quadratic_time(place):
         signal.signal(signal.SIGVTALRM, previous)
 
 
+@pytest.mark.slow
 def test_cubic_and_exponential_time_are_detected():
     """Two such expressions are added to the list for the duration of this test."""
     EXPRESSIONS["cubic"] = re.compile(r"\s*((?:'[^']*'|[^='#])+?)\s*=")

@@ -25,6 +25,7 @@ def test_arbitrary_calls_give_true_values_or_errors(kind):
         assert found.violations() == {}, found.details
 
 
+@pytest.mark.slow
 def test_oracles_report_penetration_energy_and_cost():
     """With limits that no FMU satisfies, each oracle reports violations."""
     limits = {"gap_atol": -1.0, "energy_rtol": -1.0, "energy_factor": 0.0, "call_seconds": 0.0}

@@ -286,6 +286,7 @@ MODAL_RESTITUTION = {  # Key: offset [m].  Values: walls at -10, 0, 10 mm, for r
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("offset", MODAL_RESTITUTION)
 def test_the_steel_guide_has_the_reference_modal_restitution(offset):
     fe = guide(WEIGHTLESS | {"stop.offset": offset})

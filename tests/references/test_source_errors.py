@@ -98,6 +98,7 @@ def test_2R_as_printed_gains_energy_and_ends_without_a_finite_state(stiffness_fa
     assert relative_energy(run).max() > 1e3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wall", [np.inf, 0.0], ids=["no wall", "wall"])
 @pytest.mark.parametrize("stiffness_factor", [True, False])
 def test_2R_with_the_convective_term_gains_no_energy(stiffness_factor, wall):
@@ -192,6 +193,7 @@ def test_an_impact_is_detected_up_to_a_step_late(step):
     assert exact < detected <= exact + step
 
 
+@pytest.mark.slow
 def test_the_guide_of_the_thesis_passes_through_the_wall_after_its_bounces():
     """Gravity presses the guide onto the wall, where it should rest.
 

@@ -93,7 +93,7 @@ def test_results_of_both_engines_are_equal(model):
     assert kernel.columns.dtype == python.columns.dtype
     assert kernel.values == python.values
     for name in ("time", *(f"{body.name}.x" for body in mechanism(model).bodies)):
-        scale = np.ptp(python[name])
+        scale = max(np.ptp(python[name]), 1e-6)  # m; symmetric mechanisms move in y only.
         np.testing.assert_allclose(kernel[name], python[name], atol=1e-5 * scale)
     assert len(kernel.impacts) == len(python.impacts)
 
@@ -115,6 +115,7 @@ def test_the_default_experiment_does_not_depend_on_the_engine(name):
     assert experiment(mechanism(name)) == experiment(mechanism(name), engine="python")
 
 
+@pytest.mark.slow
 def test_responses_maps_and_spectra_are_equal_in_both_engines():
     guide, times = mechanism("PRBDM2R"), np.linspace(0.0, 0.1, 40)
     series = Series(times, np.zeros(40))

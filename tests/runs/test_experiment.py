@@ -84,6 +84,7 @@ def test_motion_scales_with_the_size_of_the_mechanism():
     np.testing.assert_allclose(energy_a / small**3, energy_b / large**3, rtol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("links", "axial"), [(40, True), (12, False)])
 def test_reference_results_are_omitted_if_they_take_minutes(links, axial, monkeypatch):
     """The first chain is excluded by its frequencies, the second one after 5,000 steps."""
@@ -91,7 +92,7 @@ def test_reference_results_are_omitted_if_they_take_minutes(links, axial, monkey
     messages: list[str] = []
     chain = guide(0.1, "nR", n=links, axial=axial)
     begin = time.process_time()
-    assert reference.reference(chain, {}, (), experiment(chain), messages.append) == {}
+    assert reference.reference(chain, {}, (), experiment(chain), messages.append) == ()
     assert time.process_time() - begin < 30.0
     assert messages[-1] == f"no reference results: {reference.SLOW}"
 
@@ -101,6 +102,7 @@ def test_reference_results_of_shipped_mechanisms_are_not_excluded_by_their_frequ
         assert reference.steps(mechanism(name), {}, Experiment()) < reference.STEPS_MAX
 
 
+@pytest.mark.slow
 def test_versions_of_fmi_share_the_reference_results_of_many_mechanisms(monkeypatch):
     """All FMUs of one version are built before those of the next."""
     computed: list[str] = []
@@ -150,5 +152,5 @@ def test_the_documentation_shows_the_experiment_and_included_results(inside):
     native = described(small, {}, 3)
     html = native_page(small, native, 3, ["x86_64-linux"], chosen, inside)
     assert f"stop_time={chosen.stop_time:g}," in html
-    assert ("outputs of the default experiment" in html) == inside
+    assert ("reference results" in html) == inside
     assert f"stop_time={chosen.stop_time:g}," in page(small, interface(small, {}), chosen)

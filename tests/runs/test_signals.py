@@ -325,6 +325,26 @@ def test_slopes_are_derivatives(signal):
         assert Slope(signal).value(t, t) == signal.slope(t, t)
 
 
+@pytest.mark.parametrize(
+    ("values", "inputs"),
+    [
+        ({}, {"stop.velocity": "sine(0.1 m/s, 5 Hz)"}),
+        ({"stop.displacement": 1e-3}, {"stop.velocity": 0.1}),
+        ({"stop.velocity": 0.1}, {}),
+    ],
+)
+def test_a_velocity_of_a_wall_without_its_displacement_is_rejected(guide, values, inputs):
+    with pytest.raises(ParameterError, match=r"give stop\.displacement over time"):
+        simulate(guide, values, inputs=inputs, stop_time=1e-3)
+
+
+def test_a_wall_may_have_signals_of_its_displacement_and_of_its_velocity(guide):
+    given = {"stop.displacement": ([0.0, 0.02], [0.0, 2e-3]), "stop.velocity": "0.1 m/s"}
+    result = simulate(guide, {"stop.position": 0.01}, inputs=given, stop_time=0.02)
+    wall = result["stop.gap"] + result["shuttle.x"]
+    np.testing.assert_allclose(wall, 0.01 + 0.1 * result["time"], atol=1e-9)
+
+
 def test_a_function_is_not_evaluated_outside_of_the_simulated_time(guide):
     times = []
 

@@ -59,6 +59,7 @@ def snap_forces(displacements, thickness):
     return np.array(result)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("thickness", "last"), [(1e-3, 5.4e-3), (1.4e-3, 6.0e-3)])
 def test_snap_through_forces_are_those_of_the_boundary_value_problem(thickness, last):
     """The second stable shape exists for the thin beams only, whose force becomes negative.

@@ -103,6 +103,7 @@ def test_the_path_is_far_straighter_than_that_of_a_parallel_guide() -> None:
     assert np.all(errors["folded, one leaf 5 % thicker"][1:] < 0.1 * guide[1:])
 
 
+@pytest.mark.slow
 def test_the_first_impact_does_not_turn_the_shuttle() -> None:
     """The line of impact passes through the centre of mass, and the mechanism is symmetric."""
     result = run(FOLDED, stop_time=0.2)

@@ -39,6 +39,7 @@ def test_events_are_located_to_a_picosecond():
         assert abs(gap) < 1e-12 * impact.latched.approach_speed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rest_speed", "when"), [(1e-5, 0.1803), (1e-3, None)])
 def test_accumulating_bounces_end_in_a_resting_contact(rest_speed, when):
     """The bounces accumulate at 0.18034 s; rest begins up to 2 eps v_r/(a (1 - eps)) earlier."""

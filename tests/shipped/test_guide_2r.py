@@ -61,6 +61,7 @@ def default_run():
     return run()
 
 
+@pytest.mark.slow
 def test_default_experiment_has_about_14_impacts_and_ends_at_rest(default_run):
     sim, rows = default_run
     assert 12 <= len(sim.record) <= 16
@@ -98,6 +99,7 @@ def test_loops_stay_closed():
         assert np.abs((system.loops @ (e * v)).imag).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_a_change_of_1e_11_m_shifts_the_impacts_by_less_than_a_nanosecond(default_run):
     """Without the default damping, the motion would be chaotic."""
     sim, _ = default_run

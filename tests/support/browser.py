@@ -43,6 +43,13 @@ class Browser:
         self, path: Path, fragment: str = "", size: tuple[int, int] = WIDE, **features: str
     ) -> dict[str, str]:
         """Open a page and wait for its first simulation; return the data of its root element."""
+        self.view(path, fragment, size, **features)
+        return self.wait(lambda data: data.get("state") in ("done", "error"))
+
+    def view(
+        self, path: Path, fragment: str = "", size: tuple[int, int] = WIDE, **features: str
+    ) -> None:
+        """Open a page."""
         media = [{"name": name.replace("_", "-"), "value": x} for name, x in features.items()]
         screen = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": False}
         self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": media})
@@ -51,7 +58,6 @@ class Browser:
         for kind in ("browser", "performance"):
             self.driver.get_log(kind)
         self.driver.get(path.as_uri() + fragment)
-        return self.wait(lambda data: data.get("state") in ("done", "error"))
 
     def run(self, script: str, *arguments: object) -> Any:
         """Run a script in the page and return its result."""

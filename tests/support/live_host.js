@@ -49,6 +49,8 @@ function drawing(simulation, run, { content }) {
     q: [...q],
     points: [...simulation.points(q)],
     curves: shape.lines.map((line) => line.curve),
+    edges: shape.lines.map((line) => line.edge ?? []),
+    straight: shapes.straight.lines.map((line) => line.edge ?? line.curve),
     bodies: content.bodies.map((_, k) => shapes.body(k, shape.poses)),
     walls: content.stops.map((_, k) => shapes.wall(k, 0, shape.poses)),
     rest: [...rest],

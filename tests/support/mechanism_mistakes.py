@@ -536,6 +536,16 @@ CHANGES = {
         TRIANGLE.replace("[0.06, 0.02]", '"nose"'),
         "anvil.outline: 'nose' is not a point of the body anvil; its points are top, hook",
     ),
+    "corner with a unit": (
+        ANVIL,
+        TRIANGLE.replace("[0.06, 0.02]", '"6 cm"'),
+        "bodies.1.outline.2 (of anvil) = '6 cm': write a list of corners",
+    ),
+    "hole without its own list": (
+        ANVIL,
+        f'{TRIANGLE}holes = [["55 mm"]]\n',
+        "bodies.1.holes.0.0 (of anvil) = '55 mm': write a list of corners, [[..., ...], ",
+    ),
     "hole outside the outline": (
         ANVIL,
         f"{TRIANGLE}holes = [[[0, 0], [1e-3, 0], [0, 1e-3]]]\n",
@@ -579,7 +589,11 @@ CHANGES = {
         f"{TRIANGLE}holes = 3\n",
         "bodies.1.holes (of anvil) = 3: write a list of corners, [[..., ...], [..., ...], [..., .",
     ),
-    "mirror with a number": (LEFT, f"{LEFT}mirror = 3\n", "flexures.0.mirror (of left) = 3: write"),
+    "mirror with a number": (
+        LEFT,
+        f"{LEFT}mirror = 3\n",
+        "flexures.0.mirror (of left) = 3: write the line of symmetry",
+    ),
     "mirror with three lines": (
         LEFT,
         f'{LEFT}mirror = ["x = 0", "y = 0", "x = 1 m"]\n',
@@ -660,13 +674,18 @@ CHANGES = {
     ),
     "repeat that is a number": (LEFT, f"{LEFT}repeat = 3\n", "flexures.0.repeat (of left) = 3: wr"),
     # geometry of the drawing
+    "ends with a number": (
+        'ends = "clamp"',
+        "ends = 1",
+        "(of right) = 1: write clamp, pin or free",
+    ),
     "ends wrong": (
         'ends = "clamp"',
         'ends = "glue"',
         "right.ends = ('glue', 'glue'): choose each end among",
     ),
     "three ends": ('ends = ["clamp", "pin"]', 'ends = ["clamp", "pin", "pin"]', "flexures.2.ends"),
-    "only one end": ('ends = ["clamp", "pin"]', 'ends = ["clamp"]', "flexures.2.ends (of hanger)"),
+    "only one end": ('ends = ["clamp", "pin"]', 'ends = ["clamp"]', "clamp']: an end is missing"),
     "free at both ends": (
         'ends = "clamp"',
         'ends = "free"',
@@ -702,6 +721,11 @@ CHANGES = {
         'thickness = "0.1 mm"',
         'thickness = "20 mm"',
         "leaf.thickness = 0.02 m is not less than the length of the flexure left, 0.02 m",
+    ),
+    "taper as thick as it is long": (
+        'model = "2R"\nthickness = "0.1 mm"',
+        'model = "beam"\nprofile = "taper"\nend_thickness = 0.2\nthickness = "0.1 mm"',
+        "leaf.end_thickness = 0.2 m is not less than the length of the flexure left, 0.02 m: check",
     ),
     "joint of points drawn apart": (
         'points.hook = ["arm.length", 0]',

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
 
 import numpy as np
 import pytest
@@ -182,6 +183,9 @@ MISTAKES = [
     ({"vary": {"stop.positon": [0, 1e-3]}}, r"unknown variable 'stop\.positon'; did you mean"),
     ({"vary": {"stop.position": [1e-3]}}, "at least two samples are needed"),
     ({"vary": {"stop.position": [1e-3, 0.0]}}, "finite and increasing, in m"),
+    ({"vary": {"stop.position": ["0", "1 kg"]}}, "1 kg: the unit 'kg' has another dimension"),
+    ({"vary": {"stop.position": 1e-3}}, "at least two samples are needed"),
+    ({"vary": {"stop.position": [0.0, None]}}, "None: must be a number, in m"),
     ({"vary": {}}, "0 parameters are varied; vary one or two"),
     ({"vary": {"stop.position": np.arange(200_000)}}, "the study has 200000 simulations"),
     ({"outputs": []}, "no output is selected; name one, for instance settling"),
@@ -231,6 +235,73 @@ def test_mistakes_in_all_simulations_are_reported_before_the_first_one(
 def test_quantities_that_a_mechanism_does_not_have_are_rejected(mechanisms):
     with pytest.raises(ParameterError, match=r"unknown variable .stop\.x."):
         study(mechanisms["PRBDM"], {"stop.position": [0.0, 1e-3]}, ["max(stop.x)"])
+
+
+def test_samples_may_be_texts_with_units(mechanisms):
+    found = study(
+        mechanisms["PRBDM"], {"stop.position": ["-1 mm", 0, "2 mm"]}, ["impacts"],
+        stop_time=0.01, step=1e-3, workers=1,
+    )  # fmt: skip
+    assert found.varied["stop.position"].tolist() == [-1e-3, 0.0, 2e-3]
+
+
+def test_a_study_has_a_short_text():
+    x = np.linspace(0.0, 1.0, 5000)
+    best = module.Optimum("f", {"a": 0.25}, 2.0, {}, {}, np.zeros((5000, 1)), x)
+    found = Study({"a": x}, x[:, None], {"f": x}, {}, ("", "failed") * 2500, best)
+    assert repr(found) == (
+        "<Study of 5000 simulations over a: 2500 failed, <Optimum of f: 2 at a = 0.25>>"
+    )
+
+
+def test_an_interruption_ends_simulations_that_still_run(mechanisms):
+    options = {"stop_time": 2000.0, "step": 0.1}  # Much computing time.
+    setup = module.Setup(mechanisms["PRBDM2R"], (), {}, {}, options)
+    futures = []
+
+    def interrupted():
+        with module._pool(setup, 2, 2) as run:
+            futures.append(run({}))
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert isinstance(futures[0].exception(), BrokenProcessPool)
+
+
+def test_without_a_kernel_the_processes_are_given_the_python_engine(mechanisms, monkeypatch):
+    """The reason is then logged once, and not by each process."""
+    monkeypatch.setattr(module, "kernel_available", lambda: False)
+    setups = []
+
+    def pool(processes, context, prepare, arguments):
+        setups.extend(arguments)
+        raise InterruptedError
+
+    monkeypatch.setattr(module, "ProcessPoolExecutor", pool)
+    varied = {"stop.position": [0.0, 1e-3]}
+    for given, used in ((None, "python"), ("kernel", "kernel")):
+        with pytest.raises(InterruptedError):
+            study(mechanisms["PRBDM"], varied, ["impacts"], engine=given, stop_time=0.1, workers=2)
+        assert setups[-1].options["engine"] == used
+
+
+def test_the_number_of_processes_has_a_limit(mechanisms, monkeypatch):
+    started = []
+
+    def pool(processes, *_):
+        started.append(processes)
+        raise InterruptedError
+
+    monkeypatch.setattr(module, "ProcessPoolExecutor", pool)
+    monkeypatch.setattr(module, "PROCESSES_MAX", 61)
+    for workers, processes in ((100, 61), (3, 3)):
+        with pytest.raises(InterruptedError):
+            study(
+                mechanisms["PRBDM"], {"stop.position": np.linspace(0.0, 1e-3, 70)}, ["impacts"],
+                stop_time=0.01, workers=workers,
+            )  # fmt: skip
+        assert started[-1] == processes
 
 
 # --- figures --------------------------------------------------------------------------------------

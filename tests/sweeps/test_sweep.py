@@ -203,6 +203,7 @@ def test_one_failure_in_a_hundred_costs_one_row(native, fmi):
     assert good.nunique() == 1  # The stop has not been reached.
 
 
+@pytest.mark.slow
 def test_a_crash_an_exit_a_hang_and_an_error_cost_one_row_each(mishap, log):
     trouble = [FINE, RAISES, FINE, CRASHES, EXITS, FINE, HANGS, FINE]
     table = pd.DataFrame({"x": np.arange(8.0), "trouble": trouble})
@@ -230,6 +231,7 @@ def test_a_crash_that_is_not_reproduced_costs_no_row(mishap, log):
     assert runs(log) == {1.0: 1, 2.0: 2, 3.0: 2}
 
 
+@pytest.mark.slow
 def test_failed_runs_are_repeated_on_request(mishap, log):
     """Successful runs in the same part are not repeated; the files have all rows in order."""
     table = pd.DataFrame({"x": np.arange(12.0), "trouble": FINE})
@@ -278,6 +280,7 @@ def on_disk() -> int:
     return len(pd.read_parquet("results.parquet"))
 
 
+@pytest.mark.slow
 def test_a_killed_sweep_continues_with_the_remaining_rows(mishap, log):
     """No run that is on disk is repeated, and the files have all rows in order."""
     LONG.to_csv("table.csv", index=False)

@@ -4,8 +4,9 @@ The mechanism starts at rest in its equilibrium.  The pulse is the acceleration 
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,6 +30,7 @@ PULSES = (HALF_SINE, SAWTOOTH, TRAPEZOID)
 PULSE_STEPS = 50  # Communication steps of a pulse, at least.
 GRAVITY = 9.80665  # Standard acceleration of gravity [m/s^2].
 LEVEL_RTOL = 1e-3  # Error of the level at which a flexure yields.
+PEAKS_MAX = 16  # Largest number of peaks in a search for this level.
 
 
 @dataclass(frozen=True)
@@ -232,20 +234,56 @@ def _hits(result: Result, stop: str) -> Hits:
     )  # fmt: skip
 
 
+class Fragility(NamedTuple):
+    """Shocks over the peak of their pulse.
+
+    Parameters
+    ----------
+    peaks : list of float
+        Peaks, in ascending order [m/s^2].
+    shocks : list of Shock
+        A shock for each peak.
+    level : float
+        Least peak at which a flexure yields [m/s^2].  NaN if no flexure yields, or if one yields
+        at the first peak.
+    """
+
+    peaks: list[float]
+    shocks: list[Shock]
+    level: float
+
+
 def fragility(
     mechanism: Mechanism,
     pulse: Pulse,
-    peaks: Sequence[float],
+    peaks: Sequence[float] | None = None,
     values: Mapping[str, float] | None = None,
     *,
     stop_time: float | None = None,
     progress: Progress | None = None,
     engine: str | None = None,
-) -> tuple[list[Shock], float]:
-    """Return shocks with several peaks [m/s^2], and the least peak at which a flexure yields.
+) -> Fragility:
+    """Return shocks with several peaks, and the least peak at which a flexure yields.
 
     The level is found between the first of the peaks at which the safety factor is below 1, and
-    the one before.  It is NaN if no flexure yields, or if one yields at the first peak.
+    the one before.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The mechanism.
+    pulse : Pulse
+        Shape, duration and direction of the pulse.
+    peaks : sequence of float or None
+        Peaks in ascending order [m/s^2].  None: that of the pulse, and its products with powers of
+        2 until one flexure yields, or no flexure yields, or :data:`PEAKS_MAX` peaks are computed.
+    values, stop_time, progress, engine
+        As for :func:`shock`.
+
+    Raises
+    ------
+    ParameterError
+        If the peaks are not given, and no flexure has a yield strength.
     """
 
     def at(peak: float) -> Shock:
@@ -255,16 +293,43 @@ def fragility(
             stop_time=stop_time, engine=engine,
         )  # fmt: skip
 
-    found = []
-    for k, peak in enumerate(peaks):
-        found.append(at(peak))
-        if progress is not None:
-            progress((k + 1) / len(peaks))
-    failing = next((k for k, one in enumerate(found) if one.safety < 1.0), 0)
+    report: Progress = progress or (lambda fraction: None)
+    if peaks is None:
+        found = _doubled(at, pulse.peak, mechanism, report)
+    else:
+        found = {}
+        for k, peak in enumerate(peaks):
+            found[peak] = at(peak)
+            report((k + 1) / len(peaks))
+    known, shocks = list(found), list(found.values())
+    failing = next((k for k, one in enumerate(shocks) if one.safety < 1.0), 0)
     if failing == 0:
-        return found, math.nan
-    low, high = peaks[failing - 1], peaks[failing]
+        return Fragility(known, shocks, math.nan)
+    low, high = known[failing - 1], known[failing]
     while high - low > LEVEL_RTOL * high:
         middle = 0.5 * (low + high)
         low, high = (low, middle) if at(middle).safety < 1.0 else (middle, high)
-    return found, 0.5 * (low + high)
+    return Fragility(known, shocks, 0.5 * (low + high))
+
+
+def _doubled(
+    at: Callable[[float], Shock], peak: float, mechanism: Mechanism, report: Progress
+) -> dict[float, Shock]:
+    """Return shocks by their peaks, from one at which no flexure yields to one at which one does.
+
+    Neighbours differ by a factor of 2.
+    """
+    if all(kind.yield_strength is None for kind in mechanism.flexure_types):
+        raise ParameterError(
+            f"{mechanism.name} has no yield_strength: add it to the material, or give the peaks"
+        )
+    found = {peak: at(peak)}
+    fails = found[peak].safety < 1.0
+    while len(found) < PEAKS_MAX:
+        peak *= 0.5 if fails else 2.0
+        found[peak] = at(peak)
+        report(len(found) / PEAKS_MAX)
+        if (found[peak].safety < 1.0) != fails:
+            break
+    report(1.0)
+    return dict(sorted(found.items()))

@@ -1,7 +1,8 @@
 r"""Safety factors and fatigue of flexures, from the stress in a result.
 
-Cycles of the signed stress at both ends are counted by the rainflow method [1].  Goodman's line
-converts the amplitude of a cycle with a tensile mean to that of a fully reversed one,
+Cycles of the signed stress at both ends, and in the section of the largest stress, are counted by
+the rainflow method [1].  Goodman's line converts the amplitude of a cycle with a tensile mean to
+that of a fully reversed one,
 
     reversed = amplitude / (1 - mean / tensile_strength),
 
@@ -10,9 +11,6 @@ strength at 1,000 cycles and the fatigue strength at its number of cycles [2], a
 sides: there is no endurance limit.  By Miner's rule, the damage is the sum of all cycles over their
 numbers to failure.  This is an estimate: surface, size, notches and scatter are not known.
 
-The right face is the mirror of the left one: its normal stress, which is small in flexures that
-bend, is taken with the opposite sign.
-
 Sources
 -------
 .. [1] ASTM E1049-85, Standard Practices for Cycle Counting in Fatigue Analysis.
@@ -20,6 +18,7 @@ Sources
 """
 
 import math
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -30,9 +29,11 @@ from ..mechanics.stress import stressed
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import FlexureType
 from ..runs.result import Columns, column
+from .stress_field import StressField
 
 KNEE_SHARE = 0.9  # Of the tensile strength: the amplitude that is survived for KNEE_CYCLES.
 KNEE_CYCLES = 1e3
+LOG_MAX = math.log(sys.float_info.max)
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ class Loading:
     safety : float or None
         Yield strength over the peak; None without a yield strength.
     damage : float or None
-        Damage of the run at the worse end and face; None without a fatigue strength.
+        Damage of the run in the worst section and face; None without a fatigue strength.
     """
 
     flexure: str
@@ -136,7 +137,8 @@ def cycles_to_failure(
     if not math.isfinite(amplitude):
         return 0.0
     exponent = math.log(fatigue / (knee * tensile)) / math.log(fatigue_cycles / KNEE_CYCLES)
-    return math.exp(math.log(KNEE_CYCLES) + math.log(amplitude / (knee * tensile)) / exponent)
+    size = math.log(KNEE_CYCLES) + math.log(amplitude / (knee * tensile)) / exponent
+    return math.exp(size) if size < LOG_MAX else math.inf
 
 
 def damage(series: Sequence[float] | Real, kind: FlexureType) -> float | None:
@@ -155,7 +157,13 @@ def damage(series: Sequence[float] | Real, kind: FlexureType) -> float | None:
     return total
 
 
-def loadings(columns: Columns, mechanism: Mechanism, *, fatigue: bool = True) -> list[Loading]:
+def loadings(
+    columns: Columns,
+    mechanism: Mechanism,
+    *,
+    fatigue: bool = True,
+    stress: StressField | None = None,
+) -> list[Loading]:
     """Return the largest stress and the fatigue of all flexures whose stress is an output.
 
     Parameters
@@ -166,6 +174,9 @@ def loadings(columns: Columns, mechanism: Mechanism, *, fatigue: bool = True) ->
         The mechanism that was simulated.
     fatigue : bool
         Whether to count cycles.
+    stress : StressField or None
+        The stress in all sections.  With it, the cycles are also those of the section with the
+        largest stress, for example of the waist of a notch; None: those of the ends only.
     """
     kinds = {kind.name: kind for kind in mechanism.flexure_types}
     result = []
@@ -177,10 +188,19 @@ def loadings(columns: Columns, mechanism: Mechanism, *, fatigue: bool = True) ->
             for output in ("peak_stress", "peak_stress_time", "peak_stress_position")
         )
         safety = kind.yield_strength / peak if kind.yield_strength and peak > 0.0 else None
-        histories = [column(columns, f"{name}.stress_{end}") for end in ("start", "end")]
         worst = None
         if fatigue and kind.fatigue_strength is not None:
-            both = [face for one in histories for face in (one, -np.asarray(one))]
-            worst = max(damage(face, kind) or 0.0 for face in both)
+            worst = max(damage(face, kind) or 0.0 for face in _histories(columns, name, stress))
         result.append(Loading(name, peak, time, position, safety, worst))
     return result
+
+
+def _histories(columns: Columns, flexure: str, stress: StressField | None) -> list[Real]:
+    """Return the stress of both faces over time, at the ends and where it is largest [Pa]."""
+    if stress is None:
+        ends = [np.asarray(column(columns, f"{flexure}.stress_{e}")) for e in ("start", "end")]
+        return [face for one in ends for face in (one, -one)]
+    faces = stress.faces[flexure]
+    largest = int(np.abs(faces).max(axis=(0, 1)).argmax())
+    places = sorted({0, largest, faces.shape[2] - 1})
+    return [faces[:, face, place] for place in places for face in (0, 1)]

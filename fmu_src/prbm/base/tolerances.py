@@ -150,10 +150,13 @@ DEPENDENT_PIVOT_RTOL = 1e-7  # Of the largest pivot: smaller pivots make the sta
 
 # --- beams ---
 
+NOTCH_LENGTH_RTOL = 1e-9  # Of the length of a flexure: excess of its notch that is round-off.
 NOTCH_PEAK_FACTOR = 0.7  # Of the distance of the poles: width of the peak where nodes are dense.
 FINE_POINTS = 8  # Gauss points between two nodes, for the integrals of the flexibility.
 GAUSS_ITERATIONS_MAX = 8  # The nodes of Gauss' quadrature need four iterations of Newton's method.
 
 # --- stress ---
 
+WAIST_ATOL = 1e-12  # Of half a panel: a point that is nearer to a waist is at the waist.
+CONCENTRATION_SERIES_MAX = 1e-6  # Of half the waist over the radius: the series has one term.
 STRESS_TIE_RTOL = 1e-9  # Stresses of two sections that differ less are equal apart from round-off.

@@ -148,6 +148,7 @@ def animation_arguments(parser: ArgumentParser) -> None:
         help="factor of slow motion (default: a round factor for a film of about ten seconds)",
     )  # fmt: skip
     engine_argument(parser)
+    add("--stress", action="store_true", help="draw the stress of the flexures as their colour")
     add("--fps", type=float, metavar="N", help="frames per second (default: 25)")
     add("--from", dest="start", metavar="T", help="first time shown [s] (default: the release)")
     add(
@@ -253,6 +254,14 @@ def set_argument(parser: ArgumentParser, meaning: str = "value of a parameter") 
     )  # fmt: skip
 
 
+def parameters_argument(parser: ArgumentParser) -> None:
+    """Add --parameters."""
+    parser.add_argument(
+        "--parameters", metavar="FILE.ssv",
+        help="parameter set (SSV), as prbm parameters --out writes; --set has priority",
+    )  # fmt: skip
+
+
 def stress_arguments(parser: ArgumentParser) -> None:
     """Add the arguments of ``prbm stress``."""
     parser.add_argument(
@@ -279,6 +288,10 @@ def shock_arguments(parser: ArgumentParser) -> None:
     add(
         "--peaks", nargs="+", metavar="A",
         help="several peaks, for the level at which a flexure yields",
+    )  # fmt: skip
+    add(
+        "--sweep", choices=("peak",),
+        help="search for the level at which a flexure yields, from --peak on (default: 100 g)",
     )  # fmt: skip
     add("--record", metavar="FILE.csv", help="acceleration over time, in place of a pulse")
     stop_time_argument(parser)

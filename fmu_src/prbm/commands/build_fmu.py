@@ -8,12 +8,13 @@ import sys
 
 from ..fmu.date import date
 from .missing import missing_package
-from .program import INTERRUPTED, MISTAKE, command_name, limit_threads
+from .program import INTERRUPTED, MISTAKE, command_name, escape_output, limit_threads
 
 
 def main() -> int:
     """Run the command; return its exit status."""
     limit_threads()
+    escape_output()
     try:
         try:
             date()  # SciPy cannot be imported with an invalid date: numpy.f2py reads it, too.

@@ -20,6 +20,7 @@ from ..base.version import __version__
 from ..files.mechanism_file import read_mechanism, schema, shipped
 from ..files.settings import UserMistake, assigned, units_of
 from ..fmu import native_fmu, python_fmu
+from ..fmu.parameter_sets import read_parameter_set
 from ..kernel.compiler import ALL, HOST, PLATFORMS, CompilerError, this_platform
 from ..mechanism.description import Mechanism
 from .arguments import ProposingParser
@@ -97,6 +98,11 @@ def parser() -> argparse.ArgumentParser:
         "--set", action="append", default=[], dest="changes", metavar="NAME=VALUE",
         help='start value of a parameter or input, in SI or with a unit: "stop.position=1 mm"; '
         "repeatable",
+    )  # fmt: skip
+    p.add_argument(
+        "--parameters", type=Path, metavar="FILE.ssv",
+        help="start values from a parameter set (SSV), as prbm parameters --out writes; --set has "
+        "priority",
     )  # fmt: skip
     p.add_argument(
         "--simulate", action="store_true",
@@ -242,7 +248,7 @@ def _plan(options: argparse.Namespace) -> BuildPlan:
     chosen = mechanisms(options)
     plan = BuildPlan(
         tuple(chosen),
-        start_values(chosen, options.changes),
+        start_values(chosen, options.changes, options.parameters),
         selected_flavours(options),
         selected_platforms(options),
         bool(options.flavour or options.fmi or options.platform or options.clock),
@@ -281,15 +287,19 @@ def mechanisms(options: argparse.Namespace) -> list[Mechanism]:
     return [read_mechanism(files[name]) for name in names]
 
 
-def start_values(chosen: Sequence[Mechanism], texts: Sequence[str]) -> dict[str, float]:
+def start_values(
+    chosen: Sequence[Mechanism], texts: Sequence[str], parameters: Path | None = None
+) -> dict[str, float]:
     """Read NAME=VALUE pairs of parameters and inputs of mechanisms, in SI or with a unit.
+
+    Values in the parameter set ``parameters`` (SSV) are start values, too; the pairs have priority.
 
     Raises
     ------
     UserMistake
         If a text is not such a pair, or only some of the mechanisms have the variable.
     ParameterError
-        If no mechanism has the variable.
+        If no mechanism has the variable, or the parameter set is invalid.
 
     Examples
     --------
@@ -298,14 +308,16 @@ def start_values(chosen: Sequence[Mechanism], texts: Sequence[str]) -> dict[str,
     {'stop.restitution': 0.5, 'stop.position': 0.001}
     """
     units = {mechanism.name: units_of(mechanism) for mechanism in chosen}
-    changes = assigned(reduce(or_, units.values()), texts)
+    known = reduce(or_, units.values())
+    changes = {} if parameters is None else read_parameter_set(parameters, known)
+    changes |= assigned(known, texts)
     for name in changes:
         having = [model for model in units if name in units[model]]
         lacking = [model for model in units if name not in units[model]]
         if lacking:
             options = " ".join(f"--model {model}" for model in having)
             raise UserMistake(
-                f"--set {name}: no such parameter or input in {', '.join(lacking)}; add {options} "
+                f"{name}: no such parameter or input in {', '.join(lacking)}; add {options} "
                 "to build only mechanisms that have it"
             )
     return changes

@@ -30,6 +30,7 @@ from .arguments import (
     input_argument,
     mechanism_argument,
     out_argument,
+    parameters_argument,
     picture_arguments,
     record_arguments,
     response_arguments,
@@ -72,6 +73,7 @@ def parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     commands = p.add_subparsers(title="commands", metavar="COMMAND", parser_class=Parser)
     _list(commands)
+    _parameters(commands)
     _modes(commands)
     _equilibrium(commands)
     _simulate(commands)
@@ -86,6 +88,7 @@ def parser() -> argparse.ArgumentParser:
     _picture(commands)
     _animate(commands)
     _explore(commands)
+    _modelica(commands)
     _validate(commands)
     _completion(commands)
     return p
@@ -103,6 +106,23 @@ def _list(commands: Commands) -> None:
         examples("prbm list"),
         details="Beams are the most accurate model of flexures (GuideBeam). PRBDM, PRBDM2R and "
         "PRBDM3R are the same guide by models with 1, 2 and 3 pivots, for comparison.",
+    )
+
+
+def _parameters(commands: Commands) -> None:
+    parser = add_command(
+        commands, "parameters", "parameters:print_parameters",
+        "parameters of a mechanism, also as a parameter set (SSV) for other tools",
+        examples(
+            "prbm parameters PRBDM",
+            "prbm parameters PRBDM --set flexure.length=50mm --out long.ssv",
+        ),
+    )  # fmt: skip
+    mechanism_argument(parser)
+    set_argument(parser, "value of a parameter or input")
+    parameters_argument(parser)
+    parser.add_argument(
+        "--out", type=Path, metavar="FILE.ssv", help="file to write (default: none is written)"
     )
 
 
@@ -202,6 +222,7 @@ def _simulate(commands: Commands) -> None:
         help="relative tolerance of the integration (default: solver.tolerance)",
     )  # fmt: skip
     set_argument(parser, "value of a parameter or input")
+    parameters_argument(parser)
     input_argument(parser)
     add(
         "--spectrum", nargs="?", const="first", choices=("first", "last"),
@@ -405,6 +426,31 @@ def _explore(commands: Commands) -> None:
         "--no-open", action="store_false", dest="open", help="do not open the page in the browser"
     )
     set_argument(parser, "value of a parameter or input")
+    parameters_argument(parser)
+
+
+def _modelica(commands: Commands) -> None:
+    parser = add_command(
+        commands, "modelica", "modelica:write_wrapper",
+        "write a Modelica package around the FMU of a mechanism: signals, and forces as flanges",
+        examples("prbm modelica PRBDM", "prbm modelica PRBDM --names underscore --out Guide.mo"),
+        details="Import the FMU in the Modelica tool first: the package contains that block.",
+    )  # fmt: skip
+    mechanism_argument(parser)
+    add = parser.add_argument
+    add(
+        "--names", default="structured", choices=("structured", "underscore"),
+        help="names of variables in the imported block: force.x, or force_x as in OpenModelica "
+        "(default: %(default)s)",
+    )  # fmt: skip
+    add(
+        "--fmu", metavar="CLASS",
+        help="name of the imported block (default: MECHANISM_fmu, with --names underscore "
+        "MECHANISM_me_FMU)",
+    )  # fmt: skip
+    add("--out", type=Path, metavar="FILE.mo", help="file to write (default: MECHANISMWrapper.mo)")
+    set_argument(parser, "start value of a parameter or input")
+    parameters_argument(parser)
 
 
 def _validate(commands: Commands) -> None:
@@ -482,6 +528,9 @@ def _run(words: Sequence[str]) -> int:
         return _reported(str(error), MISTAKE)
     except KeyboardInterrupt as stop:
         return _reported(f"{name}: {str(stop) or 'interrupted'}", INTERRUPTED)
+    except MemoryError:
+        sentence = "there is not enough memory; choose fewer rows or samples, or a shorter time"
+        return _reported(f"{name}: {sentence}", FAILED)
     except Exception as error:
         status = _status(error)
         if status is None:

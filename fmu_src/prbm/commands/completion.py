@@ -23,7 +23,11 @@ _prbm() {{
     esac
     COMPREPLY=($(compgen -W "$words" -- "$word"))
     if [ -n "$files" ]; then
-        COMPREPLY+=($(compgen -f -X "$files" -- "$word"))
+        local file
+        while IFS= read -r file; do  # A line is a name, which may contain blanks.
+            COMPREPLY+=("$file")
+            compopt -o filenames 2> /dev/null
+        done < <(compgen -f -X "$files" -- "$word"; compgen -d -- "$word")
     fi
 }}
 complete -o default -F _prbm prbm

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from ..base.atomic import check_file, write
 from ..files.mechanism_file import load
-from ..files.settings import settings
 from ..fmu.explorer import explorer
+from .parameters import given_values
 
 
 def write_page(options: argparse.Namespace) -> None:
@@ -15,7 +15,7 @@ def write_page(options: argparse.Namespace) -> None:
     mechanism = load(options.mechanism)
     path = options.out or Path(f"{mechanism.name}.html")
     check_file(path)
-    page = explorer(mechanism, settings(mechanism, options.set))
+    page = explorer(mechanism, given_values(mechanism, options))
     path.parent.mkdir(parents=True, exist_ok=True)
     write(path, page.encode())
     print(path)

@@ -26,7 +26,7 @@ from ..mechanism.description import Mechanism
 from ..plots.figures import response
 from ..runs.headline import headline
 from ..runs.quantities import FREQUENCY
-from .program import FAILED, INTERRUPTED, MISTAKE, OK
+from .program import FAILED, INTERRUPTED, MISTAKE, OK, escape_output
 
 
 @dataclass(frozen=True)
@@ -131,6 +131,7 @@ def summary(run: Run) -> list[str]:
 
 def main(arguments: Sequence[str]) -> int:
     """Simulate the FMU of the first argument; write the plot to the second."""
+    escape_output()
     fmu, picture = Path(arguments[0]), Path(arguments[1])
     try:
         run = simulate(fmu, reporter())

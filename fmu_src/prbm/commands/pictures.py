@@ -5,6 +5,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from ..analysis.adequacy import Vibration, notes
+from ..analysis.strength import with_stress
+from ..analysis.stress_field import StressRecorder
 from ..base.atomic import FileError, check_file
 from ..base.errors import ParameterError
 from ..base.names import unknown
@@ -69,9 +71,11 @@ def run_animation(options: argparse.Namespace) -> None:
     check_encoder(path)
     check_file(path)
     start, stop = _seconds(options.start, "--from"), _seconds(options.stop, "--to")
-    moved = motion(_result(options))
+    recorder = StressRecorder() if options.stress else None
+    moved = motion(_result(options, recorder))
     fps = FPS if options.fps is None else options.fps
-    scene = Scene(moved, film(moved, options.slow, fps, start, stop))
+    stress = None if recorder is None else recorder.field
+    scene = Scene(moved, film(moved, options.slow, fps, start, stop), stress=stress)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -83,7 +87,7 @@ def _seconds(text: str | None, option: str) -> float | None:
     return None if text is None else quantity(text, "s", option)
 
 
-def _result(options: argparse.Namespace) -> Result:
+def _result(options: argparse.Namespace, recorder: StressRecorder | None) -> Result:
     """Return the result to show, read from a file or simulated."""
     mechanism, files = _named(options)
     if len(files) == 1:
@@ -91,14 +95,18 @@ def _result(options: argparse.Namespace) -> Result:
             raise ParameterError(
                 "nothing to show: give RESULT.csv, MECHANISM, --model or --mechanism"
             )
+        if recorder is not None:
+            mechanism = with_stress(mechanism)
         changes = settings(mechanism, options.set)
         stop_time, step = span(mechanism, changes, options.stop_time, engine=options.engine)
         return simulate(
             mechanism, changes, inputs=given_inputs(options), stop_time=stop_time, step=step,
-            engine=options.engine,
+            engine=options.engine, observer=recorder,
         )  # fmt: skip
     if options.input:
         raise UserMistake("--input: a result is shown; give a mechanism to simulate instead")
+    if recorder is not None:
+        raise UserMistake("--stress: a result has no stress in all sections; give a mechanism")
     if len(files) > 2:
         raise ParameterError(f"{len(files)} files are given; expected RESULT.csv OUT, or OUT")
     columns = read_csv(files[0])

@@ -1,5 +1,6 @@
-"""Exit statuses, threads and names of the commands."""
+"""Exit statuses, threads, output and names of the commands."""
 
+import io
 import os
 import sys
 from pathlib import Path
@@ -23,6 +24,15 @@ def limit_threads() -> None:
     """
     for name in THREADS:
         os.environ.setdefault(name, "1")
+
+
+def escape_output() -> None:
+    r"""Print characters that the encoding of the output lacks as escapes, such as ``\xb5``.
+
+    A redirected output may have an encoding without the characters of units or paths.
+    """
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
 
 
 def command_name() -> str:

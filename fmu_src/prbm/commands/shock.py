@@ -13,6 +13,8 @@ from ..mechanism.description import Mechanism
 from ..runs.headline import instant, length
 from .output import Output, aligned
 
+FIRST_PEAK = 100 * GRAVITY  # First peak of a search for the level of failure [m/s^2].
+
 
 def run_shock(options: argparse.Namespace) -> None:
     """Simulate a shock and print its effect."""
@@ -29,7 +31,7 @@ def run_shock(options: argparse.Namespace) -> None:
             progress=reporter(), engine=options.engine,
         )  # fmt: skip
         _print(found, mechanism, f"record {options.record}")
-    elif options.peaks:
+    elif options.peaks or options.sweep:
         _sweep(options, mechanism, values, stop_time, output)
         return
     else:
@@ -53,7 +55,7 @@ def run_shock(options: argparse.Namespace) -> None:
 
 def _check_record(options: argparse.Namespace) -> None:
     """Reject options of a pulse beside a record."""
-    for name in ("peak", "height", "duration", "peaks"):
+    for name in ("peak", "height", "duration", "peaks", "sweep"):
         if getattr(options, name):
             raise UserMistake(f"--record excludes --{name}: the record has the acceleration")
 
@@ -115,27 +117,29 @@ def _sweep(
     output: Output,
 ) -> None:
     """Print the effect over the peak, and the level at which a flexure yields."""
-    if options.peak or options.height:
+    if options.peaks and (options.peak or options.height):
         raise UserMistake("--peaks excludes --peak and --height")
-    peaks = sorted(quantities(options.peaks, "m/s2", "--peaks"))
-    pulse = _pulse(options, peaks[0])
-    found, level = fragility(
+    peaks = sorted(quantities(options.peaks, "m/s2", "--peaks")) if options.peaks else None
+    first = peaks[0] if peaks else None if options.peak or options.height else FIRST_PEAK
+    pulse = _pulse(options, first)
+    found = fragility(
         mechanism, pulse, peaks, values, stop_time=stop_time, progress=reporter(),
         engine=options.engine,
     )  # fmt: skip
+    level = found.level
     factor, unit = length_unit(assemble(mechanism, mechanism.values()).length)
     factor, unit = (180 / math.pi, "deg") if mechanism.release.turns else (factor, unit)
     rows = [
         [
-            f"{peak / GRAVITY:.4g}", f"{factor * one.displacement:.4g}",
+            f"{peak / GRAVITY:.6g}", f"{factor * one.displacement:.4g}",
             str(sum(hits.count for hits in one.hits)), f"{1e-6 * one.peak_stress:.4g}",
             "-" if math.isinf(one.safety) else f"{one.safety:.3g}",
         ]
-        for peak, one in zip(peaks, found, strict=True)
+        for peak, one in zip(found.peaks, found.shocks, strict=True)
     ]  # fmt: skip
     print(f"{mechanism.name}: {pulse.kind} of {1e3 * pulse.duration:.4g} ms along {pulse.axis}")
     print(aligned(("peak [g]", f"displacement [{unit}]", "hits", "stress [MPa]", "safety"), rows))
-    if all(math.isinf(one.safety) for one in found):
+    if all(math.isinf(one.safety) for one in found.shocks):
         print("no safety factor without yield_strength: add it to the material")
     elif math.isnan(level):
         print("yield                at none of these peaks, or below the first")
@@ -146,7 +150,11 @@ def _sweep(
         ["peak [m/s2]", "displacement", "hits", "stress [Pa]", "safety factor [-]"],
         [
             [p, x.displacement, sum(h.count for h in x.hits), x.peak_stress, x.safety]
-            for p, x in zip(peaks, found, strict=True)
+            for p, x in zip(found.peaks, found.shocks, strict=True)
         ],
     )
+    if options.out is not None:
+        from ..plots.shock import fragility_figure  # imported here: it takes a second
+
+        output.figure(f"{mechanism.name}-fragility.png", lambda: fragility_figure(*found))
     output.write()

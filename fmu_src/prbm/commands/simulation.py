@@ -11,7 +11,7 @@ from ..analysis.adequacy import Impact, Shape, Vibration, notes
 from ..base.progress import reporter
 from ..base.unit_text import frequency_text
 from ..files.mechanism_file import load
-from ..files.settings import UserMistake, quantity, settings
+from ..files.settings import UserMistake, quantity
 from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble
 from ..mechanism.description import Mechanism
@@ -20,6 +20,7 @@ from ..runs.result import Result, names
 from ..runs.run import communication_points, simulate
 from .duration import given_inputs, span
 from .output import Output
+from .parameters import given_values
 from .systems import ZERO_RTOL
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ SPECTRUM_END = 1.5  # Upper end of a drawn spectrum, in multiples of its highest
 def run_simulation(options: argparse.Namespace) -> None:
     """Simulate the motion after the release and print a summary."""
     mechanism = load(options.mechanism)
-    values = settings(mechanism, options.set)
+    values = given_values(mechanism, options)
     output = Output(options.out)
     stop_time, step = span(mechanism, values, options.stop_time, options.step, options.engine)
     duration = quantity(options.spectrum_time, "s", "--spectrum-time")

@@ -3,6 +3,7 @@
 import argparse
 
 from ..analysis.strength import Loading, loadings, with_stress
+from ..analysis.stress_field import StressRecorder
 from ..base.progress import reporter
 from ..files.mechanism_file import load
 from ..files.settings import UserMistake, quantities, settings
@@ -50,9 +51,10 @@ def _held(options: argparse.Namespace, mechanism: Mechanism) -> None:
         f"at [{unit.shown}]", "flexure", "start [MPa]", "end [MPa]", "largest [MPa]",
         "yield/largest",
     )  # fmt: skip
-    rows, table = [], []
+    rows, table, held = [], [], []
     for text in quantities(options.held, unit.si, "--held"):
         x = check_held(text, system, "--held")
+        held.append(x)
         for name, one in static_stresses(system, equilibrium(system, x)).items():
             safety = _safety(one, _kind(mechanism, name))
             numbers = [1e-6 * y for y in (one.start, one.end, one.largest)]
@@ -71,6 +73,14 @@ def _held(options: argparse.Namespace, mechanism: Mechanism) -> None:
         ],
         table,
     )  # fmt: skip
+    if options.out is not None:
+        from ..plots.stress import stress_figure  # imported here: it takes a second
+
+        labels = [f"held at {unit.factor * x:.4g} {unit.shown}" for x in held]
+        output.figure(
+            f"{mechanism.name}-stress.png",
+            lambda: stress_figure(mechanism, values, held, labels),
+        )
     output.write()
 
 
@@ -83,11 +93,12 @@ def _moving(options: argparse.Namespace, mechanism: Mechanism) -> None:
     values, output = settings(mechanism, options.set), Output(options.out)
     stop_time, step = span(mechanism, values, options.stop_time, None, options.engine)
     communication_points(stop_time, step / ROWS_PER_STEP)
+    recorder = StressRecorder()
     result = simulate(
         mechanism, values, inputs=given_inputs(options), stop_time=stop_time,
-        step=step / ROWS_PER_STEP, progress=reporter(), engine=options.engine,
+        step=step / ROWS_PER_STEP, progress=reporter(), engine=options.engine, observer=recorder,
     )  # fmt: skip
-    found = loadings(result.columns, mechanism)
+    found = loadings(result.columns, mechanism, stress=recorder.field)
     size = assemble(mechanism, mechanism.values()).length
     print(f"{mechanism.name}: largest stress in {stop_time:g} s")
     print(aligned(HEAD, [_row(one, stop_time, size) for one in found]))

@@ -5,7 +5,7 @@ are linear in E, so that E (1 + i a w) is the shape displaced by the amplitude a
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
@@ -13,15 +13,17 @@ from scipy.spatial import ConvexHull, QhullError
 from ..mechanics.arrays import Complex, Real
 from ..mechanics.system import FIXED, BodyFrame, Outline, System, unit
 from ..mechanism.expressions import affine
-from ..mechanism.flexure import BEAM, PIN
+from ..mechanism.flexure import BEAM, LEAF, PIN
 from ..mechanism.parts import GROUND, Flexure, Point, Stop, body_of, value
 
 CURVE_POINTS = 40  # Points of the drawn curve of a flexure.
 # Shares of the size of the mechanism:
 BODY_THICKNESS_MIN = 0.04  # Drawn thickness of a body without height.
 WALL_LENGTH, GROUND_LENGTH = 0.36, 0.16
+COINCIDENT_RTOL = 1e-9  # Sides of a line below this share of its length have no direction.
 INSIDE_RTOL = 1e-9  # A point that is nearer to a side of a hull counts as outside.
-GROUND_SHARE_MAX = 0.4  # Longest ground at the end of a flexure, as a share of its length.
+GROUND_SHARE_MAX = 0.4  # Longest ground at the end of a flexure, as a share of its length,
+GROUND_THICKNESSES_MIN = 1.3  # unless the flexure is thick: shortest ground over its thickness.
 STROKES = 6  # Strokes of the hatching.
 INCLINED_AREA_MAX = 0.4  # An inclined box must be smaller than this share of the upright box.
 
@@ -137,13 +139,46 @@ def _surrounds(around: Complex, distance: float) -> bool:
     return bool(np.all((around.conj() * sides).imag > distance * np.abs(sides)))
 
 
+def tangents(z: Complex) -> Complex:
+    """Return the unit vectors along a line at its corners, of which some may coincide.
+
+    The tangent at a corner is between those of the sides before and after it.
+
+    Examples
+    --------
+    >>> tangents(np.array([0.0, 1.0, 1.0, 1.0 + 1.0j])).round(12).tolist()[::3]
+    [(1+0j), 1j]
+    """
+    steps = np.diff(z)
+    lengths = np.abs(steps)
+    long = lengths > COINCIDENT_RTOL * lengths.sum()
+    along = steps[long] / lengths[long]
+    s = np.concatenate([[0.0], np.cumsum(lengths)])
+    middle = (0.5 * (s[1:] + s[:-1]))[long]
+    result: Complex = np.interp(s, middle, along.real) + 1j * np.interp(s, middle, along.imag)
+    return result / np.abs(result)
+
+
 @dataclass(frozen=True)
 class FlexureLine:
-    """A flexure and its outline; ``jointed`` unless it is a beam, which has no pivots."""
+    """A flexure, its outline and its kind.
+
+    Parameters
+    ----------
+    flexure : Flexure
+        The flexure, whose start is the first corner of its outline.
+    outline : Outline
+        Its line.
+    jointed : bool
+        Whether it has pivots: it is not a beam.
+    shaped : bool
+        Whether its thickness varies, and is drawn to scale.
+    """
 
     flexure: Flexure
     outline: Outline
     jointed: bool = True
+    shaped: bool = False
 
     @property
     def guided(self) -> tuple[bool, bool]:
@@ -155,6 +190,21 @@ class FlexureLine:
         """Return the positions of the pinned ends in a shape [m]."""
         z = corners(self.outline, E)
         return np.array([z[k] for k, g in zip((0, -1), self.guided, strict=True) if not g], complex)
+
+    def edge(self, E: Complex) -> Complex:
+        """Return the edge of a shaped flexure in a shape, counter-clockwise; else empty [m]."""
+        if not self.shaped:
+            return np.zeros(0, complex)
+        z = corners(self.outline, E)
+        left = 0.5j * self.outline.thickness * tangents(z)
+        return np.concatenate([z - left, (z + left)[::-1]])
+
+    def drawn(self, E: Complex) -> Complex:
+        """Return the line in a shape or, of a shaped flexure, its closed edge [m]."""
+        if not self.shaped:
+            return corners(self.outline, E)
+        edge = self.edge(E)
+        return np.append(edge, edge[0])
 
 
 class Shapes:
@@ -169,13 +219,7 @@ class Shapes:
     def __init__(self, system: System) -> None:
         self.system = system
         self.straight = self.arms(system.q0)
-        named = {flexure.name: flexure for flexure in system.mechanism.flexures}
-        beams = {kind.name for kind in system.mechanism.flexure_types if kind.model == BEAM}
-        self.flexures = [
-            FlexureLine(named[o.name], o, named[o.name].type not in beams)
-            for o in system.outlines
-            if o.kind == "flexure"
-        ]
+        self.flexures = [self._flexure(o) for o in system.outlines if o.kind == "flexure"]
         self.joints = [o for o in system.outlines if o.kind == "joint"]
         self.hits = [self._hit(stop) for stop in system.mechanism.stops]
         self.bodies = {name: self._body(name) for name in system.bodies}
@@ -196,6 +240,19 @@ class Shapes:
     def _point(self, reference: str, user: str) -> complex:
         x, y = self.system.mechanism.point(reference, user)
         return complex(self._number(x), self._number(y))
+
+    def _flexure(self, outline: Outline) -> FlexureLine:
+        """Return a flexure, described from the first corner of its outline."""
+        mechanism = self.system.mechanism
+        flexure = next(f for f in mechanism.flexures if f.name == outline.name)
+        kind = next(k for k in mechanism.flexure_types if k.name == flexure.type)
+        first, last = corners(outline, self.straight)[[0, -1]]
+        start = self._point(flexure.start, flexure.name)
+        if abs(last - start) < abs(first - start):
+            flexure = replace(
+                flexure, start=flexure.end, end=flexure.start, ends=flexure.ends[::-1]
+            )
+        return FlexureLine(flexure, outline, kind.model != BEAM, kind.profile != LEAF)
 
     def _hit(self, stop: Stop) -> complex:
         """Return the hit point of a stop as drawn [m]."""
@@ -290,10 +347,13 @@ class Shapes:
         lines = []
         for line in self.flexures:
             z = corners(line.outline, self.straight)
+            along = tangents(z)
             length = min(GROUND_LENGTH * self.size, GROUND_SHARE_MAX * abs(z[-1] - z[0]))
-            ends = (line.flexure.start, z[0], z[0] - z[-1]), (line.flexure.end, z[-1], z[-1] - z[0])
+            if line.shaped:
+                length = max(length, GROUND_THICKNESSES_MIN * float(line.outline.thickness.max()))
+            ends = (line.flexure.start, z[0], -along[0]), (line.flexure.end, z[-1], along[-1])
             lines += [
-                hatched(complex(point), complex(into / abs(into)), length)
+                hatched(complex(point), complex(into), length)
                 for end, point, into in ends
                 if body_of(end) == GROUND
             ]

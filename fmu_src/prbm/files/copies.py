@@ -10,10 +10,12 @@ from dataclasses import replace
 from functools import reduce
 from typing import Any, Protocol, TypeVar
 
+import numpy as np
+
 from ..base.errors import MechanismError
 from ..mechanism.expressions import affine
 from ..mechanism.parts import FIELDS, GROUND, Body, Flexure, FlexureType, Joint, Point
-from .images import Image, Line, displaced, rotated, same, written
+from .images import SAME_ATOL, SAME_RTOL, Image, Line, displaced, rotated, same, written
 
 COPIES_MAX = 10_000  # Copies in one file.
 SIGNED = tuple(name for name in ("curvature", "rise") if name in FIELDS[FlexureType])
@@ -148,6 +150,8 @@ class Drawing:
         self._points = {GROUND: dict(ground)}
         self._points |= {name: dict(body.points) for name, body in self._bodies.items()}
         self.made_by: dict[str, str] = {}  # Keys by the reference to a point that they created.
+        centres = ([affine(c).constant for c in body.centre] for body in self._bodies.values())
+        self._centres = np.array([complex(*centre) for centre in centres])
 
     @property
     def ground(self) -> dict[str, Point]:
@@ -210,12 +214,24 @@ class Drawing:
         return f"{owner}.{name}"
 
     def _body_image(self, owner: str, image: Image) -> str | None:
-        """Return the name of the body at the image of a body, None without such a body."""
-        other = image.name(owner)
-        if owner == GROUND or other not in self._bodies:
+        """Return the name of the body at the image of a body, None without such a body.
+
+        It has the name of the image, or it is the only one with the centre of the image.
+        """
+        if owner == GROUND:
             return None
-        centre = image.point(self._bodies[owner].centre)
-        return other if same(self._bodies[other].centre, centre) else None
+        own, other = self._bodies[owner].centre, image.name(owner)
+        centre = image.point(own)
+        if other in self._bodies and same(self._bodies[other].centre, centre):
+            return other
+        if same(own, centre):
+            return None
+        constant = complex(*(affine(c).constant for c in centre))
+        most = 2.0 * (SAME_RTOL * abs(constant) + SAME_ATOL)
+        near = np.abs(self._centres - constant) <= most
+        names = (name for name, close in zip(self._bodies, near, strict=True) if close)
+        found = [name for name in names if same(self._bodies[name].centre, centre)]
+        return found[0] if len(found) == 1 else None
 
 
 def mirrored_types(

@@ -41,6 +41,13 @@ REMEDIES = {  # Remedy for each of pydantic's error types.
     "dict_type": "write a table, [...]",
     "model_type": "write a table, [...]",
 }
+_CORNERS = "write a list of corners, [[..., ...], [..., ...], [..., ...]]"
+FORMS = {  # Remedy for a value of another form than those that these keys have.
+    "outline": _CORNERS,
+    "holes": _CORNERS + ", for each hole",
+    "mirror": 'write the line of symmetry, "x = 0" or "y = 40 mm", or a list of both',
+    "ends": "write clamp, pin or free in quotes, or a pair of them",
+}
 NAME_REMEDIES = {  # Remedy for a name that does not match the pattern of this key.
     "start": "write the name of a point, body.point or ground.point",
     "end": "write the name of a point, body.point or ground.point",
@@ -149,7 +156,8 @@ def _problem(error: dict[str, Any], data: Any) -> str:
     where = ".".join(str(key) for key in loc if key != "[key]") + _owner(loc, data)
     if kind == "missing" and isinstance(loc[-1], int):
         where = ".".join(map(str, loc[:-1])) + _owner(loc[:-1], data)
-        return f"{where} = {reprlib.repr(error['input'])}: a number is missing; add it"
+        missing = "an end" if loc[-2] == "ends" else "a number"
+        return f"{where} = {reprlib.repr(error['input'])}: {missing} is missing; add it"
     if kind == "missing":
         return f"{where} is missing: add the key"
     if kind == "extra_forbidden":
@@ -157,22 +165,26 @@ def _problem(error: dict[str, Any], data: Any) -> str:
         near = difflib.get_close_matches(str(loc[-1]), known, n=1, cutoff=0.6)
         hint = f"did you mean {near[0]}?" if near else f"allowed keys are {', '.join(known)}"
         return f"unknown key {where}; {hint}"
-    if kind == "value_error":
-        remedy = str(error["ctx"]["error"])
-    elif kind == "string_pattern_mismatch":
-        remedy = NAME_REMEDIES[str(loc[-1])]
-    elif kind == "tuple_type" and loc[-1] in ("outline", "holes"):
-        remedy = "write a list of corners, [[..., ...], [..., ...], [..., ...]]"
-        remedy += ", for each hole" if loc[-1] == "holes" else ""
-    elif kind == "tuple_type" and len(loc) > 1:
-        remedy = "write a pair, [..., ...]"
-    elif kind == "less_than_equal":
-        remedy = f"write a number of at most {error['ctx']['le']}"
-    else:
-        remedy = REMEDIES.get(kind, error["msg"])
+    remedy = _remedy(error, loc)
     if remedy.startswith("cannot read the expression"):
         return f"{where}: {remedy}"  # The remedy quotes the value already.
     return f"{where} = {reprlib.repr(error['input'])}: {remedy}"
+
+
+def _remedy(error: dict[str, Any], loc: Sequence[str | int]) -> str:
+    """Return the remedy for an invalid value."""
+    kind, key = error["type"], next(str(one) for one in reversed(loc) if isinstance(one, str))
+    if kind == "value_error":
+        return str(error["ctx"]["error"])
+    if kind in ("string_pattern_mismatch", "tuple_type") and key in FORMS:
+        return FORMS[key]
+    if kind == "string_pattern_mismatch":
+        return NAME_REMEDIES[key]
+    if kind == "tuple_type" and len(loc) > 1:
+        return "write a pair, [..., ...]"
+    if kind == "less_than_equal":
+        return f"write a number of at most {error['ctx']['le']}"
+    return str(REMEDIES.get(kind, error["msg"]))
 
 
 def _keys(loc: Sequence[str | int]) -> list[str]:

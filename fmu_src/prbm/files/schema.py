@@ -32,6 +32,7 @@ from ..mechanism.flexure import (
     NOTCH_NODES,
     ORDER_DEFAULT,
     ORDER_MAX,
+    TAPER,
 )
 from ..mechanism.parts import FIELDS, GROUND, LENGTH_MAX, LENGTH_MIN
 from .copies import (
@@ -78,8 +79,13 @@ IDENTIFIER = "^[A-Za-z_][A-Za-z0-9_]*$"
 # --- tables -----------------------------------------------------------------------------------
 
 
-MIRROR: Any = Field((), description='Line of symmetry, "x = ..." or "y = ...", or a list of both')
-REPEAT: Any = Field(None, description="Equal parts in a row or on a circle")
+# Each field has an object of its own: releases of pydantic before 2.12 change it with its class.
+def _mirror() -> Any:
+    return Field((), description='Line of symmetry, "x = ..." or "y = ...", or a list of both')
+
+
+def _repeat() -> Any:
+    return Field(None, description="Equal parts in a row or on a circle")
 
 
 class Section(Named):
@@ -167,8 +173,8 @@ class FlexureTable(Section):
         description="Type of both ends, or a pair for start and end; the other end of a free one "
         "must be a clamp",
     )
-    mirror: LineOrLines = MIRROR
-    repeat: RepeatTable | None = REPEAT
+    mirror: LineOrLines = _mirror()
+    repeat: RepeatTable | None = _repeat()
 
 
 _GIVEN: Any = {"required": [*GIVEN]}
@@ -209,8 +215,8 @@ class BodyTable(Named):
         None, description="Name of the material of the plate, in place of density"
     )
     density: Annotated[Quantity, measured(parts.FlexureType, "density")] | None = None
-    mirror: LineOrLines = MIRROR
-    repeat: RepeatTable | None = REPEAT
+    mirror: LineOrLines = _mirror()
+    repeat: RepeatTable | None = _repeat()
 
 
 class JointTable(Named):
@@ -218,8 +224,8 @@ class JointTable(Named):
 
     start: Reference = Field(description="First point, body.point or ground.point")
     end: Reference = Field(description="Second point, body.point or ground.point")
-    mirror: LineOrLines = MIRROR
-    repeat: RepeatTable | None = REPEAT
+    mirror: LineOrLines = _mirror()
+    repeat: RepeatTable | None = _repeat()
 
 
 class StopTable(Named):
@@ -633,12 +639,13 @@ def _check_slender(
             f"flexure {flexure.name} from {flexure.start} to {flexure.end} has zero length: move "
             "its ends apart"
         )
-    thickness = parts.value(kind, "thickness", values)
-    if thickness >= length:
-        raise MechanismError(
-            f"{kind.name}.thickness = {thickness:g} m is not less than the length of the flexure "
-            f"{flexure.name}, {length:g} m: check the units of both"
-        )
+    for name in ("thickness", "end_thickness") if kind.profile == TAPER else ("thickness",):
+        thickness = parts.value(kind, name, values)
+        if thickness >= length:
+            raise MechanismError(
+                f"{kind.name}.{name} = {thickness:g} m is not less than the length of the flexure "
+                f"{flexure.name}, {length:g} m: check the units of both"
+            )
 
 
 def _places(mechanism: Mechanism) -> Iterator[tuple[str, parts.Point]]:

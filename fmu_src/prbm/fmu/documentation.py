@@ -15,6 +15,7 @@ from ..mechanism.parts import FlexureType
 from ..runs.experiment import Experiment
 from .live.page import LivePart
 from .mathml import block, formula, inline, matrix, row
+from .related import FOLDER
 
 STYLE = """
 :root { color-scheme: light dark; --text: #1d2530; --muted: #566170; --page: #f6f8fa;
@@ -234,6 +235,7 @@ def _use(mechanism: Mechanism, experiment: Experiment) -> str:
         "machine that runs the FMU; Linux or Windows on x86-64. Importers written in Python (FMPy, "
         "PyFMI) need nothing else. Other importers must find the Python library when they load "
         "the FMU (on Linux for instance with <code>LD_PRELOAD=libpython3.11.so</code>).</p>\n"
+        f"<p>The folder <code>{FOLDER}</code> has the start values as a parameter set (SSV).</p>\n"
         "<p>Path: unpack the FMU to a folder whose path is plain ASCII without <code>% # ?</code>. "
         "The wrapper library pythonfmu does not decode percent-encoded paths (except for spaces) "
         "and crashes the host. FMPy unpacks to the folder of temporary files; if that path has "
@@ -508,11 +510,13 @@ def _native_use(
     experiment: Experiment,
     with_reference: bool,
 ) -> str:
-    reference = (
-        " The folder <code>extra</code> holds reference results: the outputs of the default "
-        "experiment, computed by the Python engine."
+    reference = f" The folder <code>{FOLDER}</code> has the start values as a parameter set (SSV)"
+    reference += (
+        ", and reference results, computed by the Python engine: the default experiment, a smoke "
+        "test, and a validation with the values before and after each impact. Its "
+        "<code>README.txt</code> explains the comparison."
         if with_reference
-        else ""
+        else "."
     )
     event_mode = "    use_event_mode=True,\n    early_return_allowed=True,\n"
     options = event_mode if interface.clocks else ""

@@ -5,10 +5,9 @@ from xml.etree.ElementTree import Element, SubElement
 
 from ..interface.native import NativeInterface
 from ..interface.structure import dependencies
-from ..interface.variables import CLOCK, Variable, pushed
+from ..interface.variables import CLOCK, Variable
 from ..kernel.sources import OVERRIDE
 from ..mechanism.description import Mechanism
-from ..mechanism.parts import GROUND
 from .description import (
     Heading,
     add_experiment,
@@ -17,7 +16,6 @@ from .description import (
     add_units,
     add_variables,
     initial_dependencies,
-    number,
     serialized,
     used_types,
     value_attributes,
@@ -193,50 +191,7 @@ def _attributes(v: Variable, reference: Mapping[str, str]) -> dict[str, str]:
     return attributes | value_attributes(v, reference)
 
 
-# --- terminals ------------------------------------------------------------------------------------
-
-STOP_MEMBERS = (
-    "displacement", "velocity", "mobility", "gap", "gap_rate", "force", "contact", "impulse_sum",
-    "point.displacement", "point.velocity", "point.mobility",
-)  # fmt: skip
-FORCE_MEMBERS = ("x", "y", "moment", "impulse.x", "impulse.y", "impulse.moment")
-MOTION_MEMBERS = ("x", "y", "angle", "vx", "vy", "omega")
-BASE_MEMBERS = ("acceleration.x", "acceleration.y", "force.x", "force.y", "moment")
-
-
-def terminals(mechanism: Mechanism) -> bytes:
-    """Return terminalsAndIcons.xml: one terminal per stop, one per force, and one of the base.
-
-    The file belongs to FMI 3.0.  FMI 2.0 has adopted it, but tools such as FMI Library report it as
-    an error there.
-    """
-    root = Element("fmiTerminalsAndIcons", {"fmiVersion": "3.0"})
-    corners = {"x1": "-100", "y1": "-100", "x2": "100", "y2": "100"}
-    picture = SubElement(root, "GraphicalRepresentation")
-    scale = {"suggestedScalingFactorTo_mm": number(0.1)}
-    SubElement(picture, "CoordinateSystem", corners | scale)
-    SubElement(picture, "Icon", corners)
-    ports = SubElement(root, "Terminals")
-    for stop in mechanism.stops:
-        members = {member: f"{stop.name}.{member}" for member in STOP_MEMBERS}
-        wall = "a wall that moves" if stop.on == GROUND else f"a wall on the {stop.on}"
-        _terminal(ports, stop.name, f"Contact of the {stop.body} with {wall}", members)
-    for force in mechanism.forces:
-        members = {f"force.{member}": f"{force.name}.{member}" for member in FORCE_MEMBERS}
-        members |= {member: f"{force.body}.{member}" for member in MOTION_MEMBERS}
-        text = f"Force on {pushed(force)}, and the motion of the {force.body}"
-        _terminal(ports, force.name, text, members)
-    members = {member: f"base.{member}" for member in BASE_MEMBERS}
-    _terminal(ports, "base", "Acceleration of the base, force and moment on it", members)
-    return serialized(root)
-
-
-def _terminal(ports: Element, name: str, description: str, members: Mapping[str, str]) -> None:
-    attributes = {"name": name, "matchingRule": "bus", "description": description}
-    terminal = SubElement(ports, "Terminal", attributes)
-    for member, variable in members.items():
-        names = {"variableName": variable, "memberName": member}
-        SubElement(terminal, "TerminalMemberVariable", names | {"variableKind": "signal"})
+# --- sources -------------------------------------------------------------------------------------
 
 
 def build_description(identifier: str, source: str) -> bytes:

@@ -21,13 +21,21 @@ from .archive import zipped
 from .description import Heading
 from .live.content import content
 from .live.page import LivePart, live_part
-from .native_description import LOG_CATEGORIES, build_description, description, terminals
+from .native_description import LOG_CATEGORIES, build_description, description
+from .parameter_sets import default_set
 from .reference_results import reference
+from .related import related_files
 from .slave.resolved import FILE as MODEL
 from .slave.resolved import resolved
 from .start import interface, magnitudes, start_sample
+from .terminals import terminals
 
 NAMESPACE = uuid.UUID("f0b6b5a1-6d5c-5b0e-8c55-1a52a0e6f1d3")
+# Paths of the PNG and the SVG.  FMI 2.0 has no place for an SVG but the documentation.
+ICONS = {
+    2: ("model.png", "documentation/icon.svg"),
+    3: ("terminalsAndIcons/icon.png", "terminalsAndIcons/icon.svg"),
+}
 LICENSES = ("prbm-impact.txt", "zig.txt")
 WINDOWS_LICENSE, LIVE_LICENSE = "mingw-w64.txt", "wasi-libc.txt"
 
@@ -68,7 +76,7 @@ def build(
         If the mechanism cannot start with these values, one of them is invalid, or there is no
         compiler for a platform.
     """
-    from ..drawing.icon import icon  # Imported here: Matplotlib takes half a second.
+    from ..drawing.icon import icon, vector_icon  # Imported here: Matplotlib takes half a second.
 
     changes = dict(changes or {})
     progress("checking the start")
@@ -90,14 +98,15 @@ def build(
     }
     if fmi == 3:
         contents["sources/buildDescription.xml"] = build_description(name, source)
-        contents["terminalsAndIcons/terminalsAndIcons.xml"] = terminals(mechanism)
+        contents["terminalsAndIcons/terminalsAndIcons.xml"] = terminals(mechanism, native.variables)
     contents |= dict(_binaries(name, fmi, compiled))
     progress("computing the reference results")
     results = reference(mechanism, changes, native.variables, default, progress)
-    contents |= results
+    contents |= related_files([default_set(mechanism, native.variables), *results])
     progress("drawing the icon and writing the documentation")
-    png = icon(mechanism, start_sample(mechanism, changes))
-    contents["model.png" if fmi == 2 else "terminalsAndIcons/icon.png"] = png
+    sample = start_sample(mechanism, changes)
+    png, svg = ICONS[fmi]
+    contents |= {png: icon(mechanism, sample), svg: vector_icon(mechanism, sample)}
     names = sorted(platform.name for platform in compiled)
     part = live(mechanism, native, default, table, progress)
     contents["documentation/index.html"] = documentation.native_page(

@@ -18,6 +18,8 @@ from ..runs.experiment import experiment
 from . import documentation
 from .archive import zipped
 from .description import Heading, model_description
+from .parameter_sets import default_set
+from .related import related_files
 from .slave.resolved import FILE, resolved
 from .slave.slave import MechanismSlave
 from .start import interface, start_sample
@@ -94,7 +96,7 @@ def build(
     PrbmError
         If the mechanism cannot start with these values, or one of them is out of bounds.
     """
-    from ..drawing.icon import icon  # Imported here: Matplotlib takes half a second.
+    from ..drawing.icon import icon, vector_icon  # Imported here: Matplotlib takes half a second.
 
     changes = dict(changes or {})
     progress("checking the start")
@@ -112,7 +114,10 @@ def build(
     heading = replace(heading, guid=f"{{{uuid.uuid5(NAMESPACE, anonymous)}}}")
     contents["modelDescription.xml"] = model_description(heading, listed)
     contents["documentation/index.html"] = documentation.page(mechanism, listed, default).encode()
-    contents["model.png"] = icon(mechanism, start_sample(mechanism, changes))
+    sample = start_sample(mechanism, changes)
+    contents["model.png"] = icon(mechanism, sample)
+    contents["documentation/icon.svg"] = vector_icon(mechanism, sample)
+    contents |= related_files([default_set(mechanism, listed)])
     progress("packing")
     return zipped(contents)
 

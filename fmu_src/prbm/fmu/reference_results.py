@@ -1,46 +1,71 @@
-"""Reference results inside a native FMU, in the format of the layered standard FMI-LS-REF.
+"""Reference results inside a native FMU: tables of three experiments, and how to compare.
 
 The Python engine computes them, so they are independent of the C kernel.
 """
 
+import copy
 import csv
 import io
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import lru_cache
 from typing import Any
-from xml.etree import ElementTree
-from xml.etree.ElementTree import Element, SubElement
 
 from numpy.typing import NDArray
 
 from ..base.errors import PrbmError
 from ..base.progress import messages
 from ..hybrid.simulation import Simulation
-from ..interface.variables import Variable
+from ..interface.variables import BASE, Variable, with_starts
 from ..mechanics.assembly import assemble
 from ..mechanics.modal import modes_at
 from ..mechanism.description import Mechanism
 from ..runs.engine import PYTHON
 from ..runs.experiment import Experiment
 from ..runs.result import names
-from ..runs.run import SlowSimulationError, simulate
-from .description import serialized
+from ..runs.run import SlowSimulationError, communication_points, simulate
+from .parameter_sets import MIME_TYPE, parameter_set
+from .related import Related
 
-FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
-NAMESPACE = "http://fmi-standard.org/fmi-ls-manifest"
-ATTRIBUTES = {
-    "fmi-ls-name": "org.fmi-standard.fmi-ls-ref",
-    "fmi-ls-version": "1.0.0-alpha.1",
-    "fmi-ls-description": "Layered Standard providing information on related files included in "
-    "an FMU.",
-}
 SLOW = "the default experiment takes the Python engine more than about half a minute"
 DIGITS = 9  # Significant digits; the error of the engine is larger.
+TIME_RTOL = 1e-14  # Communication points differ from decimal numbers by round-off.
 STEPS_MAX = 1e5  # Integration steps that the Python engine takes in about half a minute.
 CACHED_MAX = 32  # Results in memory: FMI 2.0 and 3.0 share them, mechanism by mechanism.
 LARGE = 40  # With more coordinates, the Python engine takes fewer steps in half a minute.
 STABLE_STEP_FACTOR = 3.0  # Largest stable step of an explicit method, in units of 1/omega.
+SMOKE_STEPS = 10  # Communication steps of the smoke test.
+VALIDATION_SHARE = 5  # The default experiment is this many times longer than the validation.
+VALIDATION_RESTITUTION = 0.9  # Factor of the coefficients of restitution in the validation.
+VALIDATION_ACCELERATION = 0.1  # Acceleration of the base in the validation, of the nominal one.
+NEAR_IMPACT = 1e-3  # Of a step: rows nearer to an impact are not compared.
+SAME_TIME = 1e-6  # Of a step: largest difference of the times of an impact.
+GUIDE = """\
+Reference results of {name}
+
+The Python engine has computed these tables. It is independent of the library of this FMU. Columns
+are the time [s] and all outputs in SI units, with nine digits.
+
+smoke test   {name}_smoke_out.csv: start values of the FMU, 0 to {smoke:g} s
+default      {name}_out.csv: start values of the FMU, 0 to {stop:g} s
+{validation}
+Rows are {step:g} s apart, which is the communication step. Compare your results as follows.
+
+1. Simulate with this communication step. In co-simulation keep the tolerance of the FMU; in model
+   exchange use a relative tolerance of 1e-8.
+2. Compare rows of equal time. Leave out rows within {near:g} s of an impact: outputs jump there.
+3. Integer and Boolean outputs are equal. Differences of other outputs are at most 1e-5 (model
+   exchange: 1e-3) of the largest magnitude in the column, or of a larger nominal value. Without
+   damping a motion can be chaotic: compare the time until the first impacts then.
+"""
+VALIDATION = """\
+validation   {name}_validation_out.csv: start values in {name}_validation.ssv, 0 to {end:g} s,
+             with two additional rows of equal time at each impact: before it and after it
+"""
+AT_IMPACTS = """\
+4. In event mode (FMI 3.0) your results have rows at impacts, too. The first and the last of them
+   equal the two rows of the validation at this time, which may differ by {same:g} s.
+"""
 
 
 def reference(
@@ -49,8 +74,11 @@ def reference(
     variables: Iterable[Variable],
     experiment: Experiment,
     progress: Callable[[str], None] = lambda step: None,
-) -> dict[str, bytes]:
-    """Return the reference results of the default experiment.
+) -> tuple[Related, ...]:
+    """Return the reference results of three experiments, and a text on their comparison.
+
+    They are the default experiment, its beginning as a smoke test, and a validation with other
+    restitution and a constant acceleration of the base.
 
     Parameters
     ----------
@@ -67,24 +95,128 @@ def reference(
 
     Returns
     -------
-    dict of str to bytes
-        Files by path in the FMU.  Empty if the simulation fails, or takes the Python engine more
-        than about half a minute.  The time is limited by a number of integration steps, so that
-        every machine builds the same FMU.
+    tuple of Related
+        Empty if the default experiment fails, or takes the Python engine more than about half a
+        minute.  The time is limited by a number of integration steps, so that every machine builds
+        the same FMU.  Without the validation if that fails.
     """
+    variables = tuple(variables)
     columns: NDArray[Any] | str = SLOW
     if steps(mechanism, changes, experiment) <= STEPS_MAX:
         cached = _Cached(mechanism, progress)
         columns = _columns(cached, tuple(changes.items()), experiment)
     if isinstance(columns, str):
         progress(f"no reference results: {columns}")
-        return {}
+        return ()
     outputs = [v.name for v in variables if v.causality == "output" and v.name in names(columns)]
-    file = f"{mechanism.name}_out.csv"
-    return {
-        f"{FOLDER}/fmi-ls-manifest.xml": _manifest(file, experiment),
-        f"{FOLDER}/{file}": _table(columns, outputs),
+    name, stop, step = mechanism.name, experiment.stop_time, experiment.step
+    smoke = columns[: SMOKE_STEPS + 1]
+    validation = _validation(mechanism, changes, variables, experiment, outputs)
+    more = VALIDATION.format(name=name, end=stop / VALIDATION_SHARE) if validation else ""
+    text = (GUIDE + (AT_IMPACTS if validation else "")).format(
+        name=name, stop=stop, step=step, smoke=float(smoke["time"][-1]), validation=more,
+        near=NEAR_IMPACT * step, same=SAME_TIME * step,
+    )  # fmt: skip
+    about = f"(0 to {stop:g} s, communication step {1e3 * step:g} ms)"
+    return (
+        Related("README.txt", text.encode(), "text/plain", "document",
+                "Reference results: experiments, and how to compare"),
+        Related(f"{name}_out.csv", _table(columns, outputs), "text/csv", "result",
+                f"Outputs of the default experiment {about}, computed by the Python engine"),
+        Related(f"{name}_smoke_out.csv", _table(smoke, outputs), "text/csv", "result",
+                f"Outputs of a smoke test: {SMOKE_STEPS} steps of the default experiment"),
+        *validation,
+    )  # fmt: skip
+
+
+def _validation(
+    mechanism: Mechanism,
+    changes: Mapping[str, float],
+    variables: tuple[Variable, ...],
+    experiment: Experiment,
+    outputs: list[str],
+) -> tuple[Related, ...]:
+    """Return the start values and the results of the validation; empty if it fails."""
+    base = f"{BASE}.acceleration.x"
+    nominal = next((v.nominal for v in variables if v.name == base), None)
+    defaults = mechanism.values()
+    values = {**defaults, **changes}
+    other = {
+        name: float(f"{VALIDATION_RESTITUTION * values[name]:.6g}")
+        for name in (f"{stop.name}.restitution" for stop in mechanism.stops)
+        if name in values
     }
+    chosen = {**changes, **other, base: VALIDATION_ACCELERATION * (nominal or 0.0)}
+    table = _validation_table(_Cached(mechanism), tuple(chosen.items()), experiment, tuple(outputs))
+    if table is None:
+        return ()
+    started = with_starts(variables, chosen)
+    given = [name for name in chosen if name not in defaults]
+    name, end = mechanism.name, experiment.stop_time / VALIDATION_SHARE
+    return (
+        Related(f"{name}_validation.ssv", parameter_set(mechanism, started, "validation", given),
+                MIME_TYPE, "parameter", "Start values of the validation"),
+        Related(f"{name}_validation_out.csv", table, "text/csv", "result",
+                f"Outputs of the validation (0 to {end:g} s), with rows before and after each "
+                "impact, computed by the Python engine"),
+    )  # fmt: skip
+
+
+@lru_cache(maxsize=CACHED_MAX)
+def _validation_table(
+    cached: "_Cached",
+    values: tuple[tuple[str, float], ...],
+    experiment: Experiment,
+    outputs: tuple[str, ...],
+) -> bytes | None:
+    """Return the results of the validation as a table; None if the simulation fails."""
+    times = communication_points(experiment.stop_time / VALIDATION_SHARE, experiment.step)
+    try:
+        motion = Simulation(cached.mechanism, dict(values))
+        rows = list(rows_with_impacts(motion, times, outputs))
+    except PrbmError:
+        return None
+    return _csv(["time", *outputs], rows)
+
+
+def rows_with_impacts(
+    motion: Simulation, times: Iterable[float], outputs: Iterable[str]
+) -> Iterator[tuple[float, ...]]:
+    """Yield the time and outputs at each of several times, and two rows at each impact.
+
+    Both rows have the time of the impact; the first has the outputs before it.  An impact at one of
+    the times has two rows there instead of one.
+
+    Raises
+    ------
+    SimulationError
+        As :meth:`prbm.hybrid.simulation.Simulation.advance`.
+    SlowSimulationError
+        If the simulation takes more than :data:`STEPS_MAX` steps.
+    """
+    chosen = tuple(outputs)
+
+    def row(simulation: Simulation, t: float) -> tuple[float, ...]:
+        shown = simulation.outputs()
+        return (t, *(float(shown[name]) for name in chosen))
+
+    for t in times:
+        # A copy returns to the impacts, since the motion does not depend on communication points.
+        earlier = copy.copy(motion)
+        earlier.record, motion.record = None, []
+        motion.advance(t)
+        if motion.step_count > STEPS_MAX:
+            raise SlowSimulationError(
+                f"more than {STEPS_MAX:g} integration steps until t = {t:g} s"
+            )
+        struck = sorted({impact.time for impact in motion.record})
+        for at in struck:
+            earlier.advance(math.nextafter(at, -math.inf))
+            yield row(earlier, at)
+            earlier.advance(at)
+            yield row(earlier, at)
+        if t not in struck:
+            yield row(motion, t)
 
 
 def steps(mechanism: Mechanism, changes: Mapping[str, float], experiment: Experiment) -> float:
@@ -104,7 +236,9 @@ def steps(mechanism: Mechanism, changes: Mapping[str, float], experiment: Experi
 class _Cached:
     """A mechanism that is hashed by its identity, with a callback that does not enter the hash."""
 
-    def __init__(self, mechanism: Mechanism, progress: Callable[[str], None]) -> None:
+    def __init__(
+        self, mechanism: Mechanism, progress: Callable[[str], None] = lambda step: None
+    ) -> None:
         self.mechanism, self.progress = mechanism, progress
 
     def __eq__(self, other: object) -> bool:
@@ -140,22 +274,17 @@ def _columns(
 
 def _table(columns: NDArray[Any], outputs: Iterable[str]) -> bytes:
     chosen = ["time", *outputs]
+    return _csv(chosen, columns[chosen])
+
+
+def _csv(head: Iterable[str], rows: Iterable[Iterable[float]]) -> bytes:
+    """Return a table; the times have all digits, so that rows of equal time can be found."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(chosen)
-    for row in columns[chosen]:
-        writer.writerow(f"{float(x):.{DIGITS}g}" for x in row)
+    writer.writerow(head)
+    for time, *values in rows:
+        short = f"{time:.{DIGITS}g}"
+        exact = math.isclose(float(short), time, rel_tol=TIME_RTOL)
+        shown = [short if exact else repr(float(time)), *(f"{float(x):.{DIGITS}g}" for x in values)]
+        writer.writerow(shown)
     return text.getvalue().encode()
-
-
-def _manifest(file: str, experiment: Experiment) -> bytes:
-    description = (
-        f"Outputs of the default experiment (0 to {experiment.stop_time:g} s, communication step "
-        f"{1e3 * experiment.step:g} ms), computed by the Python engine"
-    )
-    ElementTree.register_namespace("fmi-ls", NAMESPACE)
-    attributes = {f"{{{NAMESPACE}}}{name}": value for name, value in ATTRIBUTES.items()}
-    root = Element("fmiReferences", attributes)
-    related = {"type": "text/csv", "source": file, "role": "result"}
-    SubElement(root, "Related", related | {"description": description})
-    return serialized(root)

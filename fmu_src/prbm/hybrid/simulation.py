@@ -29,6 +29,7 @@ from ..mechanics.arrays import Real
 from ..mechanics.contact_state import ContactState
 from ..mechanics.dynamics import Equations, Evaluation
 from ..mechanics.inputs import WALL_INPUTS, Inputs, Wall, impulse_names
+from ..mechanics.stress import SectionStresses, section_stresses
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from ..mechanism.parameters import number
@@ -105,7 +106,7 @@ class Simulation:
         self.configuration = Configuration.of(mechanism, known, tolerance, step)
         self.prepared = self.configuration
         self.changed = False
-        self.received = self._impulses_given()
+        self.received = _impulses(self.mechanism, self.given)
         self.course, at_start = walls.start(self.configuration, self.given, self.time)
         inputs = Inputs.of(mechanism, self.given, at_start)
         self.front = released(self.configuration, inputs, self.time)
@@ -197,10 +198,6 @@ class Simulation:
         self.prepared = self.prepared.with_values(values)
         self.given = given
 
-    def _impulses_given(self) -> Real:
-        """Return the inputs that are impulses [N s], [N m s]."""
-        return np.array([self.given[name] for name in impulse_names(self.mechanism)])
-
     # -- time --
 
     def advance(self, time: float) -> None:
@@ -271,7 +268,7 @@ class Simulation:
 
     def _restart(self, moved: tuple[Wall, ...]) -> None:
         """Continue from the present state with the present inputs, walls and parameters."""
-        given, configuration = self._impulses_given(), self.prepared
+        given, configuration = _impulses(self.mechanism, self.given), self.prepared
         self.front = compliant.latched_until(self.configuration, self.front, self.arc, self.time)
         pushed = not np.array_equal(given, self.received)
         y = self._end_of_step(shown=pushed)
@@ -378,6 +375,16 @@ class Simulation:
         projected = self.equations.project_near(self.time, y, evaluation.factors)
         check_projection(self.configuration, self.time, y, projected)
         return projected
+
+    def section_stresses(self) -> SectionStresses:
+        """Return the stress of both faces in all sections at the present time, by flexure [Pa].
+
+        The flexures are those whose stress is an output; their sections are at
+        :func:`prbm.mechanics.stress.section_positions`.
+        """
+        y, n = self.state(), self.system.n
+        q, v = y[:n], y[n : 2 * n]
+        return section_stresses(self.equations, q, v, self.equations.at(self.time, y))
 
     def _interpolated(self, arc: Arc) -> Real:
         """Return the state at the present time in a step, not projected.
@@ -534,3 +541,8 @@ def _cut(configuration: Configuration, event: Event, view: StepView) -> tuple[Ev
         event = replace(event, time=event.time + REVERSAL_DELAY_RTOL * arc.h)
         y = closed(configuration, equations, event.time, arc.at(event.time))
     return event, replace(arc, end=event.time), y
+
+
+def _impulses(mechanism: Mechanism, given: Mapping[str, float]) -> Real:
+    """Return the inputs that are impulses [N s], [N m s]."""
+    return np.array([given[name] for name in impulse_names(mechanism)])

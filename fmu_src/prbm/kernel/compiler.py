@@ -168,9 +168,8 @@ def libraries(
     for name in platforms:
         if name == HOST:
             here = _host()
-            result[here] = _prebuilt(here, product, files) or _library(
-                here, _host_compilers(), product, files, progress
-            )
+            found = None if os.environ.get("CC", "").strip() else _prebuilt(here, product, files)
+            result[here] = found or _library(here, _host_compilers(), product, files, progress)
     names = PLATFORMS if ALL in platforms else [name for name in platforms if name in PLATFORMS]
     for name in names:
         chosen = PLATFORMS[name]
@@ -216,9 +215,7 @@ def browser_module(progress: Callable[[str], None] = lambda step: None) -> bytes
 
 
 def _prebuilt(wanted: Platform, product: Product, files: Mapping[str, bytes]) -> bytes | None:
-    """Return the library of the installed package, unless CC names a compiler."""
-    if os.environ.get("CC", "").strip():
-        return None
+    """Return the library of the installed package; None if it has none."""
     return prebuilt(f"{wanted.name}/{product.name}{wanted.suffix}", files)
 
 
@@ -267,7 +264,7 @@ def _host_compilers() -> Iterator[Compiler]:
     except NoCompilerError:
         if not found:
             raise NoCompilerError(
-                f"native FMUs need a C compiler, and none was found: {INSTALL}"
+                f"the kernel needs a C compiler, and none was found: {INSTALL}"
             ) from None
 
 

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/modal.h"
+#include "core/sections.h"
 #include "core/tables.h"
 #include "engine.h"
 #include "hybrid/simulation.h"
@@ -222,6 +223,42 @@ EXPORTED bool prbm_state(Engine *engine, double *y, char *message) {
     bool ok = present_outputs(sim, PLACES, &problem) != NULL;
     if (ok) {
         copy(state_size(sim), sim->present.y, y);
+    }
+    return succeed(ok, &problem, message);
+}
+
+static bool has_stress(const Mechanism *m, int flexure) {
+    return m->types[m->flexures[flexure].type].stress;
+}
+
+EXPORTED int prbm_section_count(const Engine *engine) {
+    const System *system = system_of(engine->simulation);
+    int count = 0;
+    for (int i = 0; i < system->mechanism->flexure_count; i++) {
+        count += has_stress(system->mechanism, i) ? system->free_bodies[i].sections : 0;
+    }
+    return count;
+}
+
+EXPORTED bool prbm_sections(Engine *engine, double *faces, char *message) {
+    Problem problem = {""};
+    Simulation *sim = engine->simulation;
+    const System *system = system_of(sim);
+    bool ok = present_outputs(sim, PLACES | MOTION, &problem) != NULL;
+    if (ok) {
+        size_t mark = sim->scratch.used;
+        const Present *present = &sim->present;
+        SectionState at = section_state(&sim->equations, present->e, present->y,
+                                        present->y + system->n, &present->evaluation,
+                                        &sim->scratch);
+        for (int i = 0; i < system->mechanism->flexure_count; i++) {
+            const FreeBody *body = &system->free_bodies[i];
+            if (has_stress(system->mechanism, i)) {
+                face_stresses(system, body, &at, faces, faces + body->sections);
+                faces += 2 * body->sections;
+            }
+        }
+        sim->scratch.used = mark;
     }
     return succeed(ok, &problem, message);
 }

@@ -49,6 +49,10 @@ EXPORTED int prbm_sample(Engine *engine, int samples, const double *times, int c
                          const int *slots, double *values, int *done, char *message);
 /* Get the present state (2 n + 2,): angles, rates, dissipated energy and work. */
 EXPORTED bool prbm_state(Engine *engine, double *y, char *message);
+/* Get the present stress of the flexures whose stress is an output [Pa]: of each flexure, that of the
+ * left face in all sections from its start, then that of the right face. */
+EXPORTED int prbm_section_count(const Engine *engine); /* sections of all these flexures */
+EXPORTED bool prbm_sections(Engine *engine, double *faces, char *message);
 EXPORTED double prbm_time(const Engine *engine);  /* present time [s] */
 EXPORTED double prbm_steps(const Engine *engine); /* integration steps so far */
 EXPORTED int prbm_coordinates(const Engine *engine); /* n */

@@ -123,9 +123,12 @@ enum { EFFORT_MAX = 1000000 };
 #define LOWEST_BOUNCE_RTOL 1e-10
 #define INDICATOR_LEAD_RTOL 0.01
 #define DEPENDENT_PIVOT_RTOL 1e-07
+#define NOTCH_LENGTH_RTOL 1e-09
 #define NOTCH_PEAK_FACTOR 0.7
 enum { FINE_POINTS = 8 };
 enum { GAUSS_ITERATIONS_MAX = 8 };
+#define WAIST_ATOL 1e-12
+#define CONCENTRATION_SERIES_MAX 1e-06
 #define STRESS_TIE_RTOL 1e-09
 
 /* --- prbm.mechanics.contact_state --------------------------------------------------------------- */

@@ -35,6 +35,8 @@ FUNCTIONS = {
         _int, _address, _int, _address, _int, _address, _address, _address, _bytes,
     ),
     "prbm_state": (_bool, _address, _address, _bytes),
+    "prbm_section_count": (_int, _address),
+    "prbm_sections": (_bool, _address, _address, _bytes),
     "prbm_time": (_double, _address),
     "prbm_steps": (_double, _address),
     "prbm_coordinates": (_int, _address),

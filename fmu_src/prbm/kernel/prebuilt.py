@@ -88,6 +88,6 @@ def prebuilt(name: str, sources: Mapping[str, bytes]) -> bytes | None:
 def _damaged(name: str) -> DamagedLibraryError:
     return DamagedLibraryError(
         f"the file {FOLDER}/{name} of the installed package is damaged; install it again with "
-        "'python -m pip install --force-reinstall', or set the environment variable CC to a "
-        "compiler"
+        "'python -m pip install --force-reinstall', or, for this machine alone, set the "
+        "environment variable CC to a compiler"
     )

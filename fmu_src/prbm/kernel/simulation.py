@@ -27,6 +27,7 @@ from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble, calculated
 from ..mechanics.compliant_stops import COMPLIANT_STATES
 from ..mechanics.independent import independent
+from ..mechanics.stress import SectionStresses, section_positions
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from ..mechanism.parameters import number
@@ -150,7 +151,7 @@ class KernelSimulation:
     @property
     def frequency(self) -> float:
         """Fundamental frequency about the equilibrium under gravity at the start [Hz]; 0: none."""
-        return float(self._values(["mode.frequency"])[0])
+        return float(self._at(self._slots(["mode.frequency"]))[0])
 
     @property
     def system(self) -> System:
@@ -289,6 +290,22 @@ class KernelSimulation:
                 raise self._error()
         return y
 
+    def section_stresses(self) -> SectionStresses:
+        """Return the stress of both faces in all sections at the present time, by flexure [Pa].
+
+        As :meth:`prbm.hybrid.simulation.Simulation.section_stresses`.
+        """
+        counts = {name: len(position) for name, position in section_positions(self.system).items()}
+        faces = np.empty(2 * sum(counts.values()))
+        with self._lock:
+            if not self._library.prbm_sections(self._address, faces.ctypes.data, self._message):
+                raise self._error()
+        found, first = {}, 0
+        for name, m in counts.items():
+            found[name] = faces[first : first + m], faces[first + m : first + 2 * m]
+            first += 2 * m
+        return found
+
     def outputs(self) -> Outputs:
         """Return all outputs, locals and calculated parameters at the present time, by name.
 
@@ -308,11 +325,7 @@ class KernelSimulation:
     def motions(self) -> dict[str, float]:
         """Return only the positions and velocities of bodies and probes, by name of the output."""
         names = self._tables.motions
-        return dict(zip(names, self._values(names).tolist(), strict=True))
-
-    def _values(self, names: Sequence[str]) -> Real:
-        """Return outputs by name, (k,)."""
-        return self._at(self._slots(names))
+        return dict(zip(names, self._at(self._slots(names)).tolist(), strict=True))
 
     def _at(self, slots: Slots) -> Real:
         """Return values by slot, (k,)."""
@@ -375,7 +388,8 @@ class KernelSimulation:
         """
         if saved.get("engine") != self.engine:
             raise ParameterError("the saved state belongs to the Python engine: restore it there")
-        if saved["values"].keys() != self.values.keys():
+        known = saved.get("values")
+        if isinstance(known, Mapping) and known.keys() != self.values.keys():
             raise ParameterError("the saved state belongs to another mechanism")
         try:
             numbers = np.array(saved["numbers"], float)

@@ -34,7 +34,7 @@ from ..mechanism.parts import (
 from .arrays import Complex, Real
 from .collection import Collection
 from .flexures import add_flexure, coefficients
-from .system import FIXED, BodyFrame, Outline, Place, System, stacked, unit
+from .system import FIXED, NO_THICKNESS, BodyFrame, Outline, Place, System, stacked, unit
 
 NAMES_MAX = 5  # Parameters that a message names.
 
@@ -144,7 +144,7 @@ class _Assembler(Collection):
         else:
             self.reach(far, place, z_end, self.turn(far))
         self.connect(body_of(start), far, known)
-        self.lines.append((joint.name, "joint", [place]))
+        self.lines.append((joint.name, "joint", [place], NO_THICKNESS))
 
     # -- arrays --
 
@@ -158,7 +158,7 @@ class _Assembler(Collection):
         e0 = np.exp(1j * Phi.of(q0))
         spread = A[:, arm]
         frames = {body.name: self.frame(body.name, body.name, None) for body in mechanism.bodies}
-        self.lines += [(body, "body", self.corners(body)) for body in frames]
+        self.lines += [(body, "body", self.corners(body), NO_THICKNESS) for body in frames]
         release = mechanism.release
         along_release, release_c = self.displaced(
             release.body, release.point, release.direction, e0
@@ -222,11 +222,11 @@ class _Assembler(Collection):
             "lifts_c": np.array([c for _, c in across]),
         }
 
-    def outline(self, name: str, kind: str, places: list[Place]) -> Outline:
+    def outline(self, name: str, kind: str, places: list[Place], thickness: Real) -> Outline:
         """Return a line to draw."""
         d = len(self.arm)
         A = np.array([p.row(d) for p in places])
-        return Outline(name, kind, np.array([p.c for p in places]), A)
+        return Outline(name, kind, np.array([p.c for p in places]), A, thickness)
 
     def displaced(
         self, body: str, point: Point | None, direction: float, e0: Complex

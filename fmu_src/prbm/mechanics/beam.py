@@ -144,7 +144,7 @@ class Cuts(NamedTuple):
     tangent : (m,) complex
         Directions as drawn, in units of the direction of the chord.
     area, modulus : (m,)
-        Area [m^2] and section modulus [m^3].
+        Area [m^2] and section modulus [m^3], at waists divided by the factors of the stress.
     """
 
     position: Real
@@ -334,6 +334,11 @@ class Beam:
             first = last
         return np.concatenate(rows)
 
+    def thickness(self, points: Sequence[Real]) -> Real:
+        """Return the thickness at points x of each panel [m]."""
+        at = zip(self.panels, points, strict=True)
+        return np.concatenate([panel.at(x).thickness for panel, x in at])
+
     @property
     def node_positions(self) -> Complex:
         """The lengths A for the nodes, (N, N) [m]."""
@@ -342,25 +347,29 @@ class Beam:
     # -- cuts --
 
     @cached_property
-    def _cut_sections(self) -> tuple[Real, Sections]:
-        """Ranks and sections of the cuts, from the start."""
+    def _cut_sections(self) -> tuple[Real, Sections, Real]:
+        """Ranks and sections of the cuts, from the start, and the factors of the stress there."""
         ranks, found = [np.array([-1.0])], [self.panels[0].at(np.array([-1.0]))]
+        factors = [np.ones((2, 1))]
         first = 0
         for panel in self.panels:
             nodes, waists = leggauss(panel.nodes)[0], np.array(panel.waists)
             rank = np.append(np.arange(panel.nodes), np.searchsorted(nodes, waists) - 0.5)
             order = np.argsort(rank)
+            x = np.append(nodes, waists)[order]
             ranks.append(first + rank[order])
-            found.append(panel.at(np.append(nodes, waists)[order]))
+            found.append(panel.at(x))
+            factors.append(panel.concentrations(x))
             first += panel.nodes
         ranks.append(np.array([float(first)]))
         found.append(self.panels[-1].at(np.array([1.0])))
-        return np.concatenate(ranks), _joined(found)
+        factors.append(np.ones((2, 1)))
+        return np.concatenate(ranks), _joined(found), np.concatenate(factors, axis=1)
 
     @property
     def cuts(self) -> Cuts:
         """The sections in which the beam is cut."""
-        rank, sections = self._cut_sections
+        rank, sections, (pulled, bent) = self._cut_sections
         tangent = self.line.tangent(sections.v) * self._scale
         # A beam with waists is straight: v is the arc length.
         position, ds = sections.v.copy(), self._fine[0]
@@ -368,8 +377,8 @@ class Beam:
         position[-1] = ds.sum()
         area = sections.width * sections.thickness
         return Cuts(
-            position, rank, self._polynomials[1], tangent / abs(tangent), area,
-            area * sections.thickness / 6,
+            position, rank, self._polynomials[1], tangent / abs(tangent), area / pulled,
+            area * sections.thickness / 6 / bent,
         )  # fmt: skip
 
 

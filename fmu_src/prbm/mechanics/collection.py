@@ -44,7 +44,7 @@ class Collection:
         self.links: list[int] = []
         self.link_count = 0
         self.owners: list[str] = []
-        self.lines: list[tuple[str, str, list[Place]]] = []
+        self.lines: list[tuple[str, str, list[Place], Real]] = []
         self.connections: list[Connection] = []
         self.body_masses: dict[str, int] = {}
 

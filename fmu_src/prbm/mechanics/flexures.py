@@ -15,7 +15,7 @@ from .beam import Beam, Material
 from .collection import ROD_POINTS, Collection
 from .free_body import of_beam, of_links
 from .profile import Line, Notch, Panel, Straight, notch_panels
-from .system import Place
+from .system import NO_THICKNESS, Place
 
 CURVE_POINTS = 33  # Points of each panel of a drawn beam.
 
@@ -115,7 +115,7 @@ def _add_links(parts: Collection, flexure: Flexure, pieces: Segments) -> None:
     )  # fmt: skip
     parts.connect(root, far, known, free)
     corners.append(parts.on(far, z_end))
-    parts.lines.append((flexure.name, "flexure", corners))
+    parts.lines.append((flexure.name, "flexure", corners, NO_THICKNESS))
 
 
 class _Points:
@@ -299,9 +299,9 @@ def _place_beam(
     masses = slice(first, len(parts.masses))
     free = of_beam(flexure.name, forwards, beam, direction, coordinates, arms, masses, points)
     parts.connect(body_of(near), body_of(far), turned is None, free)
-    curve_points = np.linspace(-1.0, 1.0, CURVE_POINTS)
-    curve = beam.positions([curve_points, *[curve_points[1:]] * (len(beam.panels) - 1)])
-    parts.lines.append((flexure.name, "flexure", [at(lengths) for lengths in curve]))
+    curve_points = [np.linspace(-1.0, 1.0, CURVE_POINTS)] * len(beam.panels)
+    curve = [at(lengths) for lengths in beam.positions(curve_points)]
+    parts.lines.append((flexure.name, "flexure", curve, beam.thickness(curve_points)))
 
 
 def _add_masses(

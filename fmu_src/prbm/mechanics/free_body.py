@@ -34,7 +34,8 @@ class SectionLoads(NamedTuple):
         Bending moment in each section, positive if the flexure turns counter-clockwise from its
         start to its end [N m].
     area, modulus : (m,)
-        Area [m^2] and section modulus [m^3] of each section.
+        Area [m^2] and section modulus [m^3] of each section, at waists divided by the factors of
+        the stress (:func:`prbm.mechanics.profile.concentration`).
     """
 
     name: str
@@ -91,7 +92,7 @@ class FreeBody:
     turned : (2,) int
         Coordinates of the rotations of the ends, if they are used in the tangents; else empty.
     area, modulus : (m,)
-        Area [m^2] and section modulus [m^3] of the sections.
+        Area [m^2] and section modulus [m^3] of the sections, as in :class:`SectionLoads`.
     beyond : (m, p)
         Share of each mass point that lies beyond a section, seen from the near end [-].
     """

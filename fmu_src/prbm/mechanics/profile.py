@@ -16,6 +16,13 @@ the angle beta from the waist of the thickness t the thickness is
 The flexibility 1/h^3 has a sharp peak at beta = 0, with poles at beta = +-i w, where h = 0.  Gauss
 points in tau are dense in the peak, so that few nodes are enough, however thin the waist is.  The
 factor c was chosen for the least error of the position of the end.
+
+At a waist the stress exceeds that of the theory of beams.  The factors are those of deep hyperbolic
+notches [1] with the same waist and the radius of curvature a^2/b there.
+
+Sources
+-------
+.. [1] H. Neuber, Kerbspannungslehre, Springer, Berlin 1937.
 """
 
 import math
@@ -26,7 +33,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.errors import ParameterError
-from ..base.tolerances import NOTCH_PEAK_FACTOR
+from ..base.tolerances import (
+    CONCENTRATION_SERIES_MAX,
+    NOTCH_LENGTH_RTOL,
+    NOTCH_PEAK_FACTOR,
+    WAIST_ATOL,
+)
 from ..mechanism.flexure import FILLET_NODES, THICK_NODES
 from .arrays import Complex, Real
 
@@ -38,6 +50,32 @@ class Sections(NamedTuple):
     dv: Real
     thickness: Real
     width: Real
+
+
+def concentration(thickness: float, radius: float) -> tuple[float, float]:
+    """Return the factors of the stress at a waist, under a normal force and under a moment [-].
+
+    They refer to the stress of a beam with the section of the waist.
+
+    Parameters
+    ----------
+    thickness : float
+        Thickness of the waist [m].
+    radius : float
+        Radius of curvature of the notch at its waist [m].
+
+    Examples
+    --------
+    >>> [round(factor, 3) for factor in concentration(1e-3, 2e-3)]
+    [1.158, 1.095]
+    """
+    x = 0.5 * thickness / radius
+    root = math.sqrt(x)
+    angle = math.atan(root)
+    pulled = 2.0 * (x + 1.0) * root / ((x + 1.0) * angle + root)
+    if x < CONCENTRATION_SERIES_MAX:
+        return pulled, 1.0 + 2.0 * x / 5
+    return pulled, 4.0 * x * root / (3.0 * (root + (x - 1.0) * angle))
 
 
 @dataclass(frozen=True)
@@ -69,6 +107,10 @@ class Straight:
     def waists(self) -> tuple[float, ...]:
         """Points x of waists: none."""
         return ()
+
+    def concentrations(self, x: Real) -> Real:
+        """Return the factors of the stress at points x (m,), as for :class:`Round`, (2, m) [-]."""
+        return np.ones((2, len(x)))
 
     def at(self, x: Real) -> Sections:
         """Return the sections at points x (m,)."""
@@ -118,9 +160,26 @@ class Round:
     @property
     def waists(self) -> tuple[float, ...]:
         """The point x of the waist, unless it is a node."""
-        _, first, last = self._range
-        x = -(first + last) / (last - first)
+        x = self._waist
         return () if x == 0.0 and self.nodes % 2 == 1 else (x,)
+
+    @property
+    def _waist(self) -> float:
+        """The point x of the waist."""
+        _, first, last = self._range
+        return -(first + last) / (last - first)
+
+    def concentrations(self, x: Real) -> Real:
+        """Return the factors of the stress at points x (m,), (2, m) [-].
+
+        They are 1 except at the waist.  The first row is for a normal force, the second for a
+        moment.
+        """
+        a, b = self.axes
+        factors = np.array(concentration(self.thickness, a**2 / b))[:, None]
+        at_waist = np.abs(x - self._waist) < WAIST_ATOL
+        result: Real = np.where(at_waist, factors, 1.0)
+        return result
 
     @property
     def _range(self) -> tuple[float, float, float]:
@@ -206,12 +265,12 @@ def notch_panels(name: str, notch: Notch, L: float, nodes: int) -> Sequence[Pane
             f"flexure {name}: the thickness outside its notch, {H:g} m, must be above the "
             f"thickness of its waist, {h:g} m: increase end_thickness"
         )
-    if not notch.length <= L:
+    if not notch.length <= L * (1.0 + NOTCH_LENGTH_RTOL):
         raise ParameterError(
             f"flexure {name}: its notch of the length {notch.length:g} m is longer than the "
             f"flexure, {L:g} m: reduce notch_radius or waist_length, or move the ends apart"
         )
-    rest, angle = 0.5 * (L - notch.length), notch.angle
+    rest, angle = max(0.5 * (L - notch.length), 0.0), notch.angle
     first = Straight(THICK_NODES, 0.0, rest, (H, H), width)
     last = Straight(THICK_NODES, L - rest, rest, (H, H), width)
     if notch.waist_length is None:

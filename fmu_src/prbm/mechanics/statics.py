@@ -158,7 +158,8 @@ def equilibrium(
         target = min(1.0, done + fraction)
         held = None if displacement is None else target * displacement
         trial = _newton(system, held, (target * w, target * moment), state)
-        if trial is not None and np.abs((trial - state)[bent]).max() <= STATICS_TURN_MAX:
+        near = trial is not None and np.abs((trial - state)[bent]).max() <= STATICS_TURN_MAX
+        if trial is not None and near and _holds(system, held, trial):
             state, done = trial, target
             fraction = min(1.0, 2 * fraction)
         else:
@@ -233,6 +234,16 @@ def _newton(
             return None
         state = state + change * min(1.0, STATICS_TURN_MAX / max(turn, STATICS_TURN_MIN))
     return None
+
+
+def _holds(system: System, held: float | None, state: Real) -> bool:
+    """Return whether a shape is held at an amount, and not half a turn or more away.
+
+    The sine that holds a rotation vanishes there, too.
+    """
+    if held is None or not system.mechanism.release.turns:
+        return True
+    return abs(system.amount(state[: system.n]) - held) < STATICS_TURN_MAX
 
 
 def _unreachable(system: System, displacement: float | None, loaded: bool, done: float) -> str:

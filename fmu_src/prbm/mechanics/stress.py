@@ -46,6 +46,10 @@ class Stress(NamedTuple):
     position: float
 
 
+SectionStresses = dict[str, tuple[Real, Real]]
+"""Stress of the left and of the right face in the sections of flexures by name, (m,), (m,) [Pa]."""
+
+
 def stressed(mechanism: Mechanism) -> tuple[int, ...]:
     """Return the indices of the flexures whose stress is an output.
 
@@ -85,6 +89,25 @@ def stresses(equations: Equations, q: Real, v: Real, found: Evaluation) -> dict[
         return {}
     loads, _ = section_loads(equations, q, v, found)
     return {loads[i].name: stress(loads[i]) for i in wanted}
+
+
+def section_stresses(equations: Equations, q: Real, v: Real, found: Evaluation) -> SectionStresses:
+    """Return the stress in all sections of the flexures whose stress is an output.
+
+    The arguments are those of :func:`prbm.mechanics.sections.section_loads`.
+    """
+    loads, _ = section_loads(equations, q, v, found)
+    return {loads[i].name: faces(loads[i]) for i in stressed(equations.system.mechanism)}
+
+
+def section_positions(system: System) -> dict[str, Real]:
+    """Return the positions of these sections along the flexures, from the start, (m,) [m]."""
+    own = {c.flexure.name: c.flexure for c in system.connections if c.flexure}
+    names = [system.mechanism.flexures[i].name for i in stressed(system.mechanism)]
+    return {
+        name: own[name].position if own[name].forwards else own[name].position[::-1]
+        for name in names
+    }
 
 
 def static_stresses(

@@ -106,12 +106,26 @@ class BodyFrame:
 
 @dataclass(frozen=True)
 class Outline:
-    """A line to draw: the places of its corners, z = c + A E."""
+    """A line to draw.
+
+    Parameters
+    ----------
+    name, kind : str
+        Name of the part; ``"flexure"``, ``"joint"`` or ``"body"``.
+    c, A : (p,) complex, (p, d) complex
+        The places of its corners, z = c + A E [m].
+    thickness : (p,)
+        Thickness of a beam at the corners [m]; empty for other parts.
+    """
 
     name: str
     kind: str
     c: Complex
     A: Complex
+    thickness: Real
+
+
+NO_THICKNESS: Real = np.zeros(0)  # Thickness of outlines that are not beams.
 
 
 def values(B: Complex, c: Real, e: Complex) -> Real:

@@ -226,7 +226,7 @@ class _Colours:
         some = [0, *hits, *(min(k + 3, last) for k in hits), last // 2, last]
         pixels = np.concatenate([_packed(frame).ravel() for frame in pictures(scene, some)])
         colours, frequency = np.unique(pixels, return_counts=True)
-        own = np.array([int(colour[1:], 16) for colour in COLOURS])
+        own = np.array([int(colour[1:], 16) for colour in (*COLOURS, *scene.stress_colours)])
         common = colours[np.argsort(-frequency, kind="stable")]
         chosen = np.concatenate([own, common[~np.isin(common, own)]])[:256]
         chosen = np.pad(chosen, (0, 256 - len(chosen)), mode="edge")

@@ -106,7 +106,7 @@ def picture(
     figure = Figure((WIDTH, height + rows * row), dpi=120, layout="constrained")
     grid = figure.add_gridspec(1 + rows, COLUMNS, height_ratios=[height, *[row] * rows])
     axes = figure.add_subplot(grid[0, :])
-    drawing = _Drawing(axes, shapes)
+    drawing = Drawing(axes, shapes)
     drawing.parts()
     if start is not None:
         drawing.released(start)
@@ -143,7 +143,7 @@ def _draw_modes(
 ) -> None:
     for k, place in enumerate(places):
         axes = figure.add_subplot(place)  # type: ignore[call-overload]
-        drawing = _Drawing(axes, shapes)
+        drawing = Drawing(axes, shapes)
         drawing.ghost(E)
         drawing.shape(moved(shapes, E, found, k))
         axes.set_title(_frequency(float(found.frequency[k])), fontsize=9)
@@ -209,7 +209,7 @@ def _aligned(across: float) -> Literal["left", "center", "right"]:
     return "center" if abs(across) < 0.5 else "left" if across > 0.0 else "right"
 
 
-class _Drawing:
+class Drawing:
     """Draws shapes on axes, in a unit suited to their size."""
 
     def __init__(self, axes: Axes, shapes: Shapes) -> None:
@@ -218,6 +218,7 @@ class _Drawing:
         axes.set_aspect("equal")
 
     def line(self, z: Complex, color: str, width: float, zorder: float, style: str = "-") -> None:
+        """Draw a line through points [m]."""
         z = z * self.factor
         self.axes.plot(
             z.real, z.imag, style, color=color, linewidth=width, zorder=zorder,
@@ -225,6 +226,7 @@ class _Drawing:
         )  # fmt: skip
 
     def mark(self, z: Complex, marker: str, color: str, size: float, zorder: float) -> None:
+        """Draw markers at points [m]."""
         z = np.atleast_1d(z) * self.factor
         self.axes.plot(
             z.real, z.imag, linestyle="none", marker=marker, markersize=size, color=color,
@@ -232,6 +234,7 @@ class _Drawing:
         )  # fmt: skip
 
     def pivots(self, z: Complex, size: float, zorder: float, width: float = 1.0) -> None:
+        """Draw open circles at points [m]."""
         z = z * self.factor
         self.axes.plot(
             z.real, z.imag, "o", color=LINK, markersize=size, markerfacecolor="white",
@@ -241,9 +244,19 @@ class _Drawing:
     def text(
         self, z: complex, words: str, color: str = NAME, ha: str = "center", va: str = "center"
     ) -> None:
+        """Write words at a point [m]."""
         self.axes.annotate(
             words, (z.real * self.factor, z.imag * self.factor), color=color, fontsize=8,
             ha=ha, va=va, zorder=9, path_effects=[withStroke(linewidth=2.2, foreground="white")],
+        )  # fmt: skip
+
+    def patch(self, rings: Sequence[Complex], color: str, zorder: float) -> None:
+        """Draw an area, see :func:`prbm.drawing.style.area`."""
+        self.axes.add_patch(
+            PathPatch(
+                area(rings, self.factor), facecolor=color, edgecolor=LINK, linewidth=1.0,
+                alpha=0.9, joinstyle="round", zorder=zorder,
+            )
         )  # fmt: skip
 
     # -- shapes --
@@ -253,7 +266,7 @@ class _Drawing:
         for ground in self.shapes.ground():
             self.line(ground, WALL, 0.9, 1.0)
         for line in self.shapes.flexures:
-            self.line(corners(line.outline, E), STRAIGHT, 0.9, 0.5, "--")
+            self.line(line.drawn(E), STRAIGHT, 0.9, 0.5, "--")
         for name in self.shapes.bodies:
             z = self.shapes.body(name, E)
             self.line(np.append(z, z[0]), STRAIGHT, 0.9, 0.5, "--")
@@ -263,17 +276,15 @@ class _Drawing:
         for line in self.shapes.flexures:
             z = corners(line.outline, E)
             many = len(z) - 2 > CURVED_PIVOTS_MAX
+            if line.shaped:
+                self.patch([line.edge(E)], FLEXURE, 2.0)
+                continue
             self.line(z if many else curve(z, line.guided), FLEXURE, 3.6, 2.0)
             self.line(z, LINK, 0.9, 2.5)
             if pivots and line.jointed:
                 self.pivots(z[1:-1], 1.5 if many else 3.4, 4.0)
         for name in self.shapes.bodies:
-            self.axes.add_patch(
-                PathPatch(
-                    area(self.shapes.areas(name, E), self.factor), facecolor=BODY, edgecolor=LINK,
-                    linewidth=1.0, alpha=0.9, joinstyle="round", zorder=3.0,
-                )
-            )  # fmt: skip
+            self.patch(self.shapes.areas(name, E), BODY, 3.0)
         self.pivots(self.shapes.pins(E), 6.0, 5.0, 1.5)
         self.axes.autoscale_view()
 
@@ -295,6 +306,7 @@ class _Drawing:
         self.axes.margins(0.08)
 
     def stops(self, E: Complex) -> None:
+        """Draw walls, hit points and names of the stops."""
         stops = self.shapes.system.mechanism.stops
         for i, (stop, wall) in enumerate(zip(stops, _walls(self.shapes), strict=True)):
             self.line(wall, WALL, 1.6, 3.5)
@@ -309,7 +321,8 @@ class _Drawing:
             z = corners(line.outline, E)
             many = len(z) - 2 > CURVED_PIVOTS_MAX
             if self.apart(z, corners(line.outline, shapes.straight)):
-                self.line(z if many else curve(z, line.guided), START, 1.0, 3.6, "--")
+                smooth = line.drawn(E) if many else curve(z, line.guided)
+                self.line(smooth, START, 1.0, 3.6, "--")
         for name in shapes.bodies:
             z = shapes.body(name, E)
             if self.apart(z, shapes.body(name, shapes.straight)):
@@ -357,6 +370,7 @@ class _Drawing:
         )  # fmt: skip
 
     def forces(self, E: Complex) -> None:
+        """Draw arrows of the forces that are inputs."""
         length = ARROW_LENGTH * self.shapes.size * self.factor
         forces = self.shapes.system.mechanism.forces
         for force, z in zip(forces, self.shapes.forces(E), strict=True):
@@ -368,11 +382,12 @@ class _Drawing:
                 )  # fmt: skip
             self.text(complex(x + length, y) / self.factor, f" {force.name}", IMPACT, ha="left")
 
-    def along(self, start: complex, end: complex, words: str) -> None:
-        """Write words parallel to a line and above it, never upside down."""
-        place = (start + NAME_AT * (end - start)) * self.factor
+    def along(self, start: complex, end: complex, words: str, thickness: float) -> None:
+        """Write words parallel to a line of a thickness [m] and above it, never upside down."""
         degrees = math.degrees(cmath.phase(end - start))
         turned = (degrees + 89.0) % 180.0 - 89.0
+        beside = cmath.rect(0.5 * thickness, math.radians(turned + 90.0))
+        place = (start + NAME_AT * (end - start) + beside) * self.factor
         away = cmath.rect(NAME_OFFSET, math.radians(turned + 90.0))
         self.axes.annotate(
             words, (place.real, place.imag), (away.real, away.imag), textcoords="offset points",
@@ -392,7 +407,8 @@ class _Drawing:
                 self.text(complex(x, 0.75 * low + 0.25 * high), name, LINK)
         for line in shapes.flexures:
             z = corners(line.outline, E)
-            self.along(complex(z[0]), complex(z[-1]), line.flexure.name)
+            thickness = float(line.outline.thickness.max()) if line.shaped else 0.0
+            self.along(complex(z[0]), complex(z[-1]), line.flexure.name, thickness)
         for joint in shapes.joints:
             self.text(complex(corners(joint, E)[0]), f"  {joint.name}", ha="left", va="bottom")
         for probe, z in zip(shapes.system.mechanism.probes, shapes.probes(E), strict=True):

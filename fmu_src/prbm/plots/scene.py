@@ -6,14 +6,18 @@ from collections.abc import Iterable, Iterator
 from typing import Any, Literal
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch
 from numpy.typing import NDArray
 
+from ..analysis.stress_field import StressField
 from ..base.unit_text import length_unit, time_unit
 from ..drawing.shapes import Shapes, corners, curve
 from ..drawing.style import (
@@ -34,6 +38,15 @@ from ..drawing.style import (
 )
 from ..mechanics.arrays import Complex
 from .motion import Film, Motion, pace
+from .stress_colours import (
+    COLOURS_OF_STRESS,
+    directions_of,
+    drawn_line,
+    norm,
+    set_stress,
+    stress_bar,
+    stress_line,
+)
 
 COLOURS = (
     LINK,
@@ -52,6 +65,7 @@ COLOURS = (
 MARGIN = 0.06  # Margin around the motion, as a share of the size of the mechanism.
 FLASH = 0.28  # Time of the film in which a flash fades [s].
 FLASH_MIN, FLASH_MAX = 8.0, 34.0  # Sizes of flashes [points].
+PALETTE = 48  # Colours of the stress that a GIF file keeps exactly.
 SIZE, DPI = (8.0, 6.4), 100  # Inches; video codecs need even numbers of pixels.
 
 
@@ -82,16 +96,25 @@ class Scene:
         Times of the frames.
     figure : Figure or None
         Figure to draw in; None: a new figure without a window.
+    stress : StressField or None
+        Stress of the flexures, drawn as their colour; None: all have the same colour.
 
     Attributes
     ----------
-    links, curves, bodies, hits, walls : dict of str to artist
+    links, curves, edges, bodies, hits, walls : dict of str to artist
         Moving artists by the names of flexures, bodies and stops, in the unit of the axes.
+        Flexures with a profile are in ``edges``, all others in ``links``.
     """
 
     @own_style()
-    def __init__(self, motion: Motion, film: Film, figure: Figure | None = None) -> None:
-        self.motion, self.film = motion, film
+    def __init__(
+        self,
+        motion: Motion,
+        film: Film,
+        figure: Figure | None = None,
+        stress: StressField | None = None,
+    ) -> None:
+        self.motion, self.film, self.stress = motion, film, stress
         self.system = motion.system
         self.figure = figure or Figure(SIZE, DPI)
         if figure is None:
@@ -99,7 +122,7 @@ class Scene:
         self.factor, self.unit = length_unit(self.system.length)
         grid = self.figure.add_gridspec(
             2, 1, height_ratios=(3.4, 1.0), hspace=0.2,
-            left=0.09, right=0.98, bottom=0.075, top=0.945,
+            left=0.09, right=0.98 if stress is None else 0.88, bottom=0.075, top=0.945,
         )  # fmt: skip
         self.stage: Axes = self.figure.add_subplot(grid[0])
         self.trace: Axes = self.figure.add_subplot(grid[1])
@@ -128,7 +151,7 @@ class Scene:
         for line in self.shapes.ground():
             self._line(line, WALL, 1.2, zorder=3.2)
         for flexure in self.shapes.flexures:
-            z = corners(flexure.outline, self.shapes.straight)
+            z = flexure.drawn(self.shapes.straight)
             self._line(z, STRAIGHT, 1.0, zorder=0.5).set_linestyle("--")
         self._set_flexures()
         self._set_bodies()
@@ -138,9 +161,16 @@ class Scene:
 
     def _set_flexures(self) -> None:
         self.curves, self.links = {}, {}
+        self.edges: dict[str, PathPatch] = {}
+        self.coloured: dict[str, LineCollection] = {}
+        self._set_stress()
         for line in self.shapes.flexures:
             pivots, name = len(line.outline.c) - 2, line.flexure.name
-            if pivots <= CURVED_PIVOTS_MAX or not line.jointed:
+            if line.shaped:
+                self.edges[name] = self._moving_area(line.edge(self.shapes.straight), FLEXURE, 2.0)
+                continue
+            curved = pivots <= CURVED_PIVOTS_MAX or not line.jointed
+            if curved and name not in self.coloured:
                 self.curves[name] = self._moving_line(FLEXURE, 5.0, zorder=2.0)
             self.links[name] = self._moving_line(
                 LINK, 1.3, zorder=4.0, marker="o" if line.jointed else "", markerfacecolor="white",
@@ -148,17 +178,45 @@ class Scene:
                 markersize=4.2 if pivots <= CURVED_PIVOTS_MAX else 2.0,
             )  # fmt: skip
 
+    def _set_stress(self) -> None:
+        """Add the lines in the colours of the stress, and the colour bar."""
+        if self.stress is None:
+            return
+        self.forwards = directions_of(self.shapes)
+        colours = norm(self.stress.largest)
+        for name in self.stress.position:
+            line = self.coloured[name] = stress_line(colours)
+            self.stage.add_collection(line)
+            self.moving.append(line)
+        left, bottom, width, height = self.stage.get_position().bounds
+        axes = self.figure.add_axes((left + width + 0.02, bottom, 0.02, height))
+        stress_bar(self.figure, axes, colours)
+
+    @property
+    def stress_colours(self) -> list[str]:
+        """Some colours of the stress; none without it."""
+        if self.stress is None:
+            return []
+        every = colormaps[COLOURS_OF_STRESS](np.linspace(0.0, 1.0, PALETTE))
+        return list(dict.fromkeys(map(to_hex, every)))
+
+    def _colour(self, t: float, E: Complex) -> None:
+        """Colour the flexures by their stress at a time [s]."""
+        if self.stress is None:
+            return
+        found = self.stress.at(t)
+        for line in self.shapes.flexures:
+            name = line.flexure.name
+            if name in self.coloured:
+                z = drawn_line(line, E, self.forwards[name])
+                position = self.stress.position[name]
+                set_stress(self.coloured[name], z, position, found[name], self.factor)
+
     def _set_bodies(self) -> None:
         self.bodies: dict[str, PathPatch] = {}
         self.centres: dict[str, Line2D] = {}
         for name in self.system.bodies:
-            patch = PathPatch(
-                area([self.shapes.bodies[name]]), facecolor=BODY, edgecolor=LINK, linewidth=1.2,
-                alpha=0.9, joinstyle="round", zorder=3.0,
-            )  # fmt: skip
-            self.stage.add_patch(patch)
-            self.moving.append(patch)
-            self.bodies[name] = patch
+            self.bodies[name] = self._moving_area(self.shapes.bodies[name], BODY, 3.0)
             self.centres[name] = self._moving_line(
                 LINK, 0.0, zorder=4.0, marker="P", markersize=6.0, markeredgecolor="white"
             )
@@ -200,6 +258,15 @@ class Scene:
         self.moving.append(line)
         return line
 
+    def _moving_area(self, ring: Complex, color: str, zorder: float) -> PathPatch:
+        patch = PathPatch(
+            area([ring]), facecolor=color, edgecolor=LINK, linewidth=1.2, alpha=0.9,
+            joinstyle="round", zorder=zorder,
+        )  # fmt: skip
+        self.stage.add_patch(patch)
+        self.moving.append(patch)
+        return patch
+
     def _set_limits(self) -> None:
         """Set limits of the axes that contain the whole film."""
         rows = np.unique(np.linspace(0, len(self.film.times) - 1, 60).astype(int))
@@ -207,7 +274,7 @@ class Scene:
         for t in (self.film.times[0], self.film.times[-1], *self.film.times[rows]):
             q, walls = self.motion.shape(float(t))
             E = self.shapes.arms(q)
-            places += [corners(line.outline, E) for line in self.shapes.flexures]
+            places += [line.drawn(E) for line in self.shapes.flexures]
             places += [self.shapes.body(name, E) for name in self.system.bodies]
             places += [self.shapes.wall(i, float(wall), E) for i, wall in enumerate(walls)]
         places += [
@@ -280,9 +347,13 @@ class Scene:
         E = self.shapes.arms(q)
         for line in self.shapes.flexures:
             z, name = corners(line.outline, E), line.flexure.name
+            if line.shaped:
+                self.edges[name].set_path(area([line.edge(E)], self.factor))
+                continue
             self._move(self.links[name], z)
             if name in self.curves:
                 self._move(self.curves[name], curve(z, line.guided) if line.jointed else z)
+        self._colour(t, E)
         for name, patch in self.bodies.items():
             patch.set_path(area(self.shapes.areas(name, E), self.factor))
             self._move(self.centres[name], np.array([self.shapes.centre(name, E)]))

@@ -13,6 +13,7 @@ from ..hybrid.simulation import Simulation
 from ..kernel.library import library
 from ..kernel.simulation import KernelSimulation
 from ..mechanics.arrays import Real
+from ..mechanics.stress import SectionStresses
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 
@@ -50,6 +51,9 @@ class Engine(Protocol):
     @property
     def system(self) -> System:
         """The constant arrays."""
+
+    def section_stresses(self) -> SectionStresses:
+        """Return the stress of both faces in all sections at the present time, by flexure [Pa]."""
 
     @property
     def frequency(self) -> float:

@@ -73,7 +73,8 @@ def signals(
     Raises
     ------
     ParameterError
-        If an input is unknown or among the constants, or a signal is invalid.
+        If an input is unknown or among the constants, a signal is invalid, or the velocity of a
+        wall has a signal and its displacement has none.
     UserMistake
         If a quantity has a wrong unit.
     """
@@ -93,26 +94,60 @@ def signals(
                 f"{name} is given both as a constant and over time; remove one of them"
             )
         found[name] = _signal(name, source, units[name])
-    return with_velocities(found, units.keys() - set(constants))
+    return with_velocities(found, units, constants)
 
 
-def with_velocities(found: Mapping[str, Signal], free: Container[str]) -> dict[str, Signal]:
+def with_velocities(
+    found: Mapping[str, Signal], inputs: Container[str], constants: Collection[str] = ()
+) -> dict[str, Signal]:
     """Return signals together with the velocities of walls whose displacement is a signal.
 
     Parameters
     ----------
     found : mapping
         Signals by the names of inputs.
-    free : container of str
-        Names of inputs that have no constant value.
+    inputs : container of str
+        Names of all inputs.
+    constants : collection of str
+        Names of inputs that have a constant value.
+
+    Raises
+    ------
+    ParameterError
+        If the velocity of a wall has a signal and its displacement has none.
     """
     derived = {}
     for name, signal in found.items():
         stop, _, last = name.rpartition(".")
         velocity = f"{stop}.velocity"
-        if last == "displacement" and velocity in free and velocity not in found:
+        if last == "velocity":
+            check_wall(name, inputs, found)
+        elif last == "displacement" and velocity in inputs and velocity not in {*found, *constants}:
             derived[velocity] = Slope(signal)
     return {**found, **derived}
+
+
+def check_wall(velocity: str, inputs: Container[str], found: Container[str]) -> None:
+    """Reject the velocity of a wall whose displacement does not follow it.
+
+    Parameters
+    ----------
+    velocity : str
+        Name of the velocity, which is not 0.
+    inputs, found : container of str
+        Names of all inputs, and of those with signals.
+
+    Raises
+    ------
+    ParameterError
+        If the displacement is an input without a signal.
+    """
+    displacement = f"{velocity.removesuffix('velocity')}displacement"
+    if displacement in inputs and displacement not in found:
+        raise ParameterError(
+            f"{velocity} is given and {displacement} is constant, so that the wall would not move; "
+            f"give {displacement} over time instead, whose derivative is then the velocity"
+        )
 
 
 def placeholders(inputs: Mapping[str, Source]) -> set[str]:

@@ -17,7 +17,7 @@ from .driving import Driver
 from .engine import Engine, simulation
 from .experiment import experiment
 from .inputs import Source as InputSource
-from .inputs import signals
+from .inputs import check_wall, signals
 from .result import Columns, Result, row_type
 
 Source = Callable[[float], Mapping[str, float]]
@@ -44,6 +44,7 @@ def simulate(
     progress: Progress | None = None,
     steps_max: float | None = None,
     engine: str | None = None,
+    observer: Callable[[Engine], None] | None = None,
 ) -> Result:
     """Simulate a mechanism from its release.
 
@@ -74,6 +75,8 @@ def simulate(
     engine : str or None
         ``"kernel"``, the C kernel, or ``"python"``, the specification, which is slower.  None: the
         kernel if it can be compiled.
+    observer : callable or None
+        Called with the simulation at each communication point.
 
     Returns
     -------
@@ -86,8 +89,8 @@ def simulate(
     TypeError
         If the mechanism is a name or a path: load it first.
     ParameterError
-        If a name is unknown, a value is not a number or out of bounds, a signal is invalid, or a
-        time is not positive.
+        If a name is unknown, a value is not a number or out of bounds, a signal is invalid, a time
+        is not positive, or the velocity of a wall is given and its displacement is constant.
     UserMistake
         If a text is not a quantity of the right dimension.
     EquilibriumError, SimulationError
@@ -129,16 +132,19 @@ def simulate(
     if replaced := replaced_tolerance(wanted):
         _log.warning("%s", replaced)
     _check_effort(motion, spacing)
+    _check_walls(motion, driver, source)
     impacts: list[Impact] = []
     motion.record = impacts
     driver.sample(motion.frequency, motion.tolerance, times[-1])
     start = {**motion.values, **motion.given}
     columns: Columns = np.empty(0)
+    observe = observer or _ignore
     for k, t in enumerate(times):
         driver.advance(motion, t)
         if steps_max is not None:
             _check_steps(motion, steps_max, k / (len(times) - 1))
         outputs = motion.outputs()
+        observe(motion)
         if source is not None:
             motion.set(source(t))
         row = {"time": t, **motion.given, **driver.values(t), **outputs}
@@ -148,6 +154,20 @@ def simulate(
         if progress is not None:
             progress(k / (len(times) - 1))
     return Result(mechanism, start, columns, tuple(impacts), motion.engine)
+
+
+def _check_walls(motion: Engine, driver: Driver, source: Source | None) -> None:
+    """Reject constant velocities of walls that do not move; a source may move them."""
+    if source is not None:
+        return
+    for stop in motion.mechanism.stops:
+        velocity = f"{stop.name}.velocity"
+        if motion.given[velocity] != 0.0:
+            check_wall(velocity, motion.given, driver.signals)
+
+
+def _ignore(motion: Engine) -> None:
+    """Observe nothing."""
 
 
 def _check_effort(motion: Engine, spacing: float) -> None:

@@ -261,7 +261,7 @@ class Runner:
         others = {name: x for name, x in row.items() if name not in within}
         known = {v.name for v in self.description.modelVariables if v.causality == "input"}
         constants = {*others, *self.job.values}
-        driver = Driver(with_velocities(signals, known - constants), self.job.start)
+        driver = Driver(with_velocities(signals, known, constants), self.job.start)
         return {**self.job.values, **driver.values(self.job.start), **others}, driver
 
     def _simulate(

@@ -11,6 +11,7 @@ import math
 import multiprocessing
 import os
 import signal
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
@@ -30,7 +31,7 @@ from ..hybrid.simulation import Simulation
 from ..interface.variables import variables
 from ..mechanics.arrays import Real
 from ..mechanism.description import Mechanism
-from ..runs.engine import check_engine
+from ..runs.engine import PYTHON, check_engine, kernel_available
 from ..runs.experiment import experiment
 from ..runs.inputs import Source, filled, placeholders, signals
 from ..runs.quantities import QUANTITIES
@@ -48,10 +49,12 @@ REFINED_RTOL = 1e-3  # Tolerance of the refined parameters, relative to the dist
 ROUNDS_MAX = 4  # Repetitions of the refinement.
 REFINEMENTS_MAX = 40  # Simulations that refine an optimum.
 REFINEMENTS_EXPECTED = 30  # Usual number of simulations of a refinement, for the progress.
+PROCESSES_MAX = 61 if sys.platform == "win32" else math.inf  # Windows waits for no more.
 LAST_FRACTION = 0.99  # Reported progress while a refinement takes more simulations than usual.
 EDGE_RTOL = 0.02  # Tolerance of the ends of the flat range, relative to the distance of samples.
 NAMES_LISTED_MAX = 12  # Messages about unknown outputs do not list more names.
 TIMES = ("first", "since")  # Reductions whose value is a time.
+Samples = Sequence[float | str] | Real
 
 
 @dataclass(frozen=True)
@@ -98,7 +101,7 @@ def _by_name(columns: Any) -> dict[str, Any]:
     return {name: columns[name] for name in names(columns)}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Optimum:
     """The refined optimum of an output.
 
@@ -134,8 +137,12 @@ class Optimum:
     values: Real
     robust: tuple[float, float, float] | None = None
 
+    def __repr__(self) -> str:
+        place = ", ".join(f"{name} = {x:.6g}" for name, x in self.point.items())
+        return f"<Optimum of {self.output}: {self.value:.6g} at {place}>"
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Study:
     """The samples of a study.
 
@@ -163,10 +170,18 @@ class Study:
     messages: tuple[str, ...] = ()
     optimum: Optimum | None = field(default=None)
 
+    def __repr__(self) -> str:
+        failed = sum(map(bool, self.messages))
+        best = "" if self.optimum is None else f", {self.optimum!r}"
+        return (
+            f"<Study of {len(self.points)} simulations over {' and '.join(self.varied)}: "
+            f"{failed} failed{best}>"
+        )
+
 
 def study(
     mechanism: Mechanism,
-    vary: Mapping[str, Sequence[float] | Real],
+    vary: Mapping[str, Samples],
     outputs: Sequence[str],
     *,
     minimise: str | None = None,
@@ -193,8 +208,8 @@ def study(
     mechanism : Mechanism
         The mechanism.
     vary : mapping
-        Increasing samples of one or two parameters or inputs by name, in SI; or of numbers that
-        are written as ``{name}`` in the texts of inputs.
+        Increasing samples of one or two parameters or inputs by name, numbers in SI or texts with
+        a unit, ``"-4 mm"``; or of numbers that are written as ``{name}`` in the texts of inputs.
     outputs : sequence of str
         Outputs as of :func:`prbm.sweeps.sweep.sweep`: ``settling``, ``max(abs(shuttle.vx))``.
     minimise, maximise : str or None
@@ -265,6 +280,8 @@ def _options(
         If one of the values or arguments is invalid, so that every simulation would fail.
     """
     check_engine(engine)
+    if engine is None and not kernel_available():  # Compiled and reported here, not by workers.
+        engine = PYTHON
     start_values(mechanism, values, 0.0)
     if stop_time is None:
         end = experiment(mechanism, values, engine).stop_time
@@ -281,7 +298,7 @@ def _options(
 
 
 def _checked(
-    mechanism: Mechanism, vary: Mapping[str, Sequence[float] | Real], within: set[str]
+    mechanism: Mechanism, vary: Mapping[str, Samples], within: set[str]
 ) -> dict[str, Real]:
     """Return the samples of each parameter or placeholder as arrays."""
     if len(vary) not in (1, 2):
@@ -297,7 +314,8 @@ def _checked(
             raise ParameterError(
                 f"{{{name}}} in an input is also a parameter; choose another name in braces"
             )
-        x = np.array(sequence, float).ravel()
+        given = np.array(sequence, object).ravel()
+        x = np.array([in_unit(name, sample, known.get(name, "")) for sample in given])
         if len(x) < 2 or not (np.isfinite(x).all() and (np.diff(x) > 0.0).all()):
             raise ParameterError(
                 f"{name}: at least two samples are needed, finite and increasing"
@@ -384,10 +402,10 @@ class _Serial(Executor):
 
 @contextmanager
 def _pool(setup: Setup, workers: int | None, count: int) -> Iterator[Run]:
-    """Yield a function that submits a simulation."""
+    """Yield a function that submits a simulation.  An error ends the simulations that still run."""
     if workers is not None and workers < 1:
         raise ParameterError(f"workers = {workers} must be 1 or more")
-    processes = min(workers or os.cpu_count() or 1, count)
+    processes = int(min(workers or os.cpu_count() or 1, count, PROCESSES_MAX))
     for name, source in setup.inputs.items():
         if processes > 1 and callable(source) and not isinstance(source, Signal):
             raise ParameterError(
@@ -397,9 +415,14 @@ def _pool(setup: Setup, workers: int | None, count: int) -> Iterator[Run]:
     if processes == 1:
         yield lambda values: _Serial().submit(setup.run, values)
         return
+    others = {*multiprocessing.active_children()}
     pool = ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), _prepare, (setup,))
     try:
         yield lambda values: pool.submit(_run, values)
+    except BaseException:  # Ctrl-C, too.
+        for process in {*multiprocessing.active_children()} - others:
+            process.terminate()
+        raise
     finally:
         pool.shutdown(cancel_futures=True)
 

@@ -11,8 +11,17 @@ from ...mechanics.assembly import assemble
 from ...mechanics.system import Outline, System
 from ...mechanism.description import Mechanism
 from ...mechanism.expressions import Quantity, affine
-from ...mechanism.flexure import FILLET_NODES, NOTCH, PIN, THICK_NODES
-from ...mechanism.parts import Flexure, FlexureType, Joint, Part, Point, Stop, body_of
+from ...mechanism.flexure import FILLET_NODES, LEAF, NOTCH, PIN, THICK_NODES
+from ...mechanism.parts import (
+    Flexure,
+    FlexureType,
+    Joint,
+    Part,
+    Point,
+    Stop,
+    body_of,
+    field_of,
+)
 from ...runs.experiment import Experiment
 
 Json = Any
@@ -178,7 +187,7 @@ def _given(part: Part, name: str) -> str | None:
 
 def _field(part: Part, name: str) -> Json:
     """Return the expression of a field of a part."""
-    quantity = getattr(part, name)
+    quantity = field_of(part, name)
     return _expression(quantity) if isinstance(quantity, str) else [0.0, {f"{part.name}.{name}": 1}]
 
 
@@ -226,9 +235,18 @@ def _flexures(mechanism: Mechanism, system: System) -> list[dict[str, Json]]:
                 "corners": _nodes(kind, model.nodes) if beam else len(outline.c),
                 "guided": guided,
                 "ends": ends,
+                "profile": _profile(kind),
             }
         )
     return result
+
+
+def _profile(kind: FlexureType) -> dict[str, Json] | None:
+    """Return the dimensions of a taper or a notch; None for leaves."""
+    if kind.profile == LEAF:
+        return None
+    fields = ("thickness", "end_thickness", "notch_radius", "notch_depth", "waist_length")
+    return {name: _field(kind, name) for name in fields if field_of(kind, name) is not None}
 
 
 def _nodes(kind: FlexureType, nodes: int) -> int:

@@ -7,6 +7,7 @@ const MESSAGE_LENGTH = 640; // Bytes of an error message.
 const IMPACT_NUMBERS = 9; // Numbers of a recorded impact before its coordinates and rates.
 const NUMBER = 8; // Bytes of a double.
 const SLOT = 4; // Bytes of an int.
+const UNFINISHED = -2; // ENGINE_UNFINISHED: prbm_advance is to be called again.
 
 class KernelError extends Error {}
 
@@ -106,7 +107,10 @@ class Simulation {
 
   // Continue to a time; return the impacts on the way.
   advance(time) {
-    const count = this.call.prbm_advance(this.address, time, this.kernel.message);
+    let count = UNFINISHED;
+    while (count === UNFINISHED) {
+      count = this.call.prbm_advance(this.address, time, this.kernel.message);
+    }
     if (count < 0) {
       throw this.kernel.error();
     }

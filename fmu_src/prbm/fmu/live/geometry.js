@@ -95,6 +95,38 @@ function splinePart(z, k, count) {
   });
 }
 
+// Return the thickness of a flexure at the arc length s from its start.  It has the dimensions of a
+// profile and the length L.
+function thicknessAt(profile, s, L) {
+  const { thickness, end_thickness: outside, notch_radius: along } = profile;
+  if (along === undefined) {
+    return thickness + ((outside - thickness) * s) / L; // A taper.
+  }
+  const across = profile.notch_depth;
+  const edge = Math.acos(Math.max(1 - (outside - thickness) / (2 * across), 0));
+  const apart = Math.max(Math.abs(s - L / 2) - (profile.waist_length ?? 0) / 2, 0);
+  if (apart > along * Math.sin(edge)) {
+    return outside;
+  }
+  return thickness + 4 * across * Math.sin(Math.asin(apart / along) / 2) ** 2;
+}
+
+// Return the edge of a flexure whose thickness varies, from the curve of its centre line.
+function profileEdge(curve, profile, L) {
+  const steps = curve.slice(1).map((point, k) => minus(point, curve[k]));
+  const lengths = steps.map(norm);
+  const total = lengths.reduce((sum, length) => sum + length, 0);
+  let s = 0;
+  const levers = curve.map((_, k) => {
+    const along = plus(steps[Math.max(k - 1, 0)], steps[Math.min(k, steps.length - 1)]);
+    const half = thicknessAt(profile, (s / total) * L, L) / 2;
+    s += lengths[k] ?? 0;
+    return times(half / norm(along), turned([0, 1], along));
+  });
+  const left = curve.map((point, k) => plus(point, levers[k]));
+  return [...curve.map((point, k) => minus(point, levers[k])), ...left.reverse()];
+}
+
 // Return the corners of the convex hull of points, counter-clockwise.
 function hull(points) {
   const sorted = [...points].sort((u, v) => u[0] - v[0] || u[1] - v[1]);
@@ -208,13 +240,22 @@ class Shapes {
     );
   }
 
-  // The straight shape, in which each flexure is a line between its drawn ends.
+  // The shape as drawn: each flexure of links is a line between its ends.  At coordinates of zero a
+  // beam has its drawn shape, but may be moved with a body that links carry.
   get straight() {
-    const lines = this.description.flexures.map(({ ends }) => ({
-      curve: ends.map((end) => pointOf(end.point, this.values)),
-      corners: [],
-    }));
-    return { poses: this.drawn, lines };
+    const { lines } = this.shape(this.simulation.points(new Float64Array(this.simulation.size)));
+    const drawn = this.description.flexures.map(({ beam, ends }, k) => {
+      const [start, end] = ends.map((place) => pointOf(place.point, this.values));
+      if (!beam) {
+        return { curve: [start, end], corners: [] };
+      }
+      const moved = minus(start, lines[k].curve[0]);
+      return this.withEdge(k, {
+        curve: lines[k].curve.map((point) => plus(point, moved)),
+        corners: [],
+      });
+    });
+    return { poses: this.drawn, lines: drawn };
   }
 
   // Return the shape at coordinates: the poses of the bodies and the lines of the flexures.
@@ -250,7 +291,19 @@ class Shapes {
       };
     }
     const [start, end] = flexure.ends.map((place) => this.carried(place.body, place.point, poses));
-    return { curve: splineCurve([start, ...corners, end]), corners: [] };
+    return this.withEdge(k, { curve: splineCurve([start, ...corners, end]), corners: [] });
+  }
+
+  // Return a line with the edge of its flexure, if the thickness of the flexure varies.
+  withEdge(k, line) {
+    const { profile, ends } = this.description.flexures[k];
+    if (!profile) {
+      return line;
+    }
+    const given = Object.entries(profile).map(([name, x]) => [name, evaluated(x, this.values)]);
+    const [start, end] = ends.map((place) => pointOf(place.point, this.values));
+    const edge = profileEdge(line.curve, Object.fromEntries(given), norm(minus(end, start)));
+    return { ...line, edge };
   }
 
   // Return the position of a drawn point of a body; point is an expression.

@@ -58,8 +58,9 @@ def live_part(content: dict[str, Any], tables: bytes, module: bytes) -> LivePart
 
 @cache
 def script() -> str:
-    """Return the script of the live part: all files in one function."""
-    joined = "\n".join(_text(name) for name in SCRIPTS)
+    """Return the script of the live part: all files in one function, without comment lines."""
+    lines = "\n".join(_text(name) for name in SCRIPTS).split("\n")
+    joined = "\n".join(line for line in lines if not line.lstrip().startswith("//"))
     return f'(() => {{\n"use strict";\n{joined}\n}})();'
 
 

@@ -42,7 +42,9 @@ class Stage {
       return node;
     };
     this.straight = flexures.map(() => add("straight", "path", { class: "straight" }));
-    this.flexures = flexures.map(() => add("flexures", "path", { class: "flexure" }));
+    this.flexures = flexures.map(({ profile }) =>
+      add("flexures", "path", { class: profile ? "flexure shaped" : "flexure" }),
+    );
     this.links = flexures.map(() => add("links", "path", { class: "link" }));
     this.pivots = flexures.map(() => add("links", "path", { class: "pivot" }));
     this.bodies = bodies.map((body) => {
@@ -218,19 +220,27 @@ class Stage {
       .join("L")}`;
   }
 
+  // Return the path of a flexure: its curve, or the edge of its profile.
+  outline({ curve, edge }) {
+    return edge ? `${this.path(edge)}Z` : this.path(curve);
+  }
+
   // -- parts --
 
   drawFixed(shapes, width, height) {
     const rest = shapes.straight;
-    rest.lines.forEach((line, k) => this.straight[k].setAttribute("d", this.path(line.curve)));
+    rest.lines.forEach((line, k) => this.straight[k].setAttribute("d", this.outline(line)));
     const parts = [];
     for (const [k, flexure] of this.description.flexures.entries()) {
       flexure.ends.forEach((end, side) => {
         if (end.body === GROUND) {
-          const { curve } = rest.lines[k];
-          const [near, far] = side === 0 ? [curve[0], curve.at(-1)] : [curve.at(-1), curve[0]];
-          const length = Math.min(0.16 * shapes.size, 0.4 * norm(minus(far, near)));
-          const into = times(1 / norm(minus(near, far)), minus(near, far));
+          const { curve, edge } = rest.lines[k];
+          const [near, next] = side === 0 ? curve : [curve.at(-1), curve.at(-2)];
+          const chord = norm(minus(curve[0], curve.at(-1)));
+          const corner = side === 0 ? 0 : curve.length;
+          const width = edge ? norm(minus(edge.at(corner - 1), edge[corner])) : 0;
+          const length = Math.max(Math.min(0.16 * shapes.size, 0.4 * chord), 1.3 * width);
+          const into = times(1 / norm(minus(near, next)), minus(near, next));
           parts.push(this.hatched(near, into, length));
         }
       });
@@ -272,7 +282,7 @@ class Stage {
     this.last = [shapes, shape];
     const { description } = this;
     shape.lines.forEach((line, k) => {
-      this.flexures[k].setAttribute("d", this.path(line.curve));
+      this.flexures[k].setAttribute("d", this.outline(line));
       this.links[k].setAttribute("d", line.corners.length ? this.path(line.corners) : "");
       const circles = line.corners.slice(1, -1).map((corner) => this.circle(corner, 3));
       this.pivots[k].setAttribute("d", circles.join(""));

@@ -477,6 +477,7 @@ static bool stubs(System *system, Scratch *scratch, Problem *problem) {
 static void clear(System *system) {
     size_t n = (size_t)system->n, d = (size_t)system->d, b = (size_t)system->b;
     system->p = system->spring_count = system->corner_count = 0;
+    memset(system->grounded, 0, (size_t)system->even * sizeof *system->grounded);
     memset(system->q0, 0, n * sizeof *system->q0);
     memset(system->J, 0, d * sizeof *system->J);
     for (int k = 0; k < system->mechanism->map.count; k++) {

@@ -235,8 +235,10 @@ static Complex set_nodes(Beam *beam, const Section *sections, const double *x,
 /* --- cuts ------------------------------------------------------------------------------------- */
 
 static void add_cut(Beam *beam, Section *sections, const Panel *panel, double x, double rank) {
-    sections[beam->cut_count] = section_at(panel, x);
-    beam->cuts[beam->cut_count++].rank = rank;
+    Cut *cut = &beam->cuts[beam->cut_count];
+    sections[beam->cut_count++] = section_at(panel, x);
+    cut->rank = rank;
+    factors_at(panel, x, &cut->pulled, &cut->bent);
 }
 
 /* Set the ranks of the cuts and their sections.  x (N,) are the nodes. */
@@ -291,8 +293,9 @@ static void set_cuts(Beam *beam, const Fine *fine, const Section *sections, Comp
         bool at_node = cut->rank == node && node >= 0 && node < beam->nodes;
         cut->position = at_node ? places[node] : sections[k].v;
         cut->tangent = scaled(1.0 / modulus(along), along);
-        cut->area = area_of(sections[k]);
-        cut->modulus = cut->area * sections[k].thickness / 6;
+        double area = area_of(sections[k]);
+        cut->area = area / cut->pulled;
+        cut->modulus = area * sections[k].thickness / 6 / cut->bent;
     }
     beam->cuts[beam->cut_count - 1].position = length;
 }

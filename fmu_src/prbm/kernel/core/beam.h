@@ -9,7 +9,8 @@ typedef struct {
     double position;      /* arc length from the start of the beam [m] */
     double rank;          /* number of the node, -1 or N at the ends, a half between two nodes */
     Complex tangent;      /* direction as drawn, in units of the direction of the chord */
-    double area, modulus; /* [m^2], [m^3] */
+    double pulled, bent;  /* factors of the stress under a normal force and a moment [-] */
+    double area, modulus; /* [m^2], [m^3], divided by these factors */
 } Cut;
 
 /* Both ends, and at most two waists. */

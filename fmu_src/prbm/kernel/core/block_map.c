@@ -109,29 +109,42 @@ static bool is_beam(const System *system, const BlockMap *block) {
            block->size <= BEAM_DIRECTIONS_MAX;
 }
 
+/* Rows and columns of the entries of a symmetric matrix of the coordinates.  The first entries are
+ * pairs of neighbours in a row. */
+static const int BEAM_ENTRY[BEAM_ENTRIES][2] = {
+    {1, 0}, {1, 1}, {2, 0}, {2, 1}, {3, 0}, {3, 1}, {3, 2}, {3, 3}, {0, 0}, {2, 2},
+};
+
+static bool consecutive(const BlockMap *block) {
+    for (int c = 1; c < block->count; c++) {
+        if (block->coordinate[c] != block->coordinate[0] + c) {
+            return false;
+        }
+    }
+    return true;
+}
+
 /* Set the mass matrices of the coordinates for each pair of directions, and that of the
  * diagonal. */
 static void set_products(const System *system, BlockMap *block) {
     double *next = block->products;
+    block->together = consecutive(block);
     zeros(BEAM_ENTRIES, block->constant);
     for (int i = 0; i < block->size; i++) {
         for (int a = 0; a < BEAM_COORDINATES; a++) {
             block->rows[i * BEAM_COORDINATES + a] = block->change[a * block->even + i];
         }
         for (int j = 0; j <= i; j++) {
-            int entry = 0;
             double mass = real_row(block->size, i) ? block->H.re[i * block->even + j] : 1.0;
-            for (int a = 0; a < BEAM_COORDINATES; a++) {
-                const double *x = block->change + a * block->even;
-                for (int b = 0; b <= a; b++) {
-                    const double *y = block->change + b * block->even;
-                    if (j < i) {
-                        next[entry++] = mass * (x[i] * y[j] + x[j] * y[i]);
-                    } else {
-                        block->constant[entry++] += system->own[block->start + i] * x[i] * y[i];
-                    }
-                    block->place[entry - 1] = mass_index(block, a, b);
+            for (int k = 0; k < BEAM_ENTRIES; k++) {
+                const double *x = block->change + BEAM_ENTRY[k][0] * block->even;
+                const double *y = block->change + BEAM_ENTRY[k][1] * block->even;
+                if (j < i) {
+                    next[k] = mass * (x[i] * y[j] + x[j] * y[i]);
+                } else {
+                    block->constant[k] += system->own[block->start + i] * x[i] * y[i];
                 }
+                block->place[k] = mass_index(block, BEAM_ENTRY[k][0], BEAM_ENTRY[k][1]);
             }
             next += j < i ? BEAM_ENTRIES : 0;
         }
@@ -262,6 +275,14 @@ SIZED void pull_beam(int size, const BlockMap *map, const double *ALONE x, doubl
             sum[c / LANES] += each * lanes_at(map->rows + i * BEAM_COORDINATES + c);
         }
     }
+    if (map->together) {
+        out += map->coordinate[0];
+        UNROLLED
+        for (int c = 0; c < BEAM_COORDINATES; c += LANES) {
+            set_lanes(out + c, lanes_at(out + c) + sum[c / LANES]);
+        }
+        return;
+    }
     UNROLLED
     for (int c = 0; c < BEAM_COORDINATES; c += LANES) {
         set_lanes(entries + c, sum[c / LANES]);
@@ -272,16 +293,23 @@ SIZED void pull_beam(int size, const BlockMap *map, const double *ALONE x, doubl
     }
 }
 
+SIZED void pull_beam_rows(int size, const System *system, const BlockMap *map, int r,
+                          const double *x, double *out) {
+    for (int row = 0; row < r; row++) {
+        pull_beam(size, map, x + row * system->wide, out + row * system->even);
+    }
+}
+
 PRBM void pull_directions(const System *system, int r, const double *x, double *out) {
-    const int wide = system->wide, even = system->even;
     for (int k = 0; k < system->block_count; k++) {
         const BlockMap *map = &system->maps[k];
-        for (int row = 0; row < r; row++) {
-            switch (map->beam ? map->size : 0) {
-            case 5: pull_beam(5, map, x + row * wide, out + row * even); break;
-            case 6: pull_beam(6, map, x + row * wide, out + row * even); break;
-            case 7: pull_beam(7, map, x + row * wide, out + row * even); break;
-            default: pull_block(map, x + row * wide, out + row * even);
+        switch (map->beam ? map->size : 0) {
+        case 5: pull_beam_rows(5, system, map, r, x, out); break;
+        case 6: pull_beam_rows(6, system, map, r, x, out); break;
+        case 7: pull_beam_rows(7, system, map, r, x, out); break;
+        default:
+            for (int row = 0; row < r; row++) {
+                pull_block(map, x + row * system->wide, out + row * system->even);
             }
         }
     }
@@ -346,12 +374,17 @@ SIZED void pull_beam_mass(int size, const BlockMap *map, const double *ALONE M,
             }
         }
     }
+    const int paired = map->together ? BEAM_PAIRED : 0;
     UNROLLED
     for (int k = 0; k < BEAM_ENTRIES; k += LANES) {
-        set_lanes(entries + k, sum[k / LANES]);
+        if (k < paired) {
+            double *place = mass + map->place[k];
+            set_lanes(place, lanes_at(place) + sum[k / LANES]);
+        } else {
+            set_lanes(entries + k, sum[k / LANES]);
+        }
     }
-    UNROLLED
-    for (int k = 0; k < BEAM_ENTRIES; k++) {
+    for (int k = paired; k < BEAM_ENTRIES; k++) {
         mass[map->place[k]] += entries[k];
     }
 }

@@ -67,8 +67,12 @@ PRBM void add_rod(System *system, double mass, const Place *start, int j, Comple
 
 PRBM void add_spring(System *system, double rate, int a, int b) {
     int n = system->n;
-    Spring spring = {rate, a == FIXED ? n : a, b == FIXED ? n : b};
-    system->spring[system->spring_count++] = spring;
+    if (a != FIXED && b != FIXED) {
+        Spring spring = {rate, a, b};
+        system->spring[system->spring_count++] = spring;
+    } else if (a != FIXED || b != FIXED) {
+        system->grounded[a != FIXED ? a : b] += rate;
+    }
     if (a != FIXED) {
         system->K[a * n + a] += rate;
     }

@@ -175,14 +175,18 @@ static double coriolis(const System *system, const double *turn, int stretch_dir
  * compute the power beta v^T K v of the damping. */
 SIZED void add_springs(int even, const Equations *q, Evaluation *result) {
     const System *system = q->system;
-    const int n = system->n;
     const double *angle = result->at.angle, *straight = system->straight, *v = result->at.speed;
-    double *turns = result->turns, *x = result->a, sum = 0.0; /* Index n is the ground. */
+    double *turns = result->turns, *x = result->a;
+    Lanes loss[SUMS] = {NO_LANES};
     UNROLLED_BY_LANES
     for (int j = 0; j < even; j += LANES) {
-        Lanes turn = lanes_at(angle + j) - lanes_at(straight + j);
-        set_lanes(turns + j, turn + q->beta * lanes_at(v + j));
+        Lanes speed = lanes_at(v + j), rate = lanes_at(system->grounded + j);
+        Lanes turn = lanes_at(angle + j) - lanes_at(straight + j) + q->beta * speed;
+        set_lanes(turns + j, turn);
+        set_lanes(x + j, lanes_at(x + j) - rate * turn);
+        loss[SUM_OF(j)] += rate * (speed * speed);
     }
+    double sum = total(loss);
     for (int k = 0; k < system->spring_count; k++) {
         const Spring *spring = &system->spring[k];
         int a = spring->a, b = spring->b;
@@ -191,7 +195,6 @@ SIZED void add_springs(int even, const Equations *q, Evaluation *result) {
         x[b] -= torque;
         sum += spring->rate * (swing * swing);
     }
-    x[n] = 0.0;
     result->spring_loss = q->beta * sum;
 }
 

@@ -35,14 +35,36 @@ static double round_range(const Panel *panel, double *first, double *last) {
     return scale;
 }
 
-PRBM bool waist_at(const Panel *panel, double *x) {
+static double waist_of(const Panel *panel) {
     double first, last;
+    round_range(panel, &first, &last);
+    return -(first + last) / (last - first);
+}
+
+PRBM bool waist_at(const Panel *panel, double *x) {
     if (!panel->round) {
         return false;
     }
-    round_range(panel, &first, &last);
-    *x = -(first + last) / (last - first);
+    *x = waist_of(panel);
     return *x != 0.0 || panel->nodes % 2 == 0;
+}
+
+PRBM void concentration(double thickness, double radius, double *pulled, double *bent) {
+    double x = 0.5 * thickness / radius, root = sqrt(x), angle = phase(complex_of(1.0, root));
+    *pulled = 2.0 * (x + 1.0) * root / ((x + 1.0) * angle + root);
+    if (x < CONCENTRATION_SERIES_MAX) {
+        *bent = 1.0 + 2.0 * x / 5;
+    } else {
+        *bent = 4.0 * x * root / (3.0 * (root + (x - 1.0) * angle));
+    }
+}
+
+PRBM void factors_at(const Panel *panel, double x, double *pulled, double *bent) {
+    *pulled = *bent = 1.0;
+    if (panel->round && fabs(x - waist_of(panel)) < WAIST_ATOL) {
+        concentration(panel->thickness[0], panel->axes[0] * panel->axes[0] / panel->axes[1], pulled,
+                      bent);
+    }
 }
 
 static Section round_section(const Panel *panel, double x) {
@@ -116,13 +138,13 @@ PRBM bool notch_panels(const char *name, const Notch *notch, double L, int nodes
                     name, H, h);
     }
     double length = notch_length(notch), angle = notch_angle(notch);
-    if (!(length <= L)) {
+    if (!(length <= L * (1.0 + NOTCH_LENGTH_RTOL))) {
         return fail(problem,
                     "flexure %s: its notch of the length %g m is longer than the flexure, %g m: "
                     "reduce notch_radius or waist_length, or move the ends apart",
                     name, length, L);
     }
-    double rest = 0.5 * (L - length), waist = notch->waist_length;
+    double rest = greater(0.5 * (L - length), 0.0), waist = notch->waist_length;
     Panel *next = panels;
     *next++ = straight_panel(THICK_NODES, 0.0, rest, H, width);
     if (notch->waisted) {

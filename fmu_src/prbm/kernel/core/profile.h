@@ -39,6 +39,11 @@ typedef struct {
 PRBM Section section_at(const Panel *panel, double x);
 /* Set the point x of the waist of a round panel; false if there is none, or if it is a node. */
 PRBM bool waist_at(const Panel *panel, double *x);
+/* Compute the factors of the stress at a waist, under a normal force and under a moment [-], from
+ * its thickness and the radius of curvature [m]. */
+PRBM void concentration(double thickness, double radius, double *pulled, double *bent);
+/* Compute these factors at a point x of a panel: 1 except at a waist. */
+PRBM void factors_at(const Panel *panel, double x, double *pulled, double *bent);
 PRBM Panel straight_panel(int nodes, double start, double length, double thickness, double width);
 /* Return the largest angle from the waist, at the edges of a notch [rad]. */
 PRBM double notch_angle(const Notch *notch);

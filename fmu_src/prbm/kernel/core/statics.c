@@ -241,6 +241,14 @@ static bool unreachable(const System *system, bool held, double displacement, do
                 heavy ? ", or reduce gravity across the motion" : "");
 }
 
+/* Return whether a shape is held at an amount, and not half a turn or more away.  The sine that
+ * holds a rotation vanishes there, too. */
+static bool holds(const System *system, bool held, double amount, const double *state) {
+    int j = system->released.j;
+    return !held || !turns(system) ||
+           fabs(state[j] - system->q0[j] - amount) < STATICS_TURN_MAX;
+}
+
 /* Increase the load and the displacement together from the straight, unloaded shape, so that the
  * result is the equilibrium that slow loading reaches.  state is (q, lam, force). */
 static bool load_slowly(const System *system, bool held, double displacement, double *state,
@@ -253,7 +261,8 @@ static bool load_slowly(const System *system, bool held, double displacement, do
         copy(size, state, trial);
         /* If a link jumps, slow loading does not reach this equilibrium: reduce the step. */
         if (loaded(system, held, displacement, target, trial, scratch) &&
-            jump(system, state, trial) <= STATICS_TURN_MAX) {
+            jump(system, state, trial) <= STATICS_TURN_MAX &&
+            holds(system, held, target * displacement, trial)) {
             copy(size, trial, state);
             done = target;
             fraction = lesser(1.0, 2 * fraction);

@@ -78,6 +78,7 @@ PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memor
     result.stretch_count = m->stretch_count;
     result.stretches = m->stretches;
     result.spring = place(memory, (size_t)m->spring_count, sizeof(Spring));
+    result.grounded = place(memory, (size_t)result.even, sizeof(double));
     result.factors = place(memory, (size_t)m->map.count, sizeof(double));
     result.blocks = place(memory, d, sizeof(Block));
     place_maps(&result, memory);

@@ -24,7 +24,7 @@ typedef struct {
     bool moves;
 } Place;
 
-/* A spring between two coordinates; n is the ground. */
+/* A spring between two coordinates. */
 typedef struct {
     double rate; /* N m/rad, N m */
     int a, b;
@@ -62,6 +62,7 @@ typedef struct {
 enum {
     BEAM_COORDINATES = 4,
     BEAM_ENTRIES = 10, /* of a symmetric matrix of the coordinates */
+    BEAM_PAIRED = 8,   /* the first of them, which are pairs in the rows of the matrix */
     BEAM_DIRECTIONS_MIN = 5,
     BEAM_DIRECTIONS_MAX = 7,
     BEAM_CHANGES = BEAM_DIRECTIONS_MAX * BEAM_COORDINATES
@@ -77,6 +78,7 @@ typedef struct {
     int mass_first, mass_size; /* The mass of the coordinates i and j <= i is at the index
                                 * mass_first + i mass_size + j of the mass blocks. */
     bool beam;             /* Whether the members below are used. */
+    bool together;         /* Whether the coordinates are consecutive. */
     int place[BEAM_ENTRIES];       /* The indices of the masses of the coordinates. */
     double constant[BEAM_ENTRIES]; /* The part of these masses that is constant. */
     double rows[BEAM_CHANGES];     /* (size, BEAM_COORDINATES) change, row by row. */
@@ -121,7 +123,9 @@ typedef struct {
     int corner_count;
     Complex *corners, *corners_c; /* (corners, d), (corners,): flexures, for drawings */
     int spring_count;
-    Spring *spring;           /* the springs whose rates make up K */
+    Spring *spring;           /* the springs between two coordinates */
+    double *grounded;         /* (even,) rates of the springs between a coordinate and the ground;
+                               * K is the sum of both */
     int block_count;
     Block *blocks;            /* of the mass matrix of the directions */
     BlockMap *maps;           /* of the blocks, if mapped */

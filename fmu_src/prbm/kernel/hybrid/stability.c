@@ -6,17 +6,14 @@
 
 /* Set the torques (n,) of the springs, K w, for changes w of the coordinates. */
 static void spring_torques(const System *system, const double *w, double *torques) {
-    int n = system->n;
-    zeros(n, torques);
+    for (int j = 0; j < system->n; j++) {
+        torques[j] = system->grounded[j] * w[j];
+    }
     for (int k = 0; k < system->spring_count; k++) {
-        int a = system->spring[k].a, b = system->spring[k].b; /* index n is the ground */
-        double torque = system->spring[k].rate * ((a < n ? w[a] : 0.0) - (b < n ? w[b] : 0.0));
-        if (a < n) {
-            torques[a] += torque;
-        }
-        if (b < n) {
-            torques[b] -= torque;
-        }
+        int a = system->spring[k].a, b = system->spring[k].b;
+        double torque = system->spring[k].rate * (w[a] - w[b]);
+        torques[a] += torque;
+        torques[b] -= torque;
     }
 }
 

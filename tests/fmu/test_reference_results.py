@@ -1,0 +1,188 @@
+"""Reference results of FMUs: the manifest, the experiments, and their comparison with the FMU."""
+
+import csv
+import io
+import zipfile
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy import read_model_description, simulate_fmu
+from lxml import etree
+
+from prbm.base.errors import SimulationError
+from prbm.files.settings import units_of
+from prbm.fmu import reference_results as reference
+from prbm.fmu.parameter_sets import read_parameter_set
+from prbm.fmu.related import FOLDER, NAMESPACE
+from prbm.fmu.start import interface
+from prbm.hybrid.simulation import Simulation
+from prbm.runs.experiment import Experiment
+from support import COSTLY_MODELS, GUIDES, each_shipped, mechanism
+
+SCHEMAS = Path(fmpy.__file__).parent / "schema"
+EQUAL_RTOL = 1e-5  # Of the largest magnitude in a column, as README.txt states.
+EXCHANGE_RTOL = 1e-3
+
+pytestmark = [pytest.mark.fmu, pytest.mark.native]
+
+
+def member(fmu: Path, name: str) -> bytes:
+    with zipfile.ZipFile(fmu) as archive:
+        return archive.read(f"{FOLDER}/{name}")
+
+
+def rows_of(content: bytes) -> np.ndarray:
+    """Return a table as an array of records."""
+    lines = list(csv.reader(io.StringIO(content.decode())))
+    return np.array([tuple(map(float, x)) for x in lines[1:]], [(n, float) for n in lines[0]])
+
+
+def start_values(fmu: Path, model: str, experiment: str, folder: Path) -> dict[str, float]:
+    if experiment != "validation":
+        return {}
+    path = folder / "x.ssv"
+    path.write_bytes(member(fmu, f"{model}_validation.ssv"))
+    return read_parameter_set(path, units_of(mechanism(model)))
+
+
+def compared(fmu: Path, expected: np.ndarray, found: np.ndarray, rtol: float = EQUAL_RTOL) -> int:
+    """Compare rows as README.txt describes; return the number of compared rows."""
+    listed = {v.name: v for v in read_model_description(str(fmu)).modelVariables}
+    time = expected["time"]
+    impacts = time[1:][np.diff(time) == 0.0]
+    near_impact, same = reference.NEAR_IMPACT * time[1], reference.SAME_TIME * time[1]
+    pairs = []
+    for k, t in enumerate(time):
+        near = np.flatnonzero(np.abs(found["time"] - t) < same)
+        if t in impacts:
+            if len(near) > 1:
+                pairs.append((k, near[0] if k + 1 < len(time) and time[k + 1] == t else near[-1]))
+        elif not len(impacts) or np.abs(impacts - t).min() > near_impact:
+            pairs.append((k, near[-1]))
+    at, other = np.array(pairs).T
+    for name in expected.dtype.names[1:]:
+        scale = max(np.abs(expected[name]).max(), float(listed[name].nominal or 0.0))
+        difference = np.abs(expected[name][at] - found[name][other]).max()
+        assert difference <= rtol * scale, (name, difference, scale)
+        if name.endswith(("_count", ".contact")):
+            assert difference == 0.0
+    return len(pairs)
+
+
+def file_of(model: str, experiment: str) -> str:
+    return f"{model}_out.csv" if experiment == "default" else f"{model}_{experiment}_out.csv"
+
+
+EXPERIMENTS = pytest.mark.parametrize("experiment", ["default", "smoke", "validation"])
+
+
+@EXPERIMENTS
+@each_shipped
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_the_fmu_reproduces_each_experiment(native, model, fmi, experiment, tmp_path):
+    """Event mode, where it exists, has both rows of each impact."""
+    if model in COSTLY_MODELS:
+        pytest.skip("built without reference results, because they take the engine minutes")
+    fmu = native[model, fmi]
+    expected = rows_of(member(fmu, file_of(model, experiment)))
+    events = fmi == 3 and experiment == "validation"
+    found = simulate_fmu(
+        str(fmu), stop_time=expected["time"][-1], output_interval=expected["time"][1],
+        start_values=start_values(fmu, model, experiment, tmp_path),
+        output=expected.dtype.names[1:], use_event_mode=events, early_return_allowed=events,
+    )  # fmt: skip
+    number = compared(fmu, expected, found)
+    doubled = int((np.diff(expected["time"]) == 0.0).sum())
+    if model in GUIDES and experiment == "validation":
+        assert doubled >= 3
+    assert number == len(expected) - (0 if events else 2 * doubled)
+
+
+def test_model_exchange_reproduces_the_smoke_test(native):
+    fmu = native["PRBDM", 3]
+    expected = rows_of(member(fmu, file_of("PRBDM", "smoke")))
+    names = expected.dtype.names[1:]
+    found = simulate_fmu(
+        str(fmu), fmi_type="ModelExchange", relative_tolerance=1e-8, output=names,
+        stop_time=expected["time"][-1], output_interval=expected["time"][1],
+    )  # fmt: skip
+    assert compared(fmu, expected, found, EXCHANGE_RTOL) == len(expected)
+
+
+def test_the_python_fmu_reproduces_the_default_experiment_of_the_native_one(fmus, native):
+    expected = rows_of(member(native["PRBDM", 2], "PRBDM_out.csv"))
+    found = simulate_fmu(
+        str(fmus["PRBDM"]), output=expected.dtype.names[1:], output_interval=1e-3, stop_time=1.0
+    )
+    assert compared(fmus["PRBDM"], expected, found) == 1001
+
+
+def test_both_rows_of_an_impact_obey_the_law_of_the_impact():
+    """The gap rate is reversed with the restitution, and the energy falls by ``energy_lost``."""
+    outputs = ("stop.gap", "stop.gap_rate", "energy.dissipated", "stop.energy_lost", "shuttle.x")
+    motion = Simulation(mechanism("PRBDM"))
+    rows = np.array([*reference.rows_with_impacts(motion, np.arange(201) * 1e-3, outputs)])
+    first = np.flatnonzero(np.diff(rows[:, 0]) == 0.0)
+    assert len(first) == 4
+    before, after = rows[first], rows[first + 1]
+    np.testing.assert_allclose(after[:, 2], -0.6 * before[:, 2], rtol=1e-9)
+    np.testing.assert_allclose(after[:, 3] - before[:, 3], after[:, 4], rtol=1e-7)
+    np.testing.assert_allclose(after[:, 5], before[:, 5], atol=1e-13)
+    np.testing.assert_allclose(before[:, 1], 0.0, atol=1e-12)
+    others = np.delete(rows, np.concatenate([first, first + 1]), axis=0)
+    np.testing.assert_allclose(others[:, 0], np.arange(201) * 1e-3, rtol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["python", 2, 3])
+def test_the_manifest_lists_the_files_of_the_layered_standard(native, fmus, kind):
+    fmu = fmus["PRBDM"] if kind == "python" else native["PRBDM", kind]
+    with zipfile.ZipFile(fmu) as archive:
+        inside = {n.removeprefix(f"{FOLDER}/") for n in archive.namelist() if FOLDER in n}
+    root = etree.fromstring(member(fmu, "fmi-ls-manifest.xml"))
+    assert root.tag == "fmiReferences"
+    listed = {related.get("source"): related.get("role") for related in root}
+    assert listed.keys() == inside - {"fmi-ls-manifest.xml"}
+    results = {
+        "README.txt": "document", "PRBDM_out.csv": "result", "PRBDM_smoke_out.csv": "result",
+        "PRBDM_validation.ssv": "parameter", "PRBDM_validation_out.csv": "result",
+    }  # fmt: skip
+    assert listed == {"PRBDM.ssv": "parameter"} | ({} if kind == "python" else results)
+    for related in root:
+        root.remove(related)
+    root.tag, root.text = f"{{{NAMESPACE}}}fmiLayeredStandardManifest", None
+    checker = etree.XMLSchema(file=str(SCHEMAS / "fmi3" / "fmi3LayeredStandardManifest.xsd"))
+    assert checker.validate(root), checker.error_log
+
+
+def test_the_set_of_the_validation_contains_all_changed_inputs(tmp_path):
+    """Changed inputs are start values of the validation, too."""
+    small, changes = mechanism("PRBDM"), {"force.x": 0.02, "stop.restitution": 0.5}
+    found = reference.reference(small, changes, interface(small, changes), Experiment(0.1))
+    path = tmp_path / "x.ssv"
+    path.write_bytes(next(x.content for x in found if x.file == "PRBDM_validation.ssv"))
+    values = read_parameter_set(path, units_of(small))
+    assert values["force.x"] == 0.02
+    assert values["stop.restitution"] == 0.45
+    assert values["base.acceleration.x"] > 0.0
+
+
+def test_a_validation_that_fails_is_left_out(monkeypatch):
+    def fails(*_: object) -> None:
+        raise SimulationError("too many impacts")
+
+    monkeypatch.setattr(reference, "rows_with_impacts", fails)
+    small = mechanism("PRBDM")
+    found = reference.reference(small, {"stop.offset": 2e-3}, interface(small, {}), Experiment(0.1))
+    assert [one.file for one in found] == ["README.txt", "PRBDM_out.csv", "PRBDM_smoke_out.csv"]
+    assert b"validation" not in found[0].content
+
+
+def test_the_text_states_the_experiments_of_the_default_experiment(native):
+    text = member(native["PRBDM", 3], "README.txt").decode()
+    assert max(map(len, text.splitlines())) <= 100
+    assert "PRBDM_smoke_out.csv: start values of the FMU, 0 to 0.01 s" in text
+    assert "start values in PRBDM_validation.ssv, 0 to 0.2 s" in text
+    experiment = read_model_description(str(native["PRBDM", 3])).defaultExperiment
+    assert f"Rows are {float(experiment.stepSize):g} s apart" in text
