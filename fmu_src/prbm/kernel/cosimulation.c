@@ -95,31 +95,17 @@ static bool check_time(const Simulation *sim, double time, Problem *problem) {
     return true;
 }
 
-/* Whether the force of a compliant stop may move its wall. */
-static bool gives_way(const Simulation *sim, int i) {
-    return sim->configuration.mechanism->stops[i].compliant &&
-           sim->equations.inputs.mobilities[i] > 0.0;
-}
-
 /* Whether the motion goes on: nothing has been set, and all walls rest on their references. */
 static bool goes_on(const Simulation *sim) {
-    bool rest = true;
-    for (int i = 0; i < system_of(sim)->s; i++) {
-        rest = rest && sim->state.walls[i].rate == 0.0 && sim->state.walls[i].span == 0.0 &&
-               !gives_way(sim, i);
-    }
-    return rest && sim->untouched;
+    return sim->untouched && !sim->equations.walls_move && !sim->equations.walls_give;
 }
 
 /* Compute the walls with the displacements by forces of compliant stops in their motion. */
 static bool fold_present(Simulation *sim, Wall *walls, Problem *problem) {
     size_t mark = sim->scratch.used;
-    bool ok = true, any = false;
+    bool ok = true;
     memcpy(walls, sim->state.walls, (size_t)system_of(sim)->s * sizeof(Wall));
-    for (int i = 0; i < system_of(sim)->s; i++) {
-        any = any || gives_way(sim, i);
-    }
-    if (any) {
+    if (sim->equations.walls_give) {
         double *y = take(&sim->scratch, (size_t)state_size(sim));
         ok = arc_state(sim, y, sim->present.e, &sim->present.reference, &sim->at_front, problem);
         for (int i = 0; ok && i < system_of(sim)->s; i++) {

@@ -113,10 +113,12 @@ PRBM bool rate(const Equations *equations, double t, const double *y, const Refe
 
 /* --- stops ------------------------------------------------------------------------------------ */
 
-/* The displacement of a wall by the force of its compliant stop, or its rate. */
-static double give_of(const Equations *q, int i, const double *extra, Extra which) {
+PRBM double give_of(const Equations *q, int i, const double *extra, Extra which) {
+    if (extra == NULL) {
+        return 0.0;
+    }
     const Stop *stop = &q->system->mechanism->stops[i];
-    return stop->compliant && extra != NULL ? extra[stop->extra + (int)which] : 0.0;
+    return stop->compliant ? extra[stop->extra + (int)which] : 0.0;
 }
 
 PRBM double gap(const Equations *equations, int i, double t, const Complex *e,

@@ -12,8 +12,10 @@ PRBM bool rate(const Equations *equations, double t, const double *y, const Refe
  * if the walls of held stops move. */
 PRBM bool rate_at_time(const Equations *equations, const double *y, const Reference *near,
                        Evaluation *result, double *dy, Problem *problem);
-/* The gap of a stop, its rate and its acceleration.  extra: the states of compliant stops, or NULL
- * for zeros. */
+/* The displacement of a wall by the force of its compliant stop, or its rate.  extra: the states of
+ * compliant stops, or NULL for zeros. */
+PRBM double give_of(const Equations *q, int i, const double *extra, Extra which);
+/* The gap of a stop, its rate and its acceleration; extra as above. */
 PRBM double gap(const Equations *equations, int i, double t, const Complex *e,
                 const double *extra);
 PRBM double gap_rate(const Equations *equations, int i, double t, const Complex *e,

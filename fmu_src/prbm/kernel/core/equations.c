@@ -197,8 +197,12 @@ static void set_loads(Equations *q) {
         const Wall *wall = &q->inputs.walls[i];
         q->walls_move = q->walls_move || wall->rate != 0.0 || wall->span > 0.0;
     }
-    q->driven = q->driven || q->walls_move;
-    q->driven = q->driven || m->compliant_count > 0;
+    q->walls_give = false;
+    for (int i = 0; m->compliant_count > 0 && i < system->s; i++) {
+        bool gives = m->stops[i].compliant && q->inputs.mobilities[i] > 0.0;
+        q->walls_give = q->walls_give || gives;
+    }
+    q->driven = q->driven || q->walls_move || m->compliant_count > 0;
     q->contacts_or_walls = q->walls_move || q->slipping_count > 0 || q->pressed_count > 0;
 }
 

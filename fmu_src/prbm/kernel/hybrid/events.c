@@ -72,18 +72,29 @@ static bool find_events(Simulation *sim, EventKind kind, Event *first, Problem *
     return true;
 }
 
+/* The first kind of events that the present contacts allow: an open stop has impacts only. */
+static EventKind first_kind(const Equations *q) {
+    bool closed = q->held_count > 0 || q->sticking_count > 0 || q->slipping_count > 0;
+    return closed ? EVENT_NONE + 1 : q->pressed_count > 0 ? EVENT_SWITCH : EVENT_IMPACT;
+}
+
 PRBM bool first_event(Simulation *sim, Event *first, Problem *problem) {
     const Event none = {EVENT_NONE, 0, 0.0};
-    bool near[EVENT_KINDS], samples = false, ok = true;
+    bool near[EVENT_KINDS], any = false, samples = false, ok = true;
+    EventKind begin = first_kind(&sim->equations);
     *first = none;
-    for (EventKind kind = EVENT_NONE + 1; kind < EVENT_KINDS; kind++) {
+    for (EventKind kind = begin; kind < EVENT_KINDS; kind++) {
         near[kind] = transition(kind)->near(sim);
+        any = any || near[kind];
         samples = samples || (near[kind] && transition(kind)->samples);
+    }
+    if (!any) {
+        return true;
     }
     if (samples) {
         sample_arc(sim);
     }
-    for (EventKind kind = EVENT_NONE + 1; ok && kind < EVENT_KINDS; kind++) {
+    for (EventKind kind = begin; ok && kind < EVENT_KINDS; kind++) {
         ok = !near[kind] || find_events(sim, kind, first, problem);
     }
     return ok;

@@ -23,13 +23,9 @@ PRBM double indentation_guard(const Equations *equations, const Instant *at, int
     return -gap_guard(equations, at, contact);
 }
 
-static double indentation_rate_guard(const Equations *equations, const Instant *at, int contact) {
-    return -gap_rate_guard(equations, at, contact);
-}
-
-/* The rate of the gap, or of the indentation, that a guard of a closing gap belongs to. */
-static GuardValue *rate_of(const Guard *guard) {
-    return guard->value == indentation_guard ? indentation_rate_guard : gap_rate_guard;
+/* The sign of the gap in a guard that is the gap or the indentation. */
+static double sign_of_gap(const Guard *guard) {
+    return guard->value == indentation_guard ? -1.0 : 1.0;
 }
 
 /* The margin of the phase of a contact.  It begins to rise when its rate exceeds the reference
@@ -156,12 +152,10 @@ static double gap_reach(const Simulation *sim, int stop, const Complex *e, const
     const System *system = system_of(sim);
     const Complex *row = system->gaps + stop * system->d;
     const Wall *wall = &sim->state.walls[stop];
-    const Stop *own = &system->mechanism->stops[stop];
     const double *extra = extra_states(sim, sim->state.arc.y);
-    double given = own->compliant ? extra[own->extra + EXTRA_GIVE_RATE] * sim->state.arc.h : 0.0;
-    double reach = fabs(given);
-    reach += fabs(wall->rate) * sim->state.arc.h + 2.0 * fabs(wall->offset) +
-                   fabs(wall->excess) * wall->span;
+    double given = give_of(&sim->equations, stop, extra, EXTRA_GIVE_RATE);
+    double reach = (fabs(wall->rate) + fabs(given)) * sim->state.arc.h +
+                   2.0 * fabs(wall->offset) + fabs(wall->excess) * wall->span;
     for (int j = 0; j < system->d; j++) {
         reach += (fabs(row[j].re) + fabs(row[j].im)) * arms[j];
     }
@@ -181,14 +175,11 @@ PRBM bool impact_near(Simulation *sim) {
         return false;
     }
     bound_arms(sim, arms);
+    double near = TOUCHING_RTOL * system->length, start = sim->state.arc.start;
+    const double *extra = extra_states(sim, sim->state.arc.y);
     for (int s = 0; s < system->s; s++) {
-        double near = TOUCHING_RTOL * system->length;
-        if (!open_stop(&sim->equations, s)) {
-            continue;
-        }
-        double start = sim->state.arc.start;
-        double distance = gap(&sim->equations, s, start, e, extra_states(sim, sim->state.arc.y));
-        if (!(distance > near + gap_reach(sim, s, e, arms))) {
+        if (sim->state.modes[s] == CONTACT_OPEN &&
+            !(gap(&sim->equations, s, start, e, extra) > near + gap_reach(sim, s, e, arms))) {
             return true;
         }
     }
@@ -336,7 +327,7 @@ static bool polish_impact(const Search *search, double apex, double *time) {
     int n = system_of(sim)->n, stop = search->contact;
     Located *located = &sim->stepping.located;
     double t = *time, *y = located->y;
-    double sign = search->guard->value == indentation_guard ? -1.0 : 1.0;
+    double sign = sign_of_gap(search->guard);
     Complex *e = located->e;
     if (t <= sim->state.arc.start) {
         return true;
@@ -421,7 +412,8 @@ static bool detect_closing(Search *search, const double *gaps, const double *rat
                            Closing *closing) {
     Simulation *sim = search->sim;
     double length = system_of(sim)->length, depth = closing_depth(&sim->configuration);
-    ArcGuard guard = arc_guard(search), rate = {search, rate_of(search->guard), false, 1.0, 0.0};
+    double sign = sign_of_gap(search->guard);
+    ArcGuard guard = arc_guard(search), rate = {search, gap_rate_guard, false, sign, 0.0};
     bool dips = rates[0] < 0.0 && 0.0 < rates[1];
     closing->a = sample_time(sim, k);
     closing->b = sample_time(sim, k + 1);
@@ -450,7 +442,7 @@ static bool detect_closing(Search *search, const double *gaps, const double *rat
         return closing->at_a || gaps[1] < lesser(gaps[0], -depth);
     }
     if (dips) {
-        rate.sign = -1.0;
+        rate.sign = -sign;
         closing->b = locate(&rate, closing->a, closing->b);
         return guard_at(&guard, closing->b) <= 0.0;
     }
@@ -476,11 +468,11 @@ static bool locate_closing(Search *search, const Closing *closing, double *time)
 PRBM bool closing_time(Simulation *sim, const Guard *guard, int stop, Fall *fall,
                        Problem *problem) {
     Search search = {sim, guard, stop, false, problem};
-    double gaps[GUARD_INTERVALS + 1], rates[GUARD_INTERVALS + 1];
+    double gaps[GUARD_INTERVALS + 1], rates[GUARD_INTERVALS + 1], sign = sign_of_gap(guard);
     for (int k = 0; k <= GUARD_INTERVALS; k++) {
         Instant at = sample(sim, k);
-        gaps[k] = guard->value(&sim->equations, &at, stop);
-        rates[k] = rate_of(guard)(&sim->equations, &at, stop);
+        gaps[k] = sign * gap_guard(&sim->equations, &at, stop);
+        rates[k] = sign * gap_rate_guard(&sim->equations, &at, stop);
     }
     for (int k = 0; !fall->found && k < GUARD_INTERVALS; k++) {
         Closing closing;

@@ -25,7 +25,8 @@ PRBM int state_size(const Simulation *sim) {
 }
 
 PRBM const double *extra_states(const Simulation *sim, const double *y) {
-    return y + 2 * system_of(sim)->n + 2;
+    const Mechanism *m = sim->configuration.mechanism;
+    return m->compliant_count > 0 ? y + 2 * m->coordinate_count + 2 : NULL;
 }
 
 PRBM int contact_count(const Simulation *sim) {

@@ -22,6 +22,7 @@ typedef struct {
     double omega; /* of the fundamental mode; 0 without one */
     Scales scales;
     double *least, *share; /* (ny,): errors are relative to max(least, share |y|) */
+    double controlled;     /* number of the states whose error is controlled */
     bool assembled; /* whether the system has been assembled from the acting values */
 } Configuration;
 

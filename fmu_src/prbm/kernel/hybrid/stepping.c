@@ -28,7 +28,7 @@ static double error_norm(const Simulation *sim, const double *x, const double *y
         Lanes ratio = lanes_at(x + j) / larger(lanes_at(least + j), lanes_at(share + j) * size);
         sum[SUM_OF(j)] += ratio * ratio;
     }
-    return sqrt(total(sum) / (2 * system_of(sim)->n + 2));
+    return sqrt(total(sum) / sim->configuration.controlled);
 }
 
 /* --- step sizes ------------------------------------------------------------------------------- */
