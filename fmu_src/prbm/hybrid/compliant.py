@@ -22,6 +22,7 @@ from ..base.tolerances import (
     SETTLED_DAMPING_RTOL,
     SETTLED_FORCE_RTOL,
     SETTLING_FACTOR,
+    TOUCH_STEP_CURVED_FACTOR,
     TOUCH_STEP_FACTOR,
 )
 from ..mechanics.arrays import Real
@@ -422,7 +423,8 @@ def shortened(
     law = front.equations.compliant.laws[stop]
     speed, power = touching.reference_speed, law.exponent + 1.0
     work = 0.5 * power * speed**2 / (law.stiffness * point_mobility(front, stop))
-    h = rounded_step(TOUCH_STEP_FACTOR * math.pow(work, 1.0 / power) / speed)
+    factor = TOUCH_STEP_FACTOR if law.exponent == 1.0 else TOUCH_STEP_CURVED_FACTOR
+    h = rounded_step(factor * math.pow(work, 1.0 / power) / speed)
     front = front.with_touch(stop, replace(touch, step=controller.h))
     return replace(controller, h=min(h, controller.h)), front
 

@@ -325,6 +325,8 @@ class Simulation:
         self.step_count += 1
         front, counted = compliant.settled(self.configuration, walls.arrived(self.front), self.arc)
         if front.equations is not self.front.equations:
+            for i in set(self.front.contacts.pressed) & set(front.contacts.held):
+                self.controller = compliant.lengthened(self.controller, front.touches[i])
             self._set_front(front, counted)
         self.front = front
         configuration, equations = self.configuration, front.equations

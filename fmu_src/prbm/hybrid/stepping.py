@@ -16,6 +16,7 @@ import numpy as np
 
 from ..base.errors import SimulationError
 from ..base.tolerances import (
+    CONTACT_ERROR_FACTOR,
     FIRST_RATE_MIN,
     FIRST_STEP_EXPONENT,
     FIRST_STEP_FACTOR,
@@ -253,7 +254,8 @@ def compute_step(
         core = 2 * equations.n + 2
         error = step_error(configuration.scales, h, k[:, :core], y[:core], y1[:core])
         if equations.pressed:
-            error = max(error, contact_error(configuration.scales, equations, h, k, y, y1))
+            contacts = contact_error(configuration.scales, equations, h, k, y, y1)
+            error = max(error, contacts / CONTACT_ERROR_FACTOR)
     error /= STEP_ERROR_FACTOR * configuration.tolerance
     forces = np.array([evaluation.lam for evaluation in evaluations])
     return Step(h, k, y1, error, forces, evaluations[-1])

@@ -251,12 +251,16 @@ static bool end_impact(Simulation *sim, int stop, Problem *problem) {
     return true;
 }
 
+/* Return to the step size before a contact that ends: it does not shorten the steps after it. */
+static void resume_step(Simulation *sim, int stop) {
+    sim->state.step_size = greater(sim->state.step_size, sim->state.touches[stop].step);
+}
+
 PRBM bool separate(Simulation *sim, int stop, Problem *problem) {
     if (!end_impact(sim, stop, problem)) {
         return false;
     }
-    /* The contact does not shorten the steps after it. */
-    sim->state.step_size = greater(sim->state.step_size, sim->state.touches[stop].step);
+    resume_step(sim, stop);
     set_phase(sim, stop, PHASE_NONE, 0.0, 0.0);
     return settle(sim, NULL, 0, NULL, problem);
 }
@@ -288,7 +292,8 @@ static bool shorten_step(Simulation *sim, int stop, Problem *problem) {
         return false;
     }
     double work = 0.5 * rise * (speed * speed) / (law->stiffness * inverse_mass);
-    double h = rounded_step(TOUCH_STEP_FACTOR * power(work, 1.0 / rise) / speed);
+    double factor = law->exponent == 1.0 ? TOUCH_STEP_FACTOR : TOUCH_STEP_CURVED_FACTOR;
+    double h = rounded_step(factor * power(work, 1.0 / rise) / speed);
     sim->state.touches[stop].step = sim->state.step_size;
     sim->state.step_size = lesser(h, sim->state.step_size);
     return true;
@@ -464,6 +469,9 @@ PRBM bool settle_calm(Simulation *sim, Problem *problem) {
         if (held && !(stop_motion(sim, i, problem) && end_impact(sim, i, problem) &&
                       settle(sim, NULL, 0, NULL, problem))) {
             return false;
+        }
+        if (held) {
+            resume_step(sim, i);
         }
     }
     return true;

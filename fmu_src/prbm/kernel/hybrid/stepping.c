@@ -106,7 +106,7 @@ static double step_error(Simulation *sim, double h, Problem *problem) {
     double size = sqrt(fine * fine + coarse * coarse);
     double error = size > 0.0 ? fine * fine / size : size;
     if (sim->equations.pressed_count > 0) {
-        error = greater(error, contact_error(sim, h));
+        error = greater(error, contact_error(sim, h) / CONTACT_ERROR_FACTOR);
     }
     return error / (STEP_ERROR_FACTOR * sim->state.tolerance);
 }
