@@ -134,6 +134,24 @@ def test_stiff_stops_converge_to_the_rigid_law_in_order():
     assert second / third == pytest.approx(10, rel=0.1)
 
 
+@pytest.mark.parametrize(
+    ("exponent", "stiffness", "step", "order"), [(1.0, 1e6, 2e-5, 7.0), (1.5, 1e8, 1e-5, 2.5)]
+)
+def test_fixed_steps_through_a_contact_have_their_order(exponent, stiffness, step, order):
+    """First touch is an event, after which the force is smooth: the order is that of the pair.
+
+    With the exponent 1.5 the force begins with the power 1.5 of the time, and its integral over the
+    first step has an error of the power 2.5.
+    """
+    errors = []
+    for h in (step, step / 2):
+        sim = Simulation(point_mass(stiffness=stiffness, exponent=exponent), step=h)
+        sim.advance(0.0015)
+        out = sim.outputs()
+        errors.append(abs(out["stop.rebound_speed"] / out["stop.approach_speed"] - 0.6))
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.3)
+
+
 @pytest.mark.parametrize("friction", [0.2, 0.5])
 def test_friction_takes_its_share_of_an_oblique_elastic_hit(friction):
     """The normal force F has the tangential force mu F against sliding, which turns at the peak."""
@@ -265,15 +283,18 @@ def test_a_settled_stop_costs_no_more_than_a_rigid_one():
     assert steps["compliant"] <= 1.1 * steps["rigid"] + 2
 
 
-@pytest.mark.slow
-def test_the_default_run_until_rest_costs_at_most_three_times_the_rigid_one():
+@pytest.mark.parametrize(
+    ("name", "ratio"), [("PRBDM", 4.5), pytest.param("PRBDM2R", 1.5, marks=pytest.mark.slow)]
+)
+def test_the_cost_until_rest_is_a_small_multiple_of_the_rigid_one(name, ratio):
+    """The rigid 1R guide has four steps for each flight, so that the contacts dominate."""
     steps = {}
-    for own in (mechanism("PRBDM2R"), compliant("PRBDM2R", 6e7)):
+    for own in (mechanism(name), compliant(name, 6e7)):
         sim = Simulation(own)
-        sim.advance(0.35)
+        sim.advance(0.45)
         steps[own.stops[0].law] = sim.step_count
         assert sim.outputs()["stop.contact"]
-    assert steps["compliant"] <= 3 * steps["rigid"]
+    assert steps["compliant"] <= ratio * steps["rigid"]
 
 
 def test_a_settled_stop_is_released_when_its_force_changes():
