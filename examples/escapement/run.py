@@ -33,7 +33,7 @@ from prbm import simulate as simulate_one
 from prbm.base.errors import PrbmError
 from prbm.base.progress import Progress, reporter
 from prbm.fmu.native_fmu import build
-from prbm.hybrid.impacts import Impact
+from prbm.hybrid.records import Impact
 from prbm.systems.cosimulation import simulate as cosimulate
 
 MOMENT = -1e-4  # Moment on the wheel [N m].

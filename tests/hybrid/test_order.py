@@ -109,9 +109,9 @@ def test_error_of_the_interpolation_through_three_states_falls_with_the_eighth_p
     for h in steps:
         y = np.array([1 - e, 0.0, 0.0, np.sqrt((1 + e) / (1 - e)), 0.0, 0.0])
         k, end = stages(PAIR, energized_orbit, 0.0, y, h, energized_orbit(0.0, y))
-        last = Arc(0.0, h, h, y, k)
+        last = Arc(0.0, h, h, y, k, 2)
         k, _ = stages(PAIR, energized_orbit, h, end, h, k[-1])
-        arc = Arc(h, h, 2 * h, end, k, last.start_before(h))
+        arc = Arc(h, h, 2 * h, end, k, 2, last.start_before(h))
         third = arc.before if previous else arc.middle(energized_orbit)
         t = 1.3 * h
         exact = solve_ivp(energized_orbit, (0.0, t), y, "DOP853", rtol=2.3e-14, atol=1e-15).y[:, -1]
@@ -122,7 +122,7 @@ def test_error_of_the_interpolation_through_three_states_falls_with_the_eighth_p
 
 def test_a_short_previous_step_is_no_node_of_the_interpolation():
     """Two nodes close to each other amplify round-off."""
-    arc = Arc(0.0, 0.1, 0.1, np.zeros(4), np.zeros((10, 4)))
+    arc = Arc(0.0, 0.1, 0.1, np.zeros(4), np.zeros((10, 4)), 1)
     assert arc.start_before(1.0) is None
     assert arc.start_before(0.1) is not None
 

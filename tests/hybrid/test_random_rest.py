@@ -38,7 +38,7 @@ def drawn(rng):
 def violations(front, zero):
     """Yield the laws that contacts violate; accelerations up to ``zero`` are round-off."""
     equations, contacts = front.equations, front.contacts
-    a, lam, _, _ = equations.evaluate(front.time, front.q, front.v)
+    a, lam, *_ = equations.evaluate(front.time, front.q, front.v)
     opening = equations.gap_accelerations(front.time, front.e, front.v, a)
     forces, rubbing = equations.stop_forces(lam), [*equations.stop_friction, 0.3]
     for c, mode in enumerate(contacts.modes):

@@ -88,7 +88,7 @@ def frictions(rng):
 def obeys_coulomb(settled: Simulation) -> bool:
     """Return whether friction forces and slip accelerations satisfy Coulomb's law."""
     equations, front, right = settled.equations, settled.front, True
-    a, lam, _, _ = equations.evaluate(front.time, front.q, front.v)
+    a, lam, *_ = equations.evaluate(front.time, front.q, front.v)
     for c, mode in enumerate(settled.contacts.modes):
         if mode is ContactMode.STICK:
             friction, limit = equations.friction(c, front.e, lam)

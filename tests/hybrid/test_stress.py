@@ -139,6 +139,24 @@ def test_mechanisms_without_stress_have_no_outputs_of_it():
 
 
 @ENGINES
+def test_stress_in_a_hit_of_a_compliant_stop_has_a_peak(engine):
+    """The stress sampled during the contact has the peak, and both engines agree."""
+    own = guide("beam", order=3)
+    stop = replace(own.stops[0], law="compliant", stiffness=1e6, exponent=1.0, position=0.0)
+    mechanism = replace(own, stops=(stop,))
+    values = {**THROWN, "release.displacement": -1e-5, "release.velocity": 0.5}
+    times = np.linspace(0.0, 1.5e-3, 301)
+    names = ("left_flexure.stress", "stop.force", "left_flexure.peak_stress")
+    stress, force, peak = engine(mechanism, values).sample(times, names).T
+    assert force.max() > 10.0
+    assert np.all(np.diff(peak) >= 0.0)
+    assert peak[-1] == pytest.approx(stress.max(), rel=2e-3)
+    expected = Simulation(mechanism, values).sample(times[::10], names).T
+    for mine, theirs in zip((stress, force, peak), expected, strict=True):
+        assert mine[::10] == pytest.approx(theirs, rel=1e-5, abs=1e-5 * theirs.max())
+
+
+@ENGINES
 @pytest.mark.parametrize(("model", "changes"), [("beam", {"order": 3}), ("2R", {})])
 def test_stress_in_the_sections_has_the_outputs_as_its_ends_and_its_maximum(engine, model, changes):
     simulation = engine(guide(model, **changes), THROWN)

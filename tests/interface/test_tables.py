@@ -260,7 +260,7 @@ class Comparison:
         for stop in m.stops:
             assert (r.text(), self.body(), self.body()) == (stop.name, stop.body, stop.on)
             self.point(stop.point)
-            assert r.take("d") == stop.direction
+            assert (r.take("d"), r.take("I")) == (stop.direction, stop.compliant)
             self.fields(stop)
         for friction in m.frictions:
             self.placed(friction)

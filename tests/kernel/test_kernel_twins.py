@@ -38,6 +38,7 @@ from prbm.mechanics import (
     assembly,
     beam,
     complementarity,
+    compliance,
     constraints,
     contact,
     direction_map,
@@ -51,7 +52,7 @@ from prbm.mechanics import (
 )
 from prbm.mechanics import inputs as input_data
 from prbm.mechanics import system as system_arrays
-from prbm.mechanics.contact_state import ContactMode, ContactState
+from prbm.mechanics.contact_state import ContactMode, ContactState, Phase, Touching
 from prbm.mechanism import flexure
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.expressions import Affine
@@ -117,7 +118,16 @@ OWN_MECHANISMS = {
 }  # fmt: skip
 
 
+def soft():
+    """Return a mechanism whose first stop is compliant."""
+    own = rich()
+    first = replace(own.stops[0], law="compliant", stiffness=1e6, exponent=1.5)
+    return replace(own, stops=(first, *own.stops[1:]))
+
+
 def described(name):
+    if name == "Soft":
+        return soft()
     return OWN_MECHANISMS[name]() if name in OWN_MECHANISMS else mechanism(name)
 
 
@@ -1102,17 +1112,30 @@ class KernelEquations:
         self.inputs = structures()["Inputs"](
             self.arrays[0].ctypes.data, base, *(part.ctypes.data for part in self.arrays[1:])
         )
-        state = structures()["ContactState"](self.modes.ctypes.data)
+        kind = structures()["Touching"]
+        self.touching = (kind * max(len(contacts.touching), 1))()
+        for to, one in zip(self.touching, contacts.touching, strict=False):
+            if one:
+                to.phase, to.reference_speed, to.depth = astuple(one)
+        state = structures()["ContactState"](
+            self.modes.ctypes.data, ctypes.addressof(self.touching)
+        )
         kernel().set_equations(self.structure, self.inputs, state, omega)
 
     def evaluate(self, t, q, v):
         """Return accelerations and multipliers."""
-        kernel().evaluate_equations(self.structure, t, q, v, None, self.evaluation)
+        kernel().evaluate_equations(self.structure, t, q, v, None, None, self.evaluation)
         return self.multiplied(len(q))
 
     def multiplied(self, n):
         """Return the accelerations and multipliers of the evaluation."""
         return array(self.evaluation.a, n), array(self.evaluation.lam, self.structure.r)
+
+    def given(self, a, lam):
+        """Set the accelerations and multipliers of the evaluation, and return them as one."""
+        for address, x in ((self.evaluation.a, a), (self.evaluation.lam, lam)):
+            ctypes.memmove(address, np.ascontiguousarray(x).ctypes.data, 8 * len(x))
+        return dynamics.Evaluation(a, lam, None, None)
 
     def rate(self, t, y):
         """Return the rates of a state at a time."""
@@ -1218,7 +1241,7 @@ def test_accelerations_and_rates_are_the_same_in_every_discrete_state(name):
         t = theirs.inputs.walls[0].since + 3e-4  # The wall has not reached its reference.
         a, lam = mine.evaluate(t, y[:n], y[n : 2 * n])
         evaluation = theirs.evaluate(t, y[:n], y[n : 2 * n])
-        a_expected, lam_expected, M, _ = evaluation
+        a_expected, lam_expected, M, *_ = evaluation
         rel = spread(condition(evaluation))
         assert mine.structure.r == r
         assert_same(a, a_expected, rel)
@@ -1249,7 +1272,9 @@ def test_a_reference_nearby_changes_evaluations_by_round_off(name):
         q, v = y[:n], y[n : 2 * n]
         expected, rel = mine.evaluate(0.1, q, v), spread(condition(theirs.evaluate(0.1, q, v)))
         kernel().set_reference(mine.reference, mine.ours.structure, q + 1e-3)
-        kernel().evaluate_equations(mine.structure, 0.1, q, v, mine.reference, mine.evaluation)
+        kernel().evaluate_equations(
+            mine.structure, 0.1, q, v, None, mine.reference, mine.evaluation
+        )
         for found, one in zip(mine.multiplied(n), expected, strict=True):
             assert_same(found, one, rel)
 
@@ -1286,12 +1311,14 @@ def test_gaps_are_the_same(name):
         t = theirs.inputs.walls[0].since + 1e-3 * rng.uniform(0.0, 1.5)
         e, v = theirs.system.directions(y[:n]), y[n : 2 * n]
         stops = len(theirs.system.gaps)
-        gaps = [kernel().gap(mine.structure, i, t, e) for i in range(stops)]
+        gaps = [kernel().gap(mine.structure, i, t, e, None) for i in range(stops)]
         assert_same(gaps, theirs.gaps(t, e), scale=size)
-        rates = [kernel().gap_rate(mine.structure, i, t, e, v) for i in range(stops)]
+        rates = [kernel().gap_rate(mine.structure, i, t, e, v, None) for i in range(stops)]
         assert_same(rates, theirs.gap_rates(t, e, v), scale=size * np.abs(v).max())
-        a, each = rng.normal(size=n) * np.abs(v).max() ** 2, range(stops)
-        found = [kernel().gap_acceleration(mine.structure, i, t, e, v, a) for i in each]
+        a = rng.normal(size=n) * np.abs(v).max() ** 2
+        mine.given(a, np.zeros(0))
+        at = t, e, v, mine.evaluation
+        found = [kernel().gap_acceleration(mine.structure, i, *at) for i in range(stops)]
         assert_same(found, theirs.gap_accelerations(t, e, v, a), scale=size * np.abs(a).max() + 10)
         wall = theirs.inputs.walls[0]
         found = kernel().wall_motion(structures()["Wall"](*astuple(wall)), t)
@@ -1304,6 +1331,8 @@ def test_gaps_are_the_same(name):
 @twin(
     is_stop=ContactState.is_stop, stop_force=dynamics.Equations.stop_forces,
     stick_force=dynamics.Equations.friction, friction_limit=dynamics.Equations.friction,
+    slip_force=dynamics.sliding_friction, is_held=ContactState.held.func,
+    friction_coefficient=dynamics.Equations.friction_coefficient,
 )  # fmt: skip
 @pytest.mark.parametrize("name", ["PRBDM2R", "Rich"])
 def test_contact_forces_are_the_same(name):
@@ -1311,16 +1340,95 @@ def test_contact_forces_are_the_same(name):
     for theirs, mine, y, rng in equations(name, 3):
         e, lam = theirs.system.directions(y[: theirs.n]), rng.normal(size=len(theirs.rows))
         contacts = theirs.contacts
+        given = mine.given(rng.normal(size=theirs.n), lam)
         for k in range(len(contacts.modes)):
             assert kernel().is_stop(mine.structure.system, k) == contacts.is_stop(k)
+            coefficient = theirs.friction_coefficient(k)
+            assert kernel().friction_coefficient(mine.structure, k) == coefficient
+        for stop in range(contacts.stops):
+            held = kernel().is_held(mine.structure.contacts, stop)
+            assert held == (stop in contacts.held)
         for stop in theirs.held:
             force = kernel().stop_force(mine.structure, lam, stop)
             assert force == theirs.stop_forces(lam)[stop]
         for c in theirs.sticking:
             force, limit = theirs.friction(c, e, lam)
             assert kernel().stick_force(mine.structure, lam, c) == force
-            found = kernel().friction_limit(mine.structure, e, lam, c)
+            found = kernel().friction_limit(mine.structure, e, mine.evaluation, c)
             assert_same(found, limit, scale=abs(force))
+        for c in (*theirs.slipping_points, *theirs.slipping_stops):
+            found = kernel().slip_force(mine.structure, e, mine.evaluation, c)
+            force = dynamics.sliding_friction(theirs, c, e, given)
+            assert_same(found, -contacts.modes[c].slip * force)
+
+
+@pytest.mark.parametrize("mode", list(ContactMode)[1:])
+@pytest.mark.parametrize("phase", [Phase.PRESSED, Phase.RISING, Phase.FREE])
+def test_equations_with_pressed_stops_are_the_same(phase, mode):
+    """The wall gives way to the force, which has friction."""
+    for system, ours, rng in systems("Soft", 3):
+        stops, q, contact = len(system.gaps), near_loops(system, rng), Touching(phase, 0.3)
+        free = ContactState.free(stops, len(system.rubs))
+        contacts = replace(free, touching=(contact,) + (None,) * (stops - 1)).with_mode(0, mode)
+        inputs = random_inputs(system, system.directions(q), rng, 1.0)
+        theirs = dynamics.Equations(system, inputs, contacts, 80.0)
+        mine = KernelEquations(ours, inputs, contacts, 80.0)
+        n, (_, v) = theirs.n, random_state(system, rng)
+        y = np.concatenate([q, 0.1 * v, rng.normal(size=2), 1e-5 * rng.normal(size=4)])
+        t = inputs.walls[0].since + 3e-4
+        evaluation, dy, expected = theirs.at(t, y), mine.rate(t, y), theirs.rate(t, y)
+        rel = spread(condition(evaluation))
+        assert_same(dy[: 2 * n], expected[: 2 * n], rel)
+        power = float(np.abs(evaluation.M @ evaluation.a) @ np.abs(y[n : 2 * n]))
+        assert_same(dy[2 * n : 2 * n + 2], expected[2 * n : 2 * n + 2], rel, scale=power)
+        assert_same(dy[2 * n + 2 :], expected[2 * n + 2 :], 1e-9)
+        e, extra = system.directions(q), y[2 * n + 2 :]
+        at, given = (mine.structure, 0, t, e), (mine.evaluation,)
+        assert_same(kernel().gap(*at, extra), theirs.gaps(t, e, extra)[0], scale=system.length)
+        speed = theirs.gap_rates(t, e, y[n : 2 * n], extra)[0]
+        assert_same(kernel().gap_rate(*at, y[n : 2 * n], extra), speed, scale=1.0)
+        known = (t, e, y[n : 2 * n], evaluation.a, evaluation.pressure)
+        bend = theirs.gap_accelerations(*known)[0]
+        found = kernel().gap_acceleration(*at, y[n : 2 * n], *given)
+        assert_same(found, bend, 1e-8, scale=abs(expected[2 * n + 3]))
+        pressed = float(evaluation.pressure.force[0])
+        assert (pressed == 0.0) == (phase is Phase.FREE)
+        limit = theirs.friction_limit(0, e, evaluation.pressure)
+        found = kernel().friction_limit(mine.structure, e, *given, 0)
+        assert_same(found, limit, 1e-9, scale=abs(pressed))
+
+
+@twin(
+    damping_factor=compliance.damping_factor,
+    elastic_force=compliance.ComplianceLaw.elastic_force,
+    damping_ratio=compliance.ComplianceLaw.damping_ratio,
+    contact_force=compliance.ComplianceLaw.force,
+    contact_energy=compliance.ComplianceLaw.energy,
+    contact_tangent=compliance.ComplianceLaw.tangent,
+    is_pressed=ContactState.pressed.func,
+)
+def test_laws_of_compliant_stops_are_the_same():
+    rng = np.random.default_rng(7)
+    for e in (*rng.uniform(0.01, 1.0, 40), 0.01, 1.0):
+        n, phase = rng.choice([1.0, 1.5, 2.3]), Phase(int(rng.integers(1, 5)))
+        a = compliance.damping_factor(e)
+        assert kernel().damping_factor(e) == pytest.approx(a, rel=1e-9)
+        theirs = compliance.ComplianceLaw(10 ** rng.uniform(0, 9), n, a)
+        mine = structures()["ComplianceLaw"](*theirs)
+        one = Touching(phase, 10 ** rng.uniform(-4, 1), 1e-6)
+        touching = structures()["Touching"](*astuple(one))
+        d, rate = rng.normal() * 1e-4, rng.normal()
+        pairs = [
+            (kernel().elastic_force(mine, d), theirs.elastic_force(d)),
+            (kernel().damping_ratio(mine, touching, rate), theirs.damping_ratio(one, rate)),
+            (kernel().contact_force(mine, touching, d, rate), theirs.force(one, d, rate)),
+            (kernel().contact_energy(mine, d), theirs.energy(d)),
+            (kernel().contact_tangent(mine, abs(d)), theirs.tangent(abs(d))),
+        ]
+        for found, expected in pairs:
+            assert found == pytest.approx(expected, rel=1e-12)
+        state = ContactState((ContactMode.OPEN,), 1, (one,))
+        assert kernel().is_pressed(touching) == bool(state.pressed)
 
 
 @twin(rub_limit=dynamics.Equations.friction_limit)
@@ -1377,9 +1485,10 @@ def test_stresses_of_flexures_are_the_same(name):
         q, v, a = y[:n], y[n : 2 * n], 100.0 * rng.normal(size=n)
         lam = rng.normal(size=len(theirs.rows))
         e = theirs.system.directions(q)
-        expected = [tuple(x) for x in stress.stresses(theirs, q, v, a, lam).values()]
+        given = mine.given(a, lam)
+        expected = [tuple(x) for x in stress.stresses(theirs, q, v, given).values()]
         found = np.full((len(expected), 5), np.nan)
-        kernel().stresses(mine.structure, e, q, v, a, lam, found.ctypes.data)
+        kernel().stresses(mine.structure, e, q, v, mine.evaluation, found.ctypes.data)
         scale = max(one[2] for one in expected)
         assert_same(found[:, :3], [one[:3] for one in expected], 1e-11, scale=scale)
         assert_same(found[:, 3:], [one[3:] for one in expected], 1e-12)

@@ -54,7 +54,7 @@ def test_accelerations_equal_those_of_lagrange_equations():
         angles, rates = RNG.normal(size=3), 20 * RNG.normal(size=3)
         M, f = evaluate(*angles, *rates)
         expected = np.linalg.solve(np.array(M, float), np.array(f, float).ravel())
-        found, _, mass, _ = sim.equations.evaluate(sim.time, angles, rates)
+        found, _, mass, *_ = sim.equations.evaluate(sim.time, angles, rates)
         np.testing.assert_allclose(mass, np.array(M, float), rtol=1e-12, atol=1e-20)
         np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-8)
 
@@ -90,7 +90,7 @@ def test_combined_equations_equal_the_separate_functions():
         Q -= 8e-6 * system.K @ v + 2 * 0.02 * sim.omega * M @ v
         right = np.concatenate([Q - C @ v**2, convective(system.loops, e, v)])
         x = constraints.solve(constraints.saddle(M, rows, rows), right)
-        a, lam, _, _ = equations.evaluate(0.0, q, v)
+        a, lam, *_ = equations.evaluate(0.0, q, v)
         np.testing.assert_allclose(a, x[: system.n], rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(lam, -x[system.n :], rtol=1e-9, atol=1e-12)
 

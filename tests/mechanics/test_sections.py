@@ -111,8 +111,7 @@ def in_motion(mechanism, times):
         sim.advance(time)
         n, y = sim.system.n, sim.state()
         q, v = y[:n], y[n : 2 * n]
-        a, lam, _, _ = sim.equations.evaluate(sim.time, q, v)
-        yield sim, q, v, a, lam
+        yield sim, q, v, sim.equations.at(sim.time, y)
 
 
 def ends_of(system, name, e):
@@ -135,17 +134,17 @@ def test_forces_and_moments_on_each_flexure_and_on_the_ground_balance(mechanism)
     check_balances(mechanism)
 
 
-def check_balances(mechanism):
+def check_balances(mechanism, times=(0.0, 1.1e-3, 3.3e-3)):
     """Check the balances of each flexure, and of the ground, with contacts, pins and damping."""
-    for sim, q, v, a, lam in in_motion(mechanism, (0.0, 1.1e-3, 3.3e-3)):
+    for sim, q, v, found in in_motion(mechanism, times):
         system, equations = sim.system, sim.equations
         e = system.directions(q)
-        loads, ground = section_loads(equations, q, v, a, lam)
-        points = point_loads(equations, e, v, a)
+        loads, ground = section_loads(equations, q, v, found)
+        points = point_loads(equations, e, v, found.a)
         speed = 1j * (system.A @ (e * system.turning(v)))
         damping = equations.mass_damping * complex(system.m @ speed)
-        scale = float(np.abs(points).sum()) + float(np.abs(lam).sum()) + 1e-6
-        reaction = base_reaction(equations, q, v, a)[0]
+        scale = float(np.abs(points).sum()) + float(np.abs(found.lam).sum()) + 1e-6
+        reaction = base_reaction(equations, q, v, found.a)[0]
         assert abs(ground + damping - reaction) < 1e-8 * scale
         flexures = {c.flexure.name: c.flexure for c in system.connections if c.flexure}
         for one, flexure in zip(loads, mechanism.flexures, strict=True):
@@ -169,11 +168,11 @@ def test_base_reactions_in_motion_are_those_of_the_flexures(model, changes):
 
 def check_base_reaction(mechanism, times):
     """Check that the flexures at the ground transmit the base reaction, without contacts."""
-    for sim, q, v, a, lam in in_motion(mechanism, times):
+    for sim, q, v, found in in_motion(mechanism, times):
         if any(mode.closed for mode in sim.equations.contacts.modes):
             continue
-        loads, _ = section_loads(sim.equations, q, v, a, lam)
-        force, moment = base_reaction(sim.equations, q, v, a)
+        loads, _ = section_loads(sim.equations, q, v, found)
+        force, moment = base_reaction(sim.equations, q, v, found.a)
         on_ground, turning = [], []
         for one, flexure in zip(loads, mechanism.flexures, strict=True):
             for at, point in enumerate((flexure.start, flexure.end)):
@@ -237,3 +236,27 @@ def test_exchange_of_start_and_end_exchanges_forces_and_moments(model, changes):
             assert back.position == pytest.approx(
                 there.position[-1] - there.position[::-1], abs=1e-12
             )
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_flexures_and_a_pressed_stop_balance_the_loads_of_the_body(friction):
+    own = guide("beam", order=3)
+    stop = replace(own.stops[0], law="compliant", stiffness=1e6, exponent=1.0, friction=friction)
+    thrown = replace(own.release, displacement=-1e-5, velocity=0.5)
+    mechanism = replace(own, stops=(replace(stop, position=0.0),), release=thrown)
+    times = (5e-5, 2e-4, 4e-4)
+    for sim, q, v, found in in_motion(mechanism, times):
+        equations, system = sim.equations, sim.system
+        assert equations.pressed == [0]
+        loads, _ = section_loads(equations, q, v, found)
+        e, slip = system.directions(q), equations.contacts.modes[0].slip
+        own_load = point_loads(equations, e, v, found.a)
+        rubbing = -slip * friction * found.pressure.force[0]
+        if equations.sticking:
+            rubbing = equations.friction(0, e, found.lam, found.pressure)[0]
+        assert bool(rubbing) == bool(friction)
+        pushed = complex(-found.pressure.force[0], rubbing)
+        through = sum(one.forces[1] for one in loads)
+        total = own_load[system.body_masses["shuttle"]] + pushed - through
+        assert abs(total) < 1e-8 * abs(pushed)
+    check_balances(mechanism, times)

@@ -18,7 +18,7 @@ def test_code_for_moving_walls_is_within_its_limit():
     found = list(sizes.wall_functions())
     assert sum(x.size for x in found) <= sizes.WALLS_MAX
     others = {x.name for x in sizes.measured().functions if x.place.split(":")[0].endswith(".c")}
-    named = {name for name in others if "wall" in name} - {"check_walls", "add_friction_and_walls"}
+    named = {name for name in others if "wall" in name} - {"check_walls", "add_contacts_and_walls"}
     assert named | set(sizes.WALL_FUNCTIONS) <= {x.name for x in found}
 
 

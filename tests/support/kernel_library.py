@@ -47,7 +47,10 @@ DTYPES = {
 }
 
 
-ENUMERATIONS = ("ContactMode",)  # Those that are types of arguments or of structure members.
+ENUMERATIONS = (
+    "ContactMode",
+    "Phase",
+)  # Those that are types of arguments or of structure members.
 SCALARS |= dict.fromkeys(ENUMERATIONS, ctypes.c_int)
 DTYPES |= dict.fromkeys(ENUMERATIONS, np.int32)
 

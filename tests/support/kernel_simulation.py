@@ -85,6 +85,14 @@ def library(changes: Changes = ()) -> ctypes.CDLL:
     return found
 
 
+@cache
+def _sizes() -> list[int]:
+    """Return the numbers of a saved state: scalars, of a stop, and of its contact."""
+    text = (KERNEL / "hybrid" / "snapshot.c").read_text()
+    names = "SCALARS", "PER_STOP_STATE", "PER_CONTACT_STATE"
+    return [int(re.search(rf"\b{name} = (\d+)", text)[1]) for name in names]
+
+
 class KernelSimulation:
     """A simulation of a mechanism in the kernel.
 
@@ -175,14 +183,25 @@ class KernelSimulation:
         state[self._mode_places()] = modes
         self.restore(state)
 
+    def touching(self, stop: int) -> int:
+        """Return the phase of the contact at a compliant stop."""
+        return int(self.state[self._mode_places()[stop] + _sizes()[1] + 3])
+
+    def set_contact(self, stop: int, phase: int, speed: float, depth: float = 0.0) -> None:
+        """Set the phase, the reference speed and the depth of the contact at a compliant stop."""
+        state, (_, per_stop, _) = self.state, _sizes()
+        at = self._mode_places()[stop] + per_stop + 3  # Behind three maxima.
+        state[at : at + 3] = phase, speed, depth
+        self.restore(state)
+
     def _mode_places(self) -> list[int]:
         """Return the places of the modes in the saved state."""
-        text = (KERNEL / "hybrid" / "snapshot.c").read_text()
-        scalars, per_stop = (
-            int(re.search(rf"\b{name} = (\d+)", text)[1]) for name in ("SCALARS", "PER_STOP_STATE")
-        )
-        points = scalars + per_stop * len(self.stops)
-        return [*range(scalars, points, per_stop), *range(points, points + self.points)]
+        at, per_stop, per_contact = _sizes()
+        places = []
+        for stop in self.stops:
+            places.append(at)
+            at += per_stop + (per_contact if stop.compliant else 0)
+        return [*places, *range(at, at + self.points)]
 
     # -- model exchange --
 

@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 from prbm.files.mechanism_file import read_mechanism, shipped
 from prbm.fmu import native_fmu
-from prbm.hybrid.impacts import Impact
+from prbm.hybrid.records import Impact
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.modal import modes

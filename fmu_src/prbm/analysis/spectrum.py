@@ -20,7 +20,7 @@ from scipy.signal import detrend, find_peaks
 from scipy.signal.windows import hann
 
 from ..base.errors import ParameterError
-from ..hybrid.impacts import Impact
+from ..hybrid.records import Impact
 from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble
 from ..mechanics.modal import modes_at

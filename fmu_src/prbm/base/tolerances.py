@@ -71,6 +71,21 @@ WALL_MOBILITY_MAX = 1e100  # 1/kg; larger mobilities lose impulses to underflow.
 EVENTS_AT_ONCE_MAX = 16  # Events of one contact at one time in model exchange.
 IMPACT_COUNT_MAX = 2147483647  # Largest Integer of FMI.
 
+# --- compliant stops ---------------------------------------------------------------------------
+DAMPING_ELASTIC_MIN = 0.9999  # Restitution above which the first term of a series is exact.
+DAMPING_PLASTIC_MAX = 0.03  # Restitution below which the factor of the damping is 1/e.
+DAMPING_BISECTIONS = 60  # Bisections of the factor of the damping.
+PHASE_RTOL = 1e-9  # Of the force and of the reference speed: excess at which a contact switches.
+SETTLED_DAMPING_RTOL = 1e-3  # Of the elastic force: largest damping of a contact that settles.
+SETTLED_FORCE_RTOL = 1e-2  # Of the elastic force: difference at which a settled stop is released.
+SETTLING_FACTOR = 0.5  # Of SETTLED_FORCE_RTOL: largest difference of a contact that settles.
+TOUCH_STEP_FACTOR = 0.5  # Of the depth of a free hit over its speed: first step of a contact.
+TOUCH_STEP_CURVED_FACTOR = 0.05  # The same if the exponent is above 1: F is not smooth at d = 0.
+CONTACT_ERROR_FACTOR = 100.0  # Of the allowed error of a step: that of indentation and its rate.
+INDENTATION_MIN_RTOL = 1e-7  # Of the size: smallest scale of the error of an indentation.
+PEAK_REFINEMENTS = 3  # Parabolas through ever closer points at a peak.
+PEAK_REFINEMENT_FACTOR = 0.125  # Ratio of the distances of these points.
+
 # --- location of events ------------------------------------------------------------------------
 EVENT_TIME_ATOL = 1e-13  # s; events are located to 1e-12 s, of which projection needs a part.
 EVENT_TIME_FACTOR = 2.0  # Of EVENT_TIME_ATOL: error of the time of an event.

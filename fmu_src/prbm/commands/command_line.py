@@ -81,6 +81,7 @@ def parser() -> argparse.ArgumentParser:
     _shock(commands)
     _fit(commands)
     _impact_map(commands)
+    _contact(commands)
     _sweep(commands)
     _study(commands)
     measure_arguments(commands)
@@ -142,6 +143,35 @@ def _modes(commands: Commands) -> None:
     )  # fmt: skip
     set_argument(parser)
     out_argument(parser)
+
+
+def _contact(commands: Commands) -> None:
+    parser = add_command(
+        commands, "contact", "contact:contact",
+        "stiffness of a compliant stop from radii and materials; force and duration of a hit",
+        examples(
+            'prbm contact --radius "5 mm" --youngs-modulus "200 GPa" --mass 53g --speed "0.8 m/s"',
+            'prbm contact --thickness 2mm --area "100 mm2" --youngs-modulus "10 MPa"',
+        ),
+    )  # fmt: skip
+    for option, text in (
+        ("--radius", "radius of the sphere [m]"),
+        ("--wall-radius", "radius of the wall, negative if hollow [m] (default: a plane)"),
+        ("--youngs-modulus", "Young's modulus of the sphere or of the pad [Pa]"),
+        ("--wall-modulus", "Young's modulus of the wall [Pa] (default: that of the sphere)"),
+        ("--wall-poisson", "Poisson's ratio of the wall (default: that of the sphere)"),
+        ("--thickness", "thickness of a pad [m], instead of a radius"),
+        ("--area", "area of the pad [m2]"),
+        ("--stiffness", "contact stiffness, instead of a radius or a thickness"),
+        ("--mass", "mass that hits the stop [kg]"),
+        ("--speed", "its speed [m/s]"),
+    ):
+        parser.add_argument(option, metavar="X", help=text)
+    for option, default in (("--poisson", "0.3"), ("--exponent", "1"), ("--restitution", "0.6")):
+        name = option[2:].replace("poisson", "Poisson's ratio")
+        parser.add_argument(
+            option, metavar="X", default=default, help=f"{name} (default: {default})"
+        )
 
 
 def _equilibrium(commands: Commands) -> None:

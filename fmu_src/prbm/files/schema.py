@@ -9,7 +9,15 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any
 
-from pydantic import ConfigDict, Field, StrictBool, StrictInt, StrictStr
+from pydantic import (
+    ConfigDict,
+    Field,
+    StrictBool,
+    StrictInt,
+    StrictStr,
+    ValidationInfo,
+    field_validator,
+)
 
 from ..base.errors import MechanismError, PrbmError
 from ..mechanism import parameters, parts
@@ -38,13 +46,14 @@ from .copies import (
 )
 from .outlines import plate
 from .tables import STRENGTHS, MaterialTable, Named, ParameterTable, RepeatTable, Table
-from .units import check_coherent
+from .units import check_coherent, si_unit
 from .values import (
     NAME_LENGTH_MAX,
     Acceleration,
     Angle,
     Corner,
     EndOrEnds,
+    Law,
     LineOrLines,
     Measured,
     Model,
@@ -231,6 +240,19 @@ class StopTable(Named):
     restitution: Annotated[Quantity, measured(parts.Stop, "restitution")] = parts.Stop.restitution
     friction: Annotated[Quantity, measured(parts.Stop, "friction")] = parts.Stop.friction
     rest_speed: Annotated[Quantity, measured(parts.Stop, "rest_speed")] = parts.Stop.rest_speed
+    law: Law = Field(parts.RIGID, description="Law of impact")
+    exponent: Annotated[Quantity, measured(parts.Stop, "exponent")] | None = None
+    stiffness: Annotated[Quantity, measured(parts.Stop, "stiffness")] | None = None
+
+    @field_validator("stiffness", mode="before")
+    @classmethod
+    def _unit_of_stiffness(cls, written: object, info: ValidationInfo) -> object:
+        exponent = info.data.get("exponent")
+        if exponent not in (None, 1.0) and isinstance(written, str) and si_unit(written):
+            raise MechanismError(
+                f"its unit is N/m^{exponent}: write a number in this unit, without quotes"
+            )
+        return written
 
 
 class FrictionTable(Named):

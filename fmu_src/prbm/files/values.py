@@ -22,7 +22,7 @@ from ..base.errors import MechanismError
 from ..mechanism.expressions import Quantity
 from ..mechanism.flexure import ENDS, MODELS, PROFILES
 from ..mechanism.parameters import NAME
-from ..mechanism.parts import FIELDS
+from ..mechanism.parts import FIELDS, LAWS
 from .images import Line
 from .units import number, quantity
 
@@ -150,6 +150,7 @@ Acceleration = Annotated[
 ]
 End = Annotated[StrictStr, Field(json_schema_extra={"enum": list(ENDS)})]
 Profile = Annotated[StrictStr, Field(json_schema_extra={"enum": list(PROFILES)})]
+Law = Annotated[StrictStr, Field(json_schema_extra={"enum": list(LAWS)})]
 Model = Annotated[StrictStr, Field(json_schema_extra={"enum": list(MODELS)})]
 
 

@@ -34,9 +34,9 @@ class Node:
     ----------
     time : float
         Time [s].
-    y : (2 n + 2,)
+    y : (2 n + 2 + 4 c,)
         State.
-    rates : (2 n + 2,)
+    rates : (2 n + 2 + 4 c,)
         Rates of the state.
     """
 
@@ -57,10 +57,12 @@ class Arc:
         Size of the whole step [s].
     end : float
         End of the step, or the time of the event that ends it, which may be slightly later [s].
-    y : (2 n + 2,)
+    y : (2 n + 2 + 4 c,)
         State at the start.
-    k : (stages, 2 n + 2)
+    k : (stages, 2 n + 2 + 4 c)
         Rates of the stages.
+    n : int
+        Number of coordinates.
     before : Node or None
         The start of the previous step, if the motion is smooth from there.
     """
@@ -70,6 +72,7 @@ class Arc:
     end: float
     y: Real
     k: Real
+    n: int
     before: Node | None = None
 
     def start_before(self, h: float) -> Node | None:
@@ -78,7 +81,7 @@ class Arc:
 
     @property
     def embedded_error(self) -> Real:
-        """Difference of the solution of lower order at the end of the step, (2 n + 2,)."""
+        """Difference of the solution of lower order at the end of the step, (2 n + 2 + 4 c,)."""
         result: Real = self.h * (TSITOURAS_PAPAKOSTAS.error @ self.k)
         return result
 
@@ -92,15 +95,15 @@ class Arc:
 
         The energies are those of :meth:`at`.
         """
-        y, n = self.at(t), len(self.y) // 2 - 1
+        y, n = self.at(t), self.n
         end = self.y + self.h * (TSITOURAS_PAPAKOSTAS.weights @ self.k)
         nodes = (Node(self.start, self.y, self.k[0]), Node(self.start + self.h, end, self.k[-1]))
-        data = np.array([[x.y[:n], x.y[n:-2], x.rates[n:-2]] for x in (*nodes, third)])
+        data = np.array([[x.y[:n], x.y[n : 2 * n], x.rates[n : 2 * n]] for x in (*nodes, third)])
         value, rate = hermite_weights(
             [x.time - self.start for x in (*nodes, third)], t - self.start
         )
         y[:n] = np.tensordot(value, data, 2)
-        y[n:-2] = np.tensordot(rate, data, 2)
+        y[n : 2 * n] = np.tensordot(rate, data, 2)
         return y
 
     def at(self, t: float) -> Real:
@@ -122,7 +125,7 @@ class Arc:
         """
         h = t - self.start
         k, y = stages(TSITOURAS_PAPAKOSTAS, rate, self.start, self.y, h, self.k[0])
-        return Arc(self.start, h, t, self.y, k, self.before), y
+        return Arc(self.start, h, t, self.y, k, self.n, self.before), y
 
     def samples(self) -> tuple[Real, Real]:
         """Return the times at which guards are evaluated, and the states there.
@@ -131,7 +134,7 @@ class Arc:
         -------
         times : (w + 1,)
             Ends of w intervals [s].
-        states : (w + 1, 2 n + 2)
+        states : (w + 1, 2 n + 2 + 4 c)
             States at these times, not projected.
         """
         return self.start + self.h * FRACTIONS, self.y + self.h * (GRID @ self.k)

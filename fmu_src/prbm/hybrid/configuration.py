@@ -129,12 +129,15 @@ class Magnitudes:
         Strain of a link; 0 if no link stretches.
     energy : float
         Elastic energy of the springs [J].
+    impulse : float
+        Impulse of a contact: this energy divided by the speed of the motion [N s].
     """
 
     angle: float
     rate: float
     strain: float
     energy: float
+    impulse: float
 
     @classmethod
     def of(cls, system: System, scales: Scales, y: Real) -> "Magnitudes":
@@ -147,7 +150,8 @@ class Magnitudes:
         energy = max(float(amplitude @ K @ amplitude) / 2, least)
         stiffest = float(K.diagonal()[list(system.strains)].max(initial=0.0))
         strain = math.sqrt(2 * NOMINAL_STRAIN_FACTOR * energy / stiffest) if stiffest else 0.0
-        return cls(angle, angle * scales.rate, strain, energy)
+        rate = angle * scales.rate
+        return cls(angle, rate, strain, energy, energy / (rate * system.length))
 
 
 @dataclass(frozen=True)

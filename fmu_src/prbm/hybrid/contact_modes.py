@@ -97,6 +97,8 @@ def settle(
     ]
     before = None
     for _ in range(SETTLE_ITERATIONS_MAX):
+        # A compliant stop is a candidate only while it is a constraint.
+        candidates = [i for i in candidates if i not in front.contacts.pressed]
         front = _chosen(configuration, front, candidates, slipped, turning)
         if front.contacts == before or not front.contacts.held:
             return front
@@ -114,8 +116,7 @@ def _chosen(
 ) -> Front:
     """Return the front with the modes that its forces choose; not projected."""
     holding = holding_stops(configuration, front, candidates)
-    contacts = ContactState.holding(holding, front.contacts.stops, front.contacts.points)
-    front = front.with_contacts(contacts)
+    front = front.with_contacts(front.contacts.holding(holding))
     return _with_friction(configuration, front, candidates, slipped, turning)
 
 
@@ -136,12 +137,12 @@ def release_moving(configuration: Configuration, front: Front) -> tuple[Front, i
     gaps, rates = front.gaps_and_rates()
     scales, contacts, struck = configuration.scales, front.contacts, None
     for i in range(contacts.stops):
-        closed = front.contacts.modes[i].closed
+        closed, compliant = i in front.contacts.held, configuration.mechanism.stops[i].compliant
         if closed and abs(rates[i]) > scales.zero_speed:
             contacts = contacts.released(i)
-        elif closed or gaps[i] > scales.touching:
+        elif compliant or closed or gaps[i] > scales.touching:
             continue
-        struck = i if rates[i] < -scales.zero_speed else struck
+        struck = i if rates[i] < -scales.zero_speed and not compliant else struck
     return front.with_contacts(contacts), struck
 
 
@@ -179,7 +180,7 @@ def find_holding_stops(
     sliding = equations_holding(scales, front, every).contacts.modes
     equations = equations_holding(scales, front, ())
     slips = [sliding[i].slip for i in every]
-    found = rest_forces(equations, front.time, front.q, front.v, every, slips, ())
+    found = rest_forces(equations, front.time, front.y, every, slips, ())
     if found is None:
         return None
     pressing = zip(every, found.normal, strict=True)
@@ -196,7 +197,8 @@ def _least_pressing(scales: Scales, front: Front, stop: int) -> float:
     A stop that was released because its force was round-off, and then penetrated, was pressed.
     """
     gaps, _ = front.gaps_and_rates()
-    return scales.zero_acceleration if gaps[stop] > -scales.depth / 2 else 0.0
+    penetration = -gaps[stop] - front.contacts.depth(stop)
+    return scales.zero_acceleration if penetration < scales.depth / 2 else 0.0
 
 
 def _failure(
@@ -211,13 +213,13 @@ def equations_holding(scales: Scales, front: Front, stops: Sequence[int]) -> Equ
     """Return the equations in which these stops hold and all contacts with a velocity slip."""
     e, v, system, contacts = front.e, front.v, front.equations.system, front.contacts
     speeds = np.concatenate([system.slide_rows.rates(e, v), system.rub_rows.rates(e, v)])
-    modes = tuple(
-        slip_mode(scales, float(speed))
-        if c in stops or not contacts.is_stop(c)
-        else ContactMode.OPEN
-        for c, speed in enumerate(speeds)
-    )
-    return front.equations.with_contacts(ContactState(modes, contacts.stops))
+    contacts = contacts.unloaded()
+    for c, speed in enumerate(speeds):
+        if c in stops:
+            contacts = contacts.held_with(c, slip_mode(scales, float(speed)))
+        elif contacts.modes[c].closed:
+            contacts = contacts.with_mode(c, slip_mode(scales, float(speed)))
+    return front.equations.with_contacts(contacts)
 
 
 def mobility(M: Real, held: Real, row: Real) -> float:
@@ -237,7 +239,7 @@ def slip_mode(scales: Scales, speed: float, slow: float = 0.0) -> ContactMode:
 
 def _slide_acceleration(front: Front, contact: int) -> float:
     """Return the sliding acceleration of a contact in its present mode [m/s^2]."""
-    a = front.equations.evaluate(front.time, front.q, front.v).a
+    a = front.evaluate().a
     return front.equations.slip_acceleration(contact, front.e, front.v, a)
 
 
@@ -308,24 +310,25 @@ def _modes_of(
         contacts = contacts.with_mode(c, modes[c]) if contacts.modes[c].closed else contacts
     if not at_rest:
         return contacts
-    contacts, slips = contacts.opened(), [modes[i].slip for i in stops]
+    contacts, slips = contacts.unloaded(), [modes[i].slip for i in stops]
     equations = front.equations.with_contacts(contacts)
-    found = rest_forces(equations, front.time, front.q, front.v, stops, slips, at_rest)
+    found = rest_forces(equations, front.time, front.y, stops, slips, at_rest)
     if found is None:
         return None
     for i, press in zip(stops, found.normal, strict=True):
         if press > _least_pressing(scales, front, i):
-            contacts = contacts.with_mode(i, modes[i] if i in rubbing else FRICTIONLESS)
+            contacts = contacts.held_with(i, modes[i] if i in rubbing else FRICTIONLESS)
     contacts = _sticking_or_slipping(scales, front, contacts, at_rest, found, slipped)
     slack = dict(zip(at_rest, scales.zero_acceleration / found.mobility, strict=True))
     return contacts if _agrees(scales, front, contacts, every, slack) else None
 
 
 def _with_coefficients(equations: Equations, stops: Sequence[int]) -> list[int]:
-    """Return those of ``stops`` and of all friction points that have friction."""
-    laws = enumerate(equations.friction_laws, start=equations.contacts.stops)
-    rubbing = [i for i in stops if equations.stop_friction[i] > 0.0]
-    return rubbing + [c for c, law in laws if law.coefficient > 0.0]
+    """Return those of ``stops``, pressed stops and all friction points that have friction."""
+    contacts = equations.contacts
+    pressed = [i for i in contacts.pressed if i not in stops and not contacts.is_free(i)]
+    points = range(contacts.stops, len(contacts.modes))
+    return [c for c in (*stops, *pressed, *points) if equations.friction_coefficient(c) > 0.0]
 
 
 def _sliding_mode(scales: Scales, front: Front, contact: int, slow: float) -> ContactMode:
@@ -362,7 +365,7 @@ def _sticking_or_slipping(
     at_limit = size >= found.limit - slack
     for j in np.argsort(np.where(at_limit, 2, size <= slack), kind="stable"):
         c, force = at_rest[j], found.friction[j]
-        if not contacts.modes[c].closed:
+        if not contacts.modes[c].closed or (c in contacts.pressed and contacts.is_free(c)):
             continue
         if abs(found.slide[j]) > scales.zero_acceleration:
             mode = ContactMode.slipping(found.slide[j])
@@ -399,16 +402,20 @@ def _agrees(
         the limit that is accepted as round-off [N].
     """
     e, v, equations = front.e, front.v, front.equations.with_contacts(contacts)
-    a, lam, _, _ = equations.evaluate(front.time, front.q, v)
-    opening = equations.gap_accelerations(front.time, e, v, a)
-    forces, zero = equations.stop_forces(lam), scales.zero_acceleration
+    evaluation = equations.at(front.time, front.y)
+    a = evaluation.a
+    opening = equations.gap_accelerations(front.time, e, v, a, evaluation.pressure)
+    forces, zero = (
+        equations.stop_forces(evaluation.lam, evaluation.pressure),
+        scales.zero_acceleration,
+    )
     for i in stops:
-        if forces[i] <= 0.0 if contacts.modes[i].closed else opening[i] < -zero:
+        if forces[i] <= 0.0 if i in contacts.held else opening[i] < -zero:
             return False
     for c, slack in at_rest.items():
         mode = contacts.modes[c]
         if mode is STICK:
-            force, limit = equations.friction(c, e, lam)
+            force, limit = equations.friction(c, e, evaluation.lam, evaluation.pressure)
             if abs(force) > limit + max(FRICTION_EXCESS_RTOL * limit, slack):
                 return False
         elif mode.slip * equations.slip_acceleration(c, e, v, a) < -zero:

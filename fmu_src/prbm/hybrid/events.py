@@ -6,11 +6,11 @@ from enum import IntEnum
 
 from ..base.errors import SimulationError
 from ..base.tolerances import EVENT_WINDOW_RTOL, EVENTS_MAX
-from . import contact_modes, guards, impacts
+from . import compliant, contact_modes, guards, impacts
 from .configuration import Configuration, Scales, contact_names
 from .front import Front
 from .guards import Guard, StepView
-from .impacts import Impact
+from .records import Impact
 
 
 class EventKind(IntEnum):
@@ -26,8 +26,12 @@ class EventKind(IntEnum):
     """A sticking contact reaches the limit of friction."""
     REVERSAL = 3
     """The sliding velocity of a contact falls to zero: it sticks or slips the other way."""
-    IMPACT = 4
-    """The gap of an open stop closes: an impact or a capture."""
+    SWITCH = 4
+    """The phase of a contact at a compliant stop changes, see :class:`.contact_state.Phase`."""
+    SEPARATION = 5
+    """The indentation of a compliant stop falls to zero: the contact ends."""
+    IMPACT = 6
+    """The gap of an open stop closes: an impact or a capture, or the first touch of a contact."""
 
 
 @dataclass(frozen=True)
@@ -86,6 +90,14 @@ TRANSITIONS = (
     Transition(
         EventKind.REVERSAL, guards.slip_speed, guards.slipping_contacts, guards.reversal_time,
         _settling(contact_modes.reverse),
+    ),
+    Transition(
+        EventKind.SWITCH, guards.switching, guards.pressed_stops, guards.switching_time,
+        _settling(compliant.switch),
+    ),
+    Transition(
+        EventKind.SEPARATION, guards.indentation, guards.pressed_stops, guards.closing_time,
+        compliant.separate,
     ),
     Transition(
         EventKind.IMPACT, guards.gap, guards.open_stops, guards.closing_time, impacts.impact,

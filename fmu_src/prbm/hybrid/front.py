@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 from ..mechanics.arrays import Complex, Real
 from ..mechanics.contact_state import ContactState
-from ..mechanics.dynamics import Equations
+from ..mechanics.dynamics import Equations, Evaluation
 from ..mechanics.inputs import Inputs, Wall
 
 
@@ -20,7 +20,45 @@ class Latched:
     energy_lost: float = 0.0
     modal_restitution: float = 0.0
     impulse_sum: float = 0.0
-    """Sum of all impulses so far, including those of captures."""
+    """Sum of all impulses so far, including those of captures; not of compliant stops, for which a
+    state of the motion is the integral of the force."""
+    peak_force: float = 0.0
+    indentation: float = 0.0
+    contact_duration: float = 0.0
+    """Outputs of compliant stops; the running maxima belong to a time in the motion."""
+
+
+@dataclass(frozen=True)
+class Touch:
+    """The begin of a contact at a compliant stop, from which its outputs are computed.
+
+    Parameters
+    ----------
+    time : float
+        Time of first touch [s].
+    counted : bool
+        Whether the contact is an impact whose outputs are not yet latched.
+    impulse, loss : float
+        Integral of the force [N s] and dissipated energy [J] of the stop before the contact.
+    q, v : (n,) tuple of float
+        Coordinates and rates at first touch.
+    momentum : (n,) tuple of float
+        M phi of the fundamental mode phi at first touch.
+    calm_since : float or None
+        Time from which the contact has been calm enough to settle [s].
+    step : float
+        Size of the integration steps before the contact, with which the next flight begins [s].
+    """
+
+    time: float
+    counted: bool = False
+    impulse: float = 0.0
+    loss: float = 0.0
+    q: tuple[float, ...] = ()
+    v: tuple[float, ...] = ()
+    momentum: tuple[float, ...] = ()
+    calm_since: float | None = None
+    step: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -31,18 +69,22 @@ class Front:
     ----------
     time : float
         Time of the state [s].
-    y : (2 n + 2,)
-        Angles, rates, dissipated energy and work [rad], [rad/s], [J], [J].
+    y : (2 n + 2 + 4 c,)
+        Angles, rates, dissipated energy and work [rad], [rad/s], [J], [J]; then the states of the
+        c compliant stops, see :mod:`prbm.mechanics.compliant_stops`.
     equations : Equations
         Equations of the motion from this time on: system, inputs with walls, contact modes.
     latched : (s,) tuple of Latched
         The last impact of each stop.
+    touches : (s,) tuple of Touch or None
+        The begin of the contacts at compliant stops that are closed; None for other stops.
     """
 
     time: float
     y: Real
     equations: Equations
     latched: tuple[Latched, ...]
+    touches: tuple[Touch | None, ...]
 
     @property
     def q(self) -> Real:
@@ -54,6 +96,11 @@ class Front:
         """Rates [rad/s], (n,)."""
         n = self.equations.n
         return self.y[n : 2 * n]
+
+    @property
+    def extras(self) -> Real:
+        """States of the compliant stops, (4 c,)."""
+        return self.y[2 * self.equations.n + 2 :]
 
     @property
     def e(self) -> Complex:
@@ -89,8 +136,24 @@ class Front:
 
     def gaps_and_rates(self) -> tuple[Real, Real]:
         """Return the gaps of all stops [m] and their rates [m/s]."""
-        e = self.e
-        return self.equations.gaps(self.time, e), self.equations.gap_rates(self.time, e, self.v)
+        t, e, equations, extras = self.time, self.e, self.equations, self.extras
+        return equations.gaps(t, e, extras), equations.gap_rates(t, e, self.v, extras)
+
+    def evaluate(self) -> Evaluation:
+        """Return accelerations and forces."""
+        return self.equations.at(self.time, self.y)
+
+    def with_touch(self, stop: int, touch: Touch | None) -> "Front":
+        """Return the front with another begin of the contact at a compliant stop."""
+        touches = list(self.touches)
+        touches[stop] = touch
+        return replace(self, touches=tuple(touches))
+
+    def with_latched(self, stop: int, latched: Latched) -> "Front":
+        """Return the front with other outputs of the last impact at a stop."""
+        every = list(self.latched)
+        every[stop] = latched
+        return replace(self, latched=tuple(every))
 
     def projected(self) -> "Front":
         """Return the front with its state projected onto the constraints."""

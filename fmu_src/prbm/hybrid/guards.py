@@ -18,9 +18,12 @@ from ..base.tolerances import (
     FRICTION_EXCESS_RTOL,
     GUARD_INTERVALS,
     LOCATION_ITERATIONS_MAX,
+    PHASE_RTOL,
     RELEASE_WATCH_FACTOR,
+    SETTLED_FORCE_RTOL,
 )
 from ..mechanics.arrays import Complex, Real
+from ..mechanics.contact_state import Phase
 from ..mechanics.dynamics import Equations, Evaluation
 from .arc import Arc
 from .configuration import Scales
@@ -34,21 +37,51 @@ Scalar = Callable[[float], float]
 
 def gap(equations: Equations, stop: int, t: float, y: Real) -> float:
     """Return the gap of a stop [m]."""
-    e = equations.system.directions(y[: equations.n])
-    return float(equations.gaps(t, e)[stop])
+    n = equations.n
+    e = equations.system.directions(y[:n])
+    return float(equations.gaps(t, e, y[2 * n + 2 :])[stop])
+
+
+def indentation(equations: Equations, stop: int, t: float, y: Real) -> float:
+    """Return the indentation of a stop [m]."""
+    return -gap(equations, stop, t, y)
+
+
+def switching(equations: Equations, stop: int, t: float, y: Real) -> float:
+    """Return the margin of the phase of a pressed stop, relative to its law [-].
+
+    A pressed contact begins to rise when its rate exceeds the reference speed, or becomes free when
+    its damping exceeds the elastic force.
+    """
+    touching = equations.contacts.touching[stop]
+    assert touching is not None
+    rate = -_gap_rate(equations, stop, t, y)
+    if touching.phase is Phase.RISING:
+        e, n = equations.system.directions(y[: equations.n]), equations.n
+        at = equations.at(t, y)
+        return -float(equations.gap_accelerations(t, e, y[n : 2 * n], at.a, at.pressure)[stop])
+    return switching_margin(equations, stop, rate)
+
+
+def switching_margin(equations: Equations, stop: int, rate: float) -> float:
+    """Return the margin of a pressed or free contact for the rate of its indentation [m/s]."""
+    touching = equations.contacts.touching[stop]
+    assert touching is not None
+    ratio = equations.compliant.laws[stop].damping_ratio(touching, rate)
+    if touching.phase is Phase.FREE:
+        return PHASE_RTOL - ratio
+    return min(PHASE_RTOL + ratio, 1.0 + PHASE_RTOL - rate / touching.reference_speed)
 
 
 def stop_force(equations: Equations, stop: int, t: float, y: Real) -> float:
     """Return the normal force of a held stop [N]."""
-    n = equations.n
-    return _stop_force(equations, stop, equations.evaluate(t, y[:n], y[n : 2 * n]))
+    return _stop_force(equations, stop, equations.at(t, y))
 
 
 def friction_margin(equations: Equations, contact: int, t: float, y: Real) -> float:
     """Return the limit of friction minus the friction force of a sticking contact [N]."""
-    n = equations.n
-    e = equations.system.directions(y[:n])
-    return _friction_margin(equations, contact, e, equations.evaluate(t, y[:n], y[n : 2 * n]))
+    e = equations.system.directions(y[: equations.n])
+    return _friction_margin(equations, contact, e, equations.at(t, y))
 
 
 def slip_speed(equations: Equations, contact: int, t: float, y: Real) -> float:
@@ -59,13 +92,18 @@ def slip_speed(equations: Equations, contact: int, t: float, y: Real) -> float:
 
 
 def _stop_force(equations: Equations, stop: int, evaluation: Evaluation) -> float:
-    return float(evaluation.lam[equations.first_hold + equations.held.index(stop)])
+    force = float(evaluation.lam[equations.hold_row(stop)])
+    depth = equations.contacts.depth(stop)
+    if not depth:
+        return force
+    elastic = equations.compliant.laws[stop].elastic_force(depth)
+    return SETTLED_FORCE_RTOL * elastic - abs(force - elastic)
 
 
 def _friction_margin(
     equations: Equations, contact: int, e: Complex, evaluation: Evaluation
 ) -> float:
-    friction, limit = equations.friction(contact, e, evaluation.lam)
+    friction, limit = equations.friction(contact, e, evaluation.lam, evaluation.pressure)
     return (1.0 + FRICTION_EXCESS_RTOL) * limit - abs(friction)
 
 
@@ -106,16 +144,18 @@ class StepView:
         return self.cuts.get(stop) or self.arc.cut(self.equations.rate, t)[0]
 
     @cached_property
-    def samples(self) -> tuple[Real, Complex, Real]:
-        """Times (w + 1,), directions and rates (w + 1, n) at the samples of the step."""
-        n, (times, states) = self.equations.n, self.arc.samples()
-        return times, self.equations.system.directions(states[:, :n]), states[:, n : 2 * n]
+    def samples(self) -> tuple[Real, Complex, Real, Real]:
+        """Times (w + 1,), directions, rates (w + 1, n) and extra states at samples of the step."""
+        n, (times, y) = self.equations.n, self.arc.samples()
+        e = self.equations.system.directions(y[:, :n])
+        return times, e, y[:, n : 2 * n], y[:, 2 * n + 2 :]
 
     @cached_property
     def gaps_and_rates(self) -> tuple[Real, Real]:
         """Gaps and their rates at the samples, (w + 1, s) [m], [m/s]."""
-        times, e, v = self.samples
-        return self.equations.gaps(times, e), self.equations.gap_rates(times, e, v)
+        times, e, v, extras = self.samples
+        equations = self.equations
+        return equations.gaps(times, e, extras), equations.gap_rates(times, e, v, extras)
 
     @cached_property
     def evaluations(self) -> list[tuple[float, Complex, Evaluation]]:
@@ -124,9 +164,15 @@ class StepView:
         result = []
         for t in (arc.start, arc.start + arc.h / 2, arc.start + arc.h):
             y = arc.at(t)
-            evaluation = self.equations.evaluate(t, y[:n], y[n : 2 * n])
+            evaluation = self.equations.at(t, y)
             result.append((t, self.equations.system.directions(y[:n]), evaluation))
         return result
+
+    def closing(self, guard: Guard, stop: int) -> tuple[Real, Real]:
+        """Return the gap of a stop, or its indentation, at the samples, and its rate there."""
+        gaps, rates = self.gaps_and_rates
+        sign = 1.0 if guard is gap else -1.0
+        return sign * gaps[:, stop], sign * rates[:, stop]
 
     def along(self, guard: Guard, contact: int, sign: float = 1.0) -> Scalar:
         """Return a guard of a contact, times a sign, as a function of time."""
@@ -136,6 +182,11 @@ class StepView:
 def open_stops(view: StepView) -> Sequence[int]:
     """Return the contacts that are watched for impacts."""
     return view.equations.contacts.open_stops
+
+
+def pressed_stops(view: StepView) -> Sequence[int]:
+    """Return the compliant stops that are watched for the end and the phases of their contacts."""
+    return view.equations.pressed
 
 
 def slipping_contacts(view: StepView) -> Sequence[int]:
@@ -151,7 +202,8 @@ def sticking_contacts(view: StepView) -> Sequence[int]:
 def releasing_stops(view: StepView) -> Sequence[int]:
     """Return the held stops if a force comes close to zero at a stage of the step, else none."""
     equations = view.equations
-    if not equations.held or equations.sticking:
+    settled = any(map(equations.contacts.depth, equations.held))
+    if not equations.held or equations.sticking or settled:
         return equations.held
     held = view.forces[:, equations.first_hold :]
     near = held.min(axis=0) <= RELEASE_WATCH_FACTOR * held.max(axis=0)
@@ -162,14 +214,13 @@ def releasing_stops(view: StepView) -> Sequence[int]:
 
 
 def closing_time(view: StepView, guard: Guard, stop: int) -> float | None:
-    """Return when a gap closes: z > 0 -> z <= 0 at a closing rate.
+    """Return when a gap or, at the end of a contact, an indentation closes: z > 0 -> z <= 0.
 
     A gap that is opening at the start of an interval can close only after its apex.  Therefore the
     last impact, after which the gap is round-off of either sign, is not found again.  A gap that
     dips below zero within an interval is found by the signs of its rates.
     """
-    all_gaps, all_rates = view.gaps_and_rates
-    gaps, rates = all_gaps[:, stop], all_rates[:, stop]
+    gaps, rates = view.closing(guard, stop)
     for j in range(GUARD_INTERVALS):
         if gaps[j + 1] > 0.0 and not rates[j] < 0.0 < rates[j + 1]:
             continue
@@ -183,14 +234,15 @@ def _closing_time_between(view: StepView, guard: Guard, stop: int, j: int) -> fl
     """Return when a gap closes in an interval at whose end, or within which, it is not positive."""
     z, depth = view.along(guard, stop), view.scales.depth
     a, b = view.samples[0][j : j + 2].tolist()
-    (gap_a, gap_b), (rate_a, rate_b) = (x[j : j + 2, stop] for x in view.gaps_and_rates)
+    (gap_a, gap_b), (rate_a, rate_b) = (x[j : j + 2] for x in view.closing(guard, stop))
+    closing_rate = _gap_rate if guard is gap else indentation_rate
     if abs(rate_a) <= view.scales.zero_speed and gap_a <= _round_off(view):
         # The stop was released too early, and is pressed again.
         return _deep_time(z, depth, a, b) if gap_b < min(gap_a, -depth) else None
     if rate_a > 0.0:
         if rate_b >= 0.0:
             return None  # The gap opens throughout the interval.
-        a = fall_time(view.along(_gap_rate, stop), a, b)
+        a = fall_time(view.along(closing_rate, stop), a, b)
         if z(a) <= 0.0:
             return a  # The flight is lower than the resolution of a position.
     elif gap_a <= 0.0:
@@ -199,10 +251,10 @@ def _closing_time_between(view: StepView, guard: Guard, stop: int, j: int) -> fl
             return float(a)
         return _deep_time(z, depth, a, b) if gap_b < min(gap_a, -depth) else None
     if rate_a < 0.0 < rate_b:
-        b = fall_time(view.along(_gap_rate, stop, sign=-1.0), a, b)
+        b = fall_time(view.along(closing_rate, stop, sign=-1.0), a, b)
         if z(b) > 0.0:
             return None
-    return _corrected_time(view, stop, fall_time(z, a, b), earliest=a)
+    return _corrected_time(view, guard, stop, fall_time(z, a, b), earliest=a)
 
 
 def _deep_time(z: Scalar, depth: float, a: float, b: float) -> float:
@@ -219,10 +271,15 @@ def _gap_rate(equations: Equations, stop: int, t: float, y: Real) -> float:
     """Return the rate of the gap of a stop [m/s]."""
     n = equations.n
     e = equations.system.directions(y[:n])
-    return float(equations.gap_rates(t, e, y[n : 2 * n])[stop])
+    return float(equations.gap_rates(t, e, y[n : 2 * n], y[2 * n + 2 :])[stop])
 
 
-def _corrected_time(view: StepView, stop: int, t: float, earliest: float) -> float:
+def indentation_rate(equations: Equations, stop: int, t: float, y: Real) -> float:
+    """Return the rate of the indentation of a stop [m/s]."""
+    return -_gap_rate(equations, stop, t, y)
+
+
+def _corrected_time(view: StepView, guard: Guard, stop: int, t: float, earliest: float) -> float:
     """Return the time at which a gap closes, from the approximate time t by the dense output.
 
     The gap is that of a step that ends close to this time, see :meth:`prbm.hybrid.arc.Arc.cut`.
@@ -230,12 +287,13 @@ def _corrected_time(view: StepView, stop: int, t: float, earliest: float) -> flo
     effect and be located again and again.
     """
     equations = view.equations
+    closing_rate = _gap_rate if guard is gap else indentation_rate
     if t <= view.arc.start:
         return t
     cut = view.located(stop, t)
     for _ in range(EVENT_CORRECTIONS_MAX):
         y = equations.project(t, cut.at(t))
-        size, rate = gap(equations, stop, t, y), _gap_rate(equations, stop, t, y)
+        size, rate = guard(equations, stop, t, y), closing_rate(equations, stop, t, y)
         if rate >= 0.0 or abs(size) <= EVENT_TIME_ATOL * abs(rate):
             break
         change = -size / rate
@@ -251,7 +309,7 @@ def reversal_time(view: StepView, guard: Guard, contact: int) -> float | None:
     When slip begins, the velocity is round-off of either sign.  The contact then reverses only if
     its velocity at the end of the step is negative in the direction of slip.
     """
-    equations, (times, e, v) = view.equations, view.samples
+    equations, (times, e, v, _) = view.equations, view.samples
     rows, i = equations.slip_rows(contact)
     z = equations.contacts.modes[contact].slip * rows.rates(e, v)[:, i]
     begins = bool(z[0] <= view.scales.zero_speed)
@@ -259,6 +317,19 @@ def reversal_time(view: StepView, guard: Guard, contact: int) -> float | None:
         if z[j] > 0.0 >= z[j + 1]:
             return fall_time(view.along(guard, contact), times[j], times[j + 1])
     return float(times[1]) if begins and z[-1] < 0.0 else None
+
+
+def switching_time(view: StepView, guard: Guard, stop: int) -> float | None:
+    """Return when the phase of a pressed stop changes."""
+    equations, (times, _, _, _) = view.equations, view.samples
+    touching = equations.contacts.touching[stop]
+    z = view.along(guard, stop)
+    if touching is not None and touching.phase is Phase.RISING:
+        seen = [(float(t), z(float(t))) for t in times[:: GUARD_INTERVALS // 2]]
+        return _first_fall(z, seen)
+    _, rates = view.gaps_and_rates
+    margins = [switching_margin(equations, stop, -float(rate)) for rate in rates[:, stop]]
+    return _first_fall(z, list(zip(times.tolist(), margins, strict=True)))
 
 
 def release_time(view: StepView, guard: Guard, stop: int) -> float | None:

@@ -10,42 +10,11 @@ from ..base.tolerances import IMPACT_COUNT_MAX, REACTION_RANK_RTOL, SHORTEST_FLI
 from ..mechanics import contact, forces
 from ..mechanics.arrays import Real
 from ..mechanics.modal import fundamental_at, simulated_restitution
+from . import compliant
 from .configuration import Configuration, contact_names
 from .contact_modes import equations_holding, find_holding_stops, mobility, settle
 from .front import Front, Latched
-
-
-@dataclass(frozen=True, repr=False)
-class Impact:
-    """An impact in a record.
-
-    Parameters
-    ----------
-    stop : str
-        Name of the stop.
-    time : float
-        Time of the impact [s].
-    q : (n,)
-        Angles [rad].
-    before, after : (n,)
-        Rates before and after the impact [rad/s].
-    impulse : float
-        Normal impulse, > 0 pushes [N s].
-    latched : Latched
-        The outputs of the stop after the impact.
-    """
-
-    stop: str
-    time: float
-    q: Real
-    before: Real
-    after: Real
-    impulse: float
-    latched: Latched
-
-    def __repr__(self) -> str:
-        closing, opening = self.latched.approach_speed, self.latched.rebound_speed
-        return f"<Impact on {self.stop} at {self.time:.6g} s: {closing:.4g} to {opening:.4g} m/s>"
+from .records import Impact
 
 
 @dataclass(frozen=True)
@@ -81,14 +50,20 @@ def impact(configuration: Configuration, front: Front, hit: int) -> tuple[Front,
     SimulationError
         If no impulses satisfy the laws of contact.
     """
+    stops = configuration.mechanism.stops
+    if stops[hit].compliant:
+        return compliant.touch(configuration, front, hit), []
     gaps, rates = front.gaps_and_rates()
     near, zero = configuration.scales.touching, configuration.scales.zero_speed
     struck = [
-        i for i in front.contacts.open_stops if rates[i] < 0.0 and (i == hit or gaps[i] <= near)
+        i
+        for i in front.contacts.open_stops
+        if rates[i] < 0.0 and (i == hit or gaps[i] <= near) and not stops[i].compliant
     ]
     if not struck:
         resting = [hit] if abs(rates[hit]) <= zero else []
         return settle(configuration, front, resting=resting), []
+    front = compliant.unsettled(front)
     held = list(front.contacts.held)
     soft = [i for i in struck if _captured(configuration, front, i, held, float(-rates[i]))]
     restitution = np.array(
@@ -99,7 +74,7 @@ def impact(configuration: Configuration, front: Front, hit: int) -> tuple[Front,
     front, impacts = _after_impact(configuration, front, counted, impulses)
     _, rates = front.gaps_and_rates()
     resting = [i for i in (*struck, *held) if rates[i] <= zero]
-    front = front.with_contacts(front.contacts.opened())
+    front = compliant.rephased(front.with_contacts(front.contacts.opened()))
     return settle(configuration, front, resting=resting), impacts
 
 
@@ -147,10 +122,10 @@ def _captured(
     if speed < configuration.stop_value(stop, "rest_speed"):
         return True
     equations = equations_holding(scales, landed, holding)
-    lam = equations.evaluate(front.time, landed.q, after).lam
+    evaluation = equations.at(front.time, landed.y)
     e, M, loops = equations.mass_and_loops(landed.q)
     G = configuration.system.gap_rows.jacobian(e)[[stop]]
-    pressing = float(equations.stop_forces(lam)[stop]) * mobility(M, loops, G)
+    pressing = float(equations.stop_forces(evaluation.lam)[stop]) * mobility(M, loops, G)
     return 2.0 * speed < pressing * SHORTEST_FLIGHT_RTOL * scales.time
 
 
@@ -194,7 +169,7 @@ def _impulses_without_friction(
     G = configuration.system.gap_rows.jacobian(e)[partners]
     X = contact.response(M, loops, G)
     W = G @ X + np.diag(mobilities[partners])
-    u = front.equations.gap_rates(front.time, e, front.v)[partners]
+    u = front.gaps_and_rates()[1][partners]
     restitutions = np.concatenate([restitution, np.zeros(len(held))])
     P = contact.newton(W, np.minimum(u, 0.0), restitutions, configuration.scales.speed)
     return Impulses(front.v + X @ P, dict(zip(partners, P.tolist(), strict=True)), {})

@@ -6,7 +6,8 @@ import numpy as np
 
 from ..mechanics import contact, forces
 from ..mechanics.arrays import Complex, Real
-from ..mechanics.dynamics import Equations, base_reaction
+from ..mechanics.compliant_stops import Extra
+from ..mechanics.dynamics import Equations, Evaluation, base_reaction
 from ..mechanics.kinetics import kinetic_energy
 from ..mechanics.stress import stresses
 from ..mechanics.system import ANGLE, STRAIN, System
@@ -15,6 +16,14 @@ from .front import Latched
 from .peaks import PeakRecord
 
 Outputs = dict[str, float | int | bool]
+
+LATCHED = (
+    "impact_count", "impact_time", "approach_speed", "rebound_speed", "impulse", "energy_lost",
+    "modal_restitution", "impulse_sum",
+)  # fmt: skip
+"""Latched outputs of all stops."""
+COMPLIANT = ("peak_force", "indentation", "contact_duration")
+"""Further latched outputs of compliant stops."""
 
 
 def all_outputs(
@@ -35,7 +44,7 @@ def all_outputs(
         The last impact of each stop.
     peaks : PeakRecord
         The peaks of the stress.
-    t, y : float, (2 n + 2,)
+    t, y : float, (2 n + 2 + 4 c,)
         Time [s] and state.
     others : mapping
         Values of the constant outputs.
@@ -43,22 +52,28 @@ def all_outputs(
     system, n = equations.system, equations.n
     q, v = y[:n], y[n : 2 * n]
     e = system.directions(q)
-    a, lam, M, _ = equations.evaluate(t, q, v)
+    evaluation, extras = equations.at(t, y), y[2 * n + 2 :]
+    a, M, own = evaluation.a, evaluation.M, equations.compliant
     out: Outputs = {**motions(system, q, v, e)}
-    out |= _stops(equations, t, e, v, lam, M)
+    out |= _stops(equations, t, y, e, evaluation)
     force, moment = base_reaction(equations, q, v, a)
     out["base.force.x"], out["base.force.y"] = force.real, force.imag
     out["base.moment"] = moment
     out["energy.kinetic"] = kinetic_energy(M, v)
-    out["energy.elastic"] = forces.elastic_energy(system.K, q - system.q0)
+    contact_energy = own.energy(equations.gaps(t, e, extras)) if own.stops else 0.0
+    out["energy.elastic"] = forces.elastic_energy(system.K, q - system.q0) + contact_energy
     out["energy.gravitational"] = forces.gravitational_energy(system, e)
     out["energy.dissipated"] = float(y[2 * n])
     out["energy.work"] = float(y[2 * n + 1])
     for i, stop in enumerate(system.mechanism.stops):
         out[f"{stop.name}.contact"] = equations.contacts.modes[i].closed
-        out |= {f"{stop.name}.{name}": x for name, x in vars(latched[i]).items()}
+        names = LATCHED + (COMPLIANT if stop.compliant else ())
+        out |= {f"{stop.name}.{name}": getattr(latched[i], name) for name in names}
+        if stop.compliant:
+            out[f"{stop.name}.impulse_sum"] = float(extras[own.index(i, Extra.IMPULSE)])
+            out[f"{stop.name}.contact_loss"] = float(extras[own.index(i, Extra.LOSS)])
     out |= _links(system, q, v)
-    out |= _stress(equations, peaks, (q, v, a, lam))
+    out |= _stress(equations, peaks, q, v, evaluation)
     out |= others
     return out
 
@@ -80,15 +95,17 @@ def motions(system: System, q: Real, v: Real, e: Complex) -> dict[str, float]:
 
 
 def _stops(
-    equations: Equations, t: float, e: Complex, v: Real, lam: Real, M: Real
+    equations: Equations, t: float, y: Real, e: Complex, evaluation: Evaluation
 ) -> dict[str, float]:
     """Return gaps, forces and the motions and mobilities of the hit points."""
     system = equations.system
     out = {}
-    gaps, rates = equations.gaps(t, e), equations.gap_rates(t, e, v)
+    n, M = equations.n, evaluation.M
+    v, extras = y[n : 2 * n], y[2 * n + 2 :]
+    gaps, rates = equations.gaps(t, e, extras), equations.gap_rates(t, e, v, extras)
     places, speeds = system.gap_rows.values(e), system.gap_rows.rates(e, v)
     G, loops = system.gap_rows.jacobian(e), equations.rows.jacobian(e)[: len(system.loops)]
-    pressed = equations.stop_forces(lam)
+    pressed = equations.stop_forces(evaluation.lam, evaluation.pressure)
     mobilities = np.diag(G @ contact.response(M, loops, G))
     for i, stop in enumerate(system.mechanism.stops):
         out[f"{stop.name}.gap"] = float(gaps[i])
@@ -112,11 +129,11 @@ def _links(system: System, q: Real, v: Real) -> dict[str, float]:
 
 
 def _stress(
-    equations: Equations, peaks: PeakRecord, at: tuple[Real, Real, Real, Real]
+    equations: Equations, peaks: PeakRecord, q: Real, v: Real, evaluation: Evaluation
 ) -> dict[str, float]:
-    """Return the stress of flexures and its peaks; ``at`` has q, v, a and the multipliers."""
-    out = {}
-    for (name, one), peak in zip(stresses(equations, *at).items(), peaks.peaks, strict=True):
+    """Return the stress of flexures and its peaks."""
+    out, found = {}, stresses(equations, q, v, evaluation)
+    for (name, one), peak in zip(found.items(), peaks.peaks, strict=True):
         out[f"{name}.stress_start"], out[f"{name}.stress_end"] = one.start, one.end
         out[f"{name}.stress"] = one.largest
         out[f"{name}.peak_stress"] = peak.stress

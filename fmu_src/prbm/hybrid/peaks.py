@@ -8,7 +8,7 @@ smooth there and the stress is largest at the same place.
 
 from dataclasses import dataclass, replace
 
-from ..mechanics.arrays import Real
+from ..mechanics.dynamics import Evaluation
 from ..mechanics.stress import Stress, stressed, stresses
 from .front import Front
 
@@ -145,29 +145,26 @@ class PeakRecord:
         if not self.peaks:
             return self
         known = self.passed().peaks if reached else self.peaks
-        a, lam, _, _ = front.equations.evaluate(front.time, front.q, front.v)
-        samples = _samples(front, a, lam)
+        samples = _samples(front, front.evaluate())
         pairs = zip(known, samples, strict=True)
         return PeakRecord(tuple(peak.restarted().after(sample) for peak, sample in pairs))
 
-    def stepped(self, front: Front, a: Real | None, lam: Real | None) -> "PeakRecord":
+    def stepped(self, front: Front, found: Evaluation | None) -> "PeakRecord":
         """Return the record after a step.
 
         Parameters
         ----------
         front : Front
             The end of the step.
-        a, lam : (n,), (r,) or None
-            Accelerations and multipliers there; None: to be computed.
+        found : Evaluation or None
+            Evaluation there; None: to be computed.
         """
         if not self.peaks:
             return self
-        if a is None or lam is None:
-            a, lam, _, _ = front.equations.evaluate(front.time, front.q, front.v)
-        return replace(self.passed(), ahead=_samples(front, a, lam))
+        return replace(self.passed(), ahead=_samples(front, found or front.evaluate()))
 
 
-def _samples(front: Front, a: Real, lam: Real) -> tuple[Sample, ...]:
+def _samples(front: Front, found: Evaluation) -> tuple[Sample, ...]:
     """Return the samples of all flexures at a front."""
-    found = stresses(front.equations, front.q, front.v, a, lam)
-    return tuple(Sample.of(front.time, one) for one in found.values())
+    every = stresses(front.equations, front.q, front.v, found)
+    return tuple(Sample.of(front.time, one) for one in every.values())

@@ -9,6 +9,7 @@ from ..mechanics.inputs import Inputs
 from ..mechanics.start import start_shape
 from ..mechanics.statics import release_velocity
 from ..mechanism.parts import value
+from .compliant import preloaded, rephased
 from .configuration import Configuration
 from .contact_modes import settle
 from .front import Front, Latched
@@ -41,20 +42,28 @@ def released(configuration: Configuration, inputs: Inputs, time: float) -> Front
     velocity = release_velocity(system, q, speed)
     stops = len(mechanism.stops)
     contacts = ContactState.free(stops, len(mechanism.frictions))
-    y = np.concatenate([q, velocity, np.zeros(2)])
     equations = configuration.equations(inputs, contacts)
-    front = Front(time, y, equations, (Latched(),) * stops).projected()
+    y = np.concatenate([q, velocity, np.zeros(2 + equations.compliant.size)])
+    front = Front(time, y, equations, (Latched(),) * stops, (None,) * stops).projected()
     check_walls(configuration, front)
     gaps, rates = front.gaps_and_rates()
-    for i in range(stops):
-        if gaps[i] <= RELEASE_PENETRATION_ATOL and rates[i] < 0.0:
+    for i in equations.compliant.stops:
+        if gaps[i] < 0.0:
+            front = preloaded(configuration, front, i)
+    for i in contacts.open_stops:
+        if (
+            gaps[i] <= RELEASE_PENETRATION_ATOL
+            and rates[i] < 0.0
+            and not front.contacts.touching[i]
+        ):
             front, _ = impact(configuration, front, i)
             break
-    return settle(configuration, front, resting=range(stops))
+    rigid = [i for i in range(stops) if i not in equations.compliant.stops]
+    return settle(configuration, rephased(front), resting=rigid)
 
 
 def check_walls(configuration: Configuration, front: Front) -> None:
-    """Reject a wall that is penetrated.
+    """Reject a rigid wall that is penetrated; the penetration of a compliant one is a preload.
 
     Raises
     ------
@@ -63,7 +72,7 @@ def check_walls(configuration: Configuration, front: Front) -> None:
     """
     gaps, _ = front.gaps_and_rates()
     for i, stop in enumerate(configuration.mechanism.stops):
-        if gaps[i] < -RELEASE_PENETRATION_ATOL:
+        if gaps[i] < -RELEASE_PENETRATION_ATOL and not stop.compliant:
             wall = front.inputs.walls[i].position
             raise ParameterError(
                 f"the wall {stop.name} is penetrated by {-gaps[i]:.6g} m at release: "

@@ -43,8 +43,7 @@ class RestForces:
 def rest_forces(
     equations: Equations,
     t: float,
-    q: Real,
-    v: Real,
+    y: Real,
     stops: Sequence[int],
     slips: Sequence[int],
     at_rest: Sequence[int],
@@ -57,8 +56,8 @@ def rest_forces(
         Equations in which all stops are open, and friction points at rest have no friction.
     t : float
         Time, at which the accelerations of the walls are taken [s].
-    q, v : (n,)
-        Angles and rates [rad], [rad/s].
+    y : (2 n + 2 + 4 c,)
+        State.
     stops : sequence of int
         Stops that touch.
     slips : sequence of int
@@ -66,9 +65,10 @@ def rest_forces(
     at_rest : sequence of int
         Contacts with friction that do not slide: those of ``stops`` and of the friction points.
     """
-    e, M, loops = equations.mass_and_loops(q)
-    system, is_stop = equations.system, equations.contacts.is_stop
-    a, n, k = equations.evaluate(t, q, v).a, equations.n, len(stops)
+    n, k = equations.n, len(stops)
+    v, (e, M, loops) = y[n : 2 * n], equations.mass_and_loops(y[:n])
+    system, evaluation = equations.system, equations.at(t, y)
+    a = evaluation.a
     G = system.gap_rows.jacobian(e)[list(stops)]
     T = np.reshape([equations.slip_row(c, e) for c in at_rest], (-1, n))
     # The normal force of a stop that slides acts together with its friction.
@@ -79,10 +79,13 @@ def rest_forces(
     rows, pushes = np.vstack([G, T]), np.vstack([G - np.reshape(rubs, (-1, n)), T])
     W = rows @ contact.response(M, loops, pushes)
     slide = [equations.slip_acceleration(c, e, v, a) for c in at_rest]
-    u = np.concatenate([equations.gap_accelerations(t, e, v, a)[list(stops)], slide])
-    friction = np.array([equations.stop_friction[c] if is_stop(c) else 0.0 for c in at_rest])
-    fixed = np.array([0.0 if is_stop(c) else equations.friction_limit(c, e) for c in at_rest])
-    normal = np.array([list(stops).index(c) if is_stop(c) else -1 for c in at_rest], int)
+    opening = equations.gap_accelerations(t, e, v, a, evaluation.pressure)
+    u = np.concatenate([opening[list(stops)], slide])
+    friction = np.array([equations.stop_friction[c] if c in stops else 0.0 for c in at_rest])
+    fixed = np.array([
+        0.0 if c in stops else equations.friction_limit(c, e, evaluation.pressure) for c in at_rest
+    ])  # fmt: skip
+    normal = np.array([list(stops).index(c) if c in stops else -1 for c in at_rest], int)
     tolerance = COMPLEMENTARITY_RTOL * float(np.abs(u).max(initial=0.0))
     P = coulomb(W, u, friction, fixed, normal, tolerance)
     if P is None:

@@ -27,25 +27,31 @@ from ..base.tolerances import (
 )
 from ..mechanics.arrays import Real
 from ..mechanics.contact_state import ContactState
-from ..mechanics.dynamics import Equations
+from ..mechanics.dynamics import Equations, Evaluation
 from ..mechanics.inputs import WALL_INPUTS, Inputs, Wall, impulse_names
 from ..mechanics.stress import SectionStresses, section_stresses
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from ..mechanism.parameters import number
-from . import contact_modes, events, impacts, snapshot, walls
+from . import compliant, contact_modes, events, impacts, snapshot, walls
 from .arc import Arc, Node
 from .configuration import Configuration, Magnitudes
 from .events import Event, EventKind, EventWindow
 from .front import Front, Latched
 from .given import changed_values, checked_times, start_values
 from .guards import StepView
-from .impacts import Impact
 from .outputs import Outputs, all_outputs, motions
 from .peaks import PeakRecord
+from .records import Impact
 from .release import released
 from .stability import FastestMode
-from .stepping import StepSizeController, check_projection, closed, error_norm, take_step
+from .stepping import (
+    StepSizeController,
+    check_projection,
+    closed,
+    error_norm,
+    take_step,
+)
 
 
 class Simulation:
@@ -238,10 +244,10 @@ class Simulation:
 
     def _advance(self, time: float) -> None:
         """Continue the motion to a later time."""
+        present = compliant.present_walls(replace(self.front, time=self.time), self.state)
         self.course, moved = walls.join(
-            self.configuration, self.prepared, self.given, self.course, self.inputs.walls,
-            self.time, time,
-        )  # fmt: skip
+            self.configuration, self.prepared, self.given, self.course, present, self.time, time
+        )
         if self.changed or moved != self.inputs.walls:
             self._restart(moved)
         last = self.step_count + EFFORT_MAX
@@ -262,18 +268,20 @@ class Simulation:
 
     def _restart(self, moved: tuple[Wall, ...]) -> None:
         """Continue from the present state with the present inputs, walls and parameters."""
-        given = _impulses(self.mechanism, self.given)
-        configuration = self.prepared
+        given, configuration = _impulses(self.mechanism, self.given), self.prepared
+        self.front = compliant.latched_until(self.configuration, self.front, self.arc, self.time)
         pushed = not np.array_equal(given, self.received)
         y = self._end_of_step(shown=pushed)
         if configuration is not self.configuration:
             moved = walls.keeping_gaps(self.system, configuration.system, y, moved)
         inputs = Inputs.of(self.mechanism, self.given, moved)
         equations = configuration.equations(inputs, self.contacts)
-        front = Front(self.time, y, equations, self.latched)
+        front = Front(self.time, y, equations, self.latched, self.front.touches)
+        front, _ = compliant.fold_gives(front, equations.compliant.stops)
         if pushed:
             front = impacts.receive(front, given - self.received)
         front, struck = contact_modes.release_moving(configuration, front)
+        front = compliant.rephased(front)
         counted: list[Impact] = []
         if struck is None:
             front = contact_modes.settle(configuration, front.projected())
@@ -296,7 +304,14 @@ class Simulation:
     def _apply(self, event: Event) -> None:
         """Apply an event at the front."""
         self.window = self.window.counting(event, self.configuration.scales)
-        self._set_front(*events.apply(self.configuration, self.front, event))
+        front = compliant.latched_until(self.configuration, self.front, self.arc, event.time)
+        self._set_front(*events.apply(self.configuration, front, event))
+        if event.kind is EventKind.IMPACT:
+            self.controller, self.front = compliant.shortened(
+                self.controller, self.front, event.contact
+            )
+        elif event.kind is EventKind.SEPARATION:
+            self.controller = compliant.lengthened(self.controller, front.touches[event.contact])
 
     def _set_front(self, front: Front, counted: list[Impact]) -> None:
         """Continue from a front without the step that led there."""
@@ -308,30 +323,33 @@ class Simulation:
     def _take_step(self) -> None:
         """Take one step from the front, up to the first event within it."""
         self.step_count += 1
-        front = walls.arrived(self.front)
-        if front is not self.front:
-            self._set_front(front, [])
+        front, counted = compliant.settled(self.configuration, walls.arrived(self.front), self.arc)
+        if front.equations is not self.front.equations:
+            for i in set(self.front.contacts.pressed) & set(front.contacts.held):
+                self.controller = compliant.lengthened(self.controller, front.touches[i])
+            self._set_front(front, counted)
+        self.front = front
         configuration, equations = self.configuration, front.equations
         last = self.arc
         if self.k1 is None:
             self.k1 = equations.rate(front.time, front.y)
         step, controller = take_step(configuration, front, self.k1, self.controller, self.fastest)
         if step.h > STABLE_STEP_WATCH_FACTOR * self.fastest.longest_step(equations):
-            self.fastest = self.fastest.refined(equations, step.factors)
-        before = last.start_before(step.h) if last else None
-        arc = Arc(front.time, step.h, front.time + step.h, front.y, step.k, before)
+            self.fastest = self.fastest.refined(equations, step.last.factors)
+        n, before = equations.n, last.start_before(step.h) if last else None
+        arc = Arc(front.time, step.h, front.time + step.h, front.y, step.k, n, before)
         view = StepView(configuration.scales, equations, arc, step.forces)
         event = events.first_event(view)
+        found: Evaluation | None = None
         if event is None:
-            y, self.k1 = step.y, step.k[-1]
-            a, lam = step.k[-1][equations.n : 2 * equations.n], step.forces[-1]
+            y, self.k1, found = step.y, step.k[-1], step.last
         else:
             # The event does not shorten the next step.
             controller = StepSizeController(step.h, controller.last_error)
             event, arc, y = _cut(configuration, event, view)
-            self.k1 = a = lam = None
-        self.front = Front(arc.end, y, equations, front.latched)
-        self.peaks = self.peaks.stepped(self.front, a, lam)
+            self.k1 = None
+        self.front = replace(front, time=arc.end, y=y)
+        self.peaks = self.peaks.stepped(self.front, found)
         self.arc, self.pending, self.controller = arc, event, controller
 
     def check_effort(self, step: float) -> None:
@@ -347,12 +365,15 @@ class Simulation:
     # -- state and outputs --
 
     def state(self) -> Real:
-        """Return y = (q, v, dissipated energy, work) at the present time, on the constraints."""
+        """Return y = (q, v, dissipated energy, work) at the present time, on the constraints.
+
+        The states of compliant stops follow, see :mod:`prbm.mechanics.compliant_stops`.
+        """
         if self.arc is None or self.time >= self.front.time:
             return self.front.y
         # The present equations are those of the step that passes the present time.
-        n, y = self.system.n, self._interpolated(self.arc)
-        evaluation = self.equations.evaluate(self.time, y[:n], y[n : 2 * n])
+        y = self._interpolated(self.arc)
+        evaluation = self.equations.at(self.time, y)
         projected = self.equations.project_near(self.time, y, evaluation.factors)
         check_projection(self.configuration, self.time, y, projected)
         return projected
@@ -365,8 +386,7 @@ class Simulation:
         """
         y, n = self.state(), self.system.n
         q, v = y[:n], y[n : 2 * n]
-        a, lam, _, _ = self.equations.evaluate(self.time, q, v)
-        return section_stresses(self.equations, q, v, a, lam)
+        return section_stresses(self.equations, q, v, self.equations.at(self.time, y))
 
     def _interpolated(self, arc: Arc) -> Real:
         """Return the state at the present time in a step, not projected.
@@ -376,12 +396,13 @@ class Simulation:
         much, a step to the present time replaces them.
         """
         dense, scales = arc.at(self.time), self.configuration.scales
-        embedded = error_norm(scales, arc.embedded_error, arc.y, arc.y)
+        core = 2 * self.system.n + 2
+        embedded = error_norm(scales, arc.embedded_error[:core], arc.y[:core], arc.y[:core])
         exact = embedded <= DENSE_FACTOR * self.configuration.tolerance
         if (exact and not self.configuration.step) or arc.h < NODE_STEP_RTOL * scales.time:
             return dense
         y = arc.through(arc.before or self._middle_of(arc), self.time)
-        difference = error_norm(scales, y - dense, dense, y)
+        difference = error_norm(scales, (y - dense)[:core], dense[:core], y[:core])
         if difference <= INTERPOLATION_FACTOR * self.configuration.tolerance:
             return y
         return arc.cut(self.equations.rate, self.time)[1]
@@ -404,8 +425,9 @@ class Simulation:
         if self._output_cache is None or self._output_cache[0] != self.time:
             constant = {"mode.frequency": self.frequency, **self.configuration.calculated}
             peaks = self.peaks.passed() if self.time >= self.front.time else self.peaks
+            front = compliant.latched_until(self.configuration, self.front, self.arc, self.time)
             out = all_outputs(
-                self.equations, self.latched, peaks, self.time, self.state(), constant
+                self.equations, front.latched, peaks, self.time, self.state(), constant
             )
             self._output_cache = (self.time, out)
         return dict(self._output_cache[1])
@@ -511,7 +533,7 @@ def _cut(configuration: Configuration, event: Event, view: StepView) -> tuple[Ev
     unique there.
     """
     arc, equations = view.arc, view.equations
-    if event.kind is EventKind.IMPACT and event.time > arc.start:
+    if event.kind in (EventKind.IMPACT, EventKind.SEPARATION) and event.time > arc.start:
         arc = view.cut(event.contact, event.time)
     try:
         y = closed(configuration, equations, event.time, arc.at(event.time))

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from ..mechanics.arrays import Real
-from ..mechanics.contact_state import ContactMode, ContactState
+from ..mechanics.contact_state import ContactMode, ContactState, Phase, Touching
 from ..mechanics.inputs import Inputs, Wall
 from .arc import Arc, Node
 from .configuration import Configuration
 from .events import Event, EventKind
-from .front import Front, Latched
+from .front import Front, Latched, Touch
 from .peaks import Peak, PeakRecord, Sample
 from .stability import FastestMode
 from .walls import Course
@@ -49,20 +49,35 @@ def plain_front(front: Front) -> Plain:
         "y": front.y.tolist(),
         "inputs": plain_inputs(front.inputs),
         "modes": [int(mode) for mode in front.contacts.modes],
+        "touching": [asdict(one) if one else None for one in front.contacts.touching],
         "latched": [asdict(latched) for latched in front.latched],
+        "touches": [asdict(touch) if touch else None for touch in front.touches],
     }
 
 
 def front_of(plain: Mapping[str, Any], configuration: Configuration) -> Front:
     """Return a front from plain values, the inverse of :func:`plain_front`."""
     modes = tuple(ContactMode(mode) for mode in plain["modes"])
-    contacts = ContactState(modes, len(configuration.mechanism.stops))
+    touching = tuple(
+        Touching(Phase(one["phase"]), one["reference_speed"], one["depth"]) if one else None
+        for one in plain["touching"]
+    )
+    contacts = ContactState(modes, len(configuration.mechanism.stops), touching)
     return Front(
         plain["time"],
         np.array(plain["y"]),
         configuration.equations(inputs_of(plain["inputs"]), contacts),
         tuple(Latched(**latched) for latched in plain["latched"]),
+        tuple(touch_of(touch) for touch in plain["touches"]),
     )
+
+
+def touch_of(plain: Mapping[str, Any] | None) -> Touch | None:
+    """Return the begin of a contact from plain values."""
+    if plain is None:
+        return None
+    arrays = {name: tuple(plain[name]) for name in ("q", "v", "momentum")}
+    return Touch(**{**plain, **arrays})
 
 
 def course_of(plain: Mapping[str, Any]) -> Course:
@@ -76,7 +91,7 @@ def plain_arc(arc: Arc | None) -> Plain | None:
         return None
     return {
         "start": arc.start, "h": arc.h, "end": arc.end, "y": arc.y.tolist(), "k": arc.k.tolist(),
-        "before": plain_node(arc.before),
+        "n": arc.n, "before": plain_node(arc.before),
     }  # fmt: skip
 
 
@@ -89,7 +104,7 @@ def arc_of(plain: Mapping[str, Any] | None) -> Arc | None:
     node = (
         Node(before["time"], np.array(before["y"]), np.array(before["rates"])) if before else None
     )
-    return Arc(start, h, end, np.array(plain["y"]), np.array(plain["k"]), node)
+    return Arc(start, h, end, np.array(plain["y"]), np.array(plain["k"]), plain["n"], node)
 
 
 def plain_node(node: Node | None) -> Plain | None:

@@ -48,7 +48,7 @@ class FastestMode:
             If the equations are singular.
         """
         n = equations.n
-        factors = equations.evaluate(t, y[:n], y[n : 2 * n]).factors
+        factors = equations.at(t, y).factors
         mode = cls(1.0 / np.arange(1.0, n + 1.0))
         for _ in range(FASTEST_ITERATIONS_MAX):
             last, mode = mode.rate, mode.refined(equations, factors)

@@ -16,9 +16,11 @@ import numpy as np
 
 from ..base.errors import SimulationError
 from ..base.tolerances import (
+    CONTACT_ERROR_FACTOR,
     FIRST_RATE_MIN,
     FIRST_STEP_EXPONENT,
     FIRST_STEP_FACTOR,
+    INDENTATION_MIN_RTOL,
     PROJECTION_FACTOR,
     STEP_ERROR_FACTOR,
     STEP_ERROR_MIN,
@@ -31,7 +33,7 @@ from ..base.tolerances import (
     STEP_TREND_FACTOR,
 )
 from ..mechanics.arrays import Real
-from ..mechanics.constraints import Factors
+from ..mechanics.compliant_stops import Extra
 from ..mechanics.dynamics import Equations, Evaluation
 from .configuration import Configuration, Scales
 from .front import Front
@@ -116,8 +118,8 @@ class Step(NamedTuple):
         Error divided by the allowed error.
     forces : (stages - 1, r)
         Constraint forces of all stages but the first [N].
-    factors : Factors
-        Factors of the equations at the end.
+    last : Evaluation
+        Evaluation at the end, before the projection.
     """
 
     h: float
@@ -125,7 +127,7 @@ class Step(NamedTuple):
     y: Real
     error: float
     forces: Real
-    factors: Factors
+    last: Evaluation
 
 
 def take_step(
@@ -222,7 +224,8 @@ def check_size(t: float, h: float) -> None:
 
 def first_step(configuration: Configuration, y: Real, k1: Real) -> float:
     """Return a first step size from the size of the rates [1, II.4] [s]."""
-    rate = k1 / configuration.scales.of_state(y)
+    core = 2 * configuration.system.n + 2
+    rate = k1[:core] / configuration.scales.of_state(y[:core])
     size = math.sqrt(float(rate @ rate) / len(rate))
     accuracy = math.pow(configuration.tolerance, FIRST_STEP_EXPONENT)
     longest = FIRST_STEP_FACTOR * accuracy / max(size, FIRST_RATE_MIN)
@@ -248,10 +251,14 @@ def compute_step(
 
     with np.errstate(over="ignore", invalid="ignore"):
         k, y1 = stages(PAIR, rate, t, y, h, k1)
-        error = step_error(configuration.scales, h, k, y, y1)
+        core = 2 * equations.n + 2
+        error = step_error(configuration.scales, h, k[:, :core], y[:core], y1[:core])
+        if equations.pressed:
+            contacts = contact_error(configuration.scales, equations, h, k, y, y1)
+            error = max(error, contacts / CONTACT_ERROR_FACTOR)
     error /= STEP_ERROR_FACTOR * configuration.tolerance
     forces = np.array([evaluation.lam for evaluation in evaluations])
-    return Step(h, k, y1, error, forces, evaluations[-1].factors)
+    return Step(h, k, y1, error, forces, evaluations[-1])
 
 
 def projected(configuration: Configuration, equations: Equations, t: float, step: Step) -> Step:
@@ -262,7 +269,7 @@ def projected(configuration: Configuration, equations: Equations, t: float, step
     SimulationError
         If the loops cannot be closed, or as :func:`check_projection`.
     """
-    y = equations.project_near(t + step.h, step.y, step.factors)
+    y = equations.project_near(t + step.h, step.y, step.last.factors)
     check_projection(configuration, t + step.h, step.y, y)
     return step._replace(y=y)
 
@@ -279,7 +286,8 @@ def check_projection(configuration: Configuration, t: float, y: Real, projected:
     SimulationError
         If the change relative to the state is too large.
     """
-    change = error_norm(configuration.scales, projected - y, y, projected)
+    core = 2 * configuration.system.n + 2
+    change = error_norm(configuration.scales, (projected - y)[:core], y[:core], projected[:core])
     largest = PROJECTION_FACTOR * math.sqrt(configuration.tolerance)
     if not (change <= largest or configuration.step):
         raise SimulationError(
@@ -316,6 +324,36 @@ def step_error(scales: Scales, h: float, k: Real, y: Real, y1: Real) -> float:
     coarse = root_mean_square(h * PAIR.coarse_error.dot(k) / scale)
     size = math.sqrt(fine * fine + coarse * coarse)
     return fine * fine / size if size > 0.0 else size
+
+
+def contact_error(
+    scales: Scales, equations: Equations, h: float, k: Real, y: Real, y1: Real
+) -> float:
+    """Return the error of the indentations of pressed stops and of their rates, as `step_error`.
+
+    The scales are the reference speed of the contact and the largest of the indentation, the
+    distance at this speed in the step, and a fraction of the size of the mechanism.
+    """
+    n, own, largest = equations.n, equations.compliant, 0.0
+    e = equations.system.directions(y[:n])
+    rows = equations.system.gap_rows.jacobian(e)
+    fine, coarse = h * (PAIR.error @ k), h * (PAIR.coarse_error @ k)
+    for i in equations.pressed:
+        touching = equations.contacts.touching[i]
+        assert touching is not None
+        speed = touching.reference_speed
+        give = 2 * n + 2 + own.index(i, Extra.GIVE)
+        depth = max(
+            abs(float(rows[i] @ (y1[:n] - y[:n]))), speed * h, INDENTATION_MIN_RTOL * scales.length
+        )
+        sizes = []
+        for difference in (fine, coarse):
+            d = (rows[i] @ difference[:n] + difference[give]) / depth
+            rate = (rows[i] @ difference[n : 2 * n] + difference[give + 1]) / speed
+            sizes.append(math.hypot(float(d), float(rate)))
+        size = math.hypot(*sizes)
+        largest = max(largest, sizes[0] ** 2 / size if size > 0.0 else size)
+    return largest
 
 
 def error_norm(scales: Scales, difference: Real, y: Real, y1: Real) -> float:

@@ -129,7 +129,12 @@ def keeping_gaps(old: System, new: System, y: Real, walls: tuple[Wall, ...]) -> 
     walls : (s,) tuple of Wall
         Motions of the walls, which join their references from now on if their gaps jump.
     """
-    e, v, before, after = new.directions(y[: new.n]), y[new.n : -2], old.gap_rows, new.gap_rows
+    e, v, before, after = (
+        new.directions(y[: new.n]),
+        y[new.n : 2 * new.n],
+        old.gap_rows,
+        new.gap_rows,
+    )
     jumps = after.values(e) - before.values(e)
     turns = after.rates(e, v) - before.rates(e, v)
     return tuple(

@@ -15,6 +15,7 @@ from .variables import (
     Scales,
     Variable,
     check_names,
+    compliant_states,
     nearest_power_of_ten,
     scales,
 )
@@ -92,13 +93,17 @@ def native_interface(
     nominal = scales(mechanism, sample)
     names = coordinate_variables(mechanism)
     angles, rates = (tuple(names[j][order] for j in independent) for order in (0, 1))
-    states = (*angles, *rates, *STORED)
+    contacts = compliant_states(mechanism)
+    states = (*angles, *rates, *STORED, *contacts)
     sizes = {
         name: magnitudes.strain if name.endswith(".strain") else magnitudes.angle for name in angles
     }
     sizes |= dict.fromkeys(rates, magnitudes.rate) | dict.fromkeys(STORED, magnitudes.energy)
+    for name in contacts:
+        impulse = name.endswith(".impulse_sum")
+        sizes[name] = magnitudes.impulse if impulse else magnitudes.energy
     nominals = {name: nearest_power_of_ten(size) for name, size in sizes.items()}
-    accelerations = state_derivatives(names, independent)
+    accelerations = state_derivatives(mechanism, names, independent)
     indicators = tuple(_indicators(mechanism))
     clocks = tuple(f"{stop.name}.impact" for stop in mechanism.stops) if clock else ()
     listed = (
@@ -128,12 +133,12 @@ def coordinate_variables(mechanism: Mechanism) -> tuple[tuple[str, str], ...]:
 
 
 def state_derivatives(
-    coordinates: Sequence[tuple[str, str]], independent: Sequence[int]
+    mechanism: Mechanism, coordinates: Sequence[tuple[str, str]], independent: Sequence[int]
 ) -> tuple[str, ...]:
     """Return the names of the state derivatives that only model exchange has as variables."""
     return (
         *(f"der({coordinates[j][1]})" for j in independent),
-        *(f"der({name})" for name in STORED),
+        *(f"der({name})" for name in (*STORED, *compliant_states(mechanism))),
     )
 
 
@@ -154,6 +159,8 @@ def _derivative(name: str, nominal: Scales) -> Variable:
     unit, description = {
         "omega": ("rad/s2", f"Angular acceleration of {owner}"),
         "strain_rate": ("1/s2", f"Rate of the strain rate of {owner}"),
+        "impulse_sum": ("N", f"Force of the wall at {owner}"),
+        "contact_loss": ("W", f"Power lost in the contact at {owner}"),
     }.get(rate, ("W", DERIVATIVES.get(state, "")))
     return Variable(
         name, description, "local", "continuous", "calculated", unit,

@@ -14,11 +14,13 @@ from ..mechanism.description import Mechanism
 from .native import NativeInterface
 from .variables import (
     BASE_OUTPUTS,
+    COMPLIANT_OUTPUTS,
     INDICATORS,
     LATCHED,
     PEAK_OUTPUTS,
     STORED,
     STRESS_OUTPUTS,
+    compliant_states,
 )
 
 Dependencies = Mapping[str, tuple[str, ...]]
@@ -60,13 +62,18 @@ def dependencies(mechanism: Mechanism, interface: NativeInterface) -> Dependenci
         found |= {f"{stop}.point.{output}": shape for output in ("displacement", "mobility")}
         found[f"{stop}.point.velocity"] = moving
         found[f"{stop}.impact"] = moving + walls
+    for stop in (s.name for s in mechanism.stops if s.compliant):
+        found |= {f"{stop}.{output}": () for output in COMPLIANT_OUTPUTS}
     for flexure in (mechanism.flexures[i].name for i in stressed(mechanism)):
         found |= {f"{flexure}.{output}": everything for output in STRESS_OUTPUTS}
         found |= {f"{flexure}.{output}": () for output in PEAK_OUTPUTS}
     found |= {name: everything for name in interface.indicators}
     found |= {"energy.kinetic": moving, "energy.elastic": shape, "energy.gravitational": shape}
+    if any(stop.compliant for stop in mechanism.stops):
+        found["energy.elastic"] = everything  # Walls press.
     found |= {name: everything for name in interface.derivatives}
-    found |= {name: (name,) for name in (*moving, *STORED)}  # A state depends on itself only.
+    # A state depends on itself only.
+    found |= {name: (name,) for name in (*moving, *STORED, *compliant_states(mechanism))}
     outputs = (v.name for v in interface.variables if v.causality == "output")
     missing = [name for name in outputs if name not in found]
     if missing:

@@ -38,6 +38,7 @@ from .variables import (
     BASE_OUTPUTS,
     BODY_OUTPUTS,
     CLOCK,
+    COMPLIANT_OUTPUTS,
     ENERGIES,
     INDICATORS,
     LATCHED,
@@ -49,7 +50,7 @@ from .variables import (
 )
 
 FILE = "mechanism.bin"
-MAGIC, VERSION = b"PRBM", 6
+MAGIC, VERSION = b"PRBM", 7
 HEAD = 16  # Bytes before those that the checksum covers.
 DIMENSIONS = (
     "end_thickness", "end_width", "notch_radius", "notch_depth", "waist_length", "curvature",
@@ -66,8 +67,9 @@ PLACES_MAX = 1024  # Largest number of forces, and of probes.
 GROUND_POINTS_MAX = 4096  # The kernel computes the distance of every pair of points.
 GROUND_NUMBER = 0  # Bodies are counted from 1.
 SLOT_GROUPS = (
-    "parameters", "inputs", "bodies", "stops", "base", "energies", "latched", "links", "stretches",
-    "probes", "stresses", "frequency", "calculated", "derivatives", "indicators", "time",
+    "parameters", "inputs", "bodies", "stops", "base", "energies", "latched", "compliant", "links",
+    "stretches", "probes", "stresses", "frequency", "calculated", "derivatives", "indicators",
+    "time",
 )  # fmt: skip
 """The groups of values in the order of the vector of all values."""
 FIXED_NAMES = ("gravity.x", "gravity.y", "solver.tolerance", "damping.zeta", "damping.beta")
@@ -165,6 +167,12 @@ def _groups(mechanism: Mechanism, independent: Sequence[int]) -> dict[str, Itera
         "base": BASE_OUTPUTS,
         "energies": ENERGIES,
         "latched": [f"{stop}.{output}" for stop in stops for output in LATCHED],
+        "compliant": [
+            f"{stop.name}.{output}"
+            for stop in mechanism.stops
+            if stop.compliant
+            for output in COMPLIANT_OUTPUTS
+        ],
         "links": links,
         "stretches": stretches,
         "probes": [f"{p.name}.{output}" for p in mechanism.probes for output in PROBE_OUTPUTS],
@@ -175,7 +183,7 @@ def _groups(mechanism: Mechanism, independent: Sequence[int]) -> dict[str, Itera
         ],
         "frequency": ["mode.frequency"],
         "calculated": [f"{name}.gamma0" for name in several],
-        "derivatives": state_derivatives(coordinates, independent),
+        "derivatives": state_derivatives(mechanism, coordinates, independent),
         "indicators": [
             *(f"{stop}.{kind}_indicator" for stop in stops for kind in INDICATORS),
             *(f"{friction.name}.slip_indicator" for friction in mechanism.frictions),
@@ -259,7 +267,8 @@ class _Writer:
         m = self.mechanism
         for stop in m.stops:
             yield _text(stop.name) + _u32(self.body[stop.body], self.body[stop.on])
-            yield self._point(stop.point) + _f64(stop.direction) + self._fields(stop)
+            yield self._point(stop.point) + _f64(stop.direction)
+            yield _u32(stop.compliant) + self._fields(stop)
         for friction in m.frictions:
             yield self._placed(friction) + _f64(friction.direction) + self._fields(friction)
         for force in m.forces:

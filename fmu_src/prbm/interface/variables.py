@@ -40,6 +40,9 @@ LATCHED = (
     "contact", "impact_count", "impact_time", "approach_speed", "rebound_speed", "impulse",
     "energy_lost", "modal_restitution", "impulse_sum",
 )  # fmt: skip
+COMPLIANT_OUTPUTS = ("peak_force", "indentation", "contact_duration", "contact_loss")
+"""Further outputs of compliant stops."""
+COMPLIANT_STORED = ("impulse_sum", "contact_loss")  # Those that are integrated, hence states.
 LINK_OUTPUTS = ("angle", "omega")
 STRETCH_OUTPUTS = ("strain", "strain_rate")
 FLEXURE_ANGLE = re.compile(r"^(link\[\d+\]|\w+\.(bend\[\d+\]|start|end))\.angle$")
@@ -275,7 +278,8 @@ def _variables(
     for probe in mechanism.probes:
         yield from _probe(probe.name, f"of {probe.point}", nominal)
     for stop in mechanism.stops:
-        yield from _stop(stop.name, nominal)
+        rigid = _stop(stop.name, nominal)
+        yield from _of_compliant_stop(rigid, stop.name, nominal) if stop.compliant else rigid
     yield from _base(nominal)
     yield from _energies(nominal)
     yield from _flexures(sample, nominal)
@@ -487,6 +491,52 @@ def _stop(stop: str, nominal: Scales) -> Iterator[Variable]:
     yield last("impulse_sum", "N.s", "Sum of all impulses of the wall, including captures", 0.0)
 
 
+COMPLIANT_DESCRIPTIONS = {
+    "force": "Force of the wall on the body",
+    "contact": "Whether the body touches the wall",
+    "impact_time": "Time of the first touch of the last impact",
+    "approach_speed": "Closing speed at the first touch of the last impact",
+    "rebound_speed": "Opening speed at the end of the last impact; 0 until then",
+    "impulse": "Impulse of the wall during the last impact; 0 until its end",
+    "energy_lost": "Energy lost during the last impact; 0 until its end",
+    "impulse_sum": "Integral of the force of the wall",
+}
+"""Descriptions of outputs that differ from those of a rigid stop."""
+
+
+def _of_compliant_stop(rigid: Iterator[Variable], stop: str, nominal: Scales) -> Iterator[Variable]:
+    """Yield the outputs of a compliant stop: those of a rigid stop, and further ones."""
+    for variable in rigid:
+        name = variable.name.removeprefix(f"{stop}.")
+        described = COMPLIANT_DESCRIPTIONS.get(name, variable.description)
+        changed = replace(variable, description=described)
+        if name == "force":
+            changed = replace(changed, minimum=-math.inf)  # Round-off at the end of a contact.
+        yield replace(changed, variability="continuous") if name == "impulse_sum" else changed
+    yield _output(
+        f"{stop}.peak_force", "N", "Largest force since the first touch of the last impact",
+        nominal, minimum=0.0,
+    )  # fmt: skip
+    yield _output(
+        f"{stop}.indentation", "m", "Largest indentation since the first touch of the last impact",
+        nominal, minimum=0.0,
+    )  # fmt: skip
+    duration = _output(
+        f"{stop}.contact_duration", "s", "Duration of the last impact until the body separates or "
+        "settles; 0 until then", nominal, minimum=0.0,
+    )  # fmt: skip
+    yield replace(duration, variability="discrete")
+    yield _output(
+        f"{stop}.contact_loss", "J", "Energy lost in the contacts of the stop so far", nominal
+    )
+
+
+def compliant_states(mechanism: Mechanism) -> tuple[str, ...]:
+    """Return the outputs of compliant stops that are states of model exchange."""
+    stops = (stop.name for stop in mechanism.stops if stop.compliant)
+    return tuple(f"{stop}.{name}" for stop in stops for name in COMPLIANT_STORED)
+
+
 def _base(nominal: Scales) -> Iterator[Variable]:
     for axis in "xy":
         yield _output(
@@ -503,7 +553,8 @@ def _base(nominal: Scales) -> Iterator[Variable]:
 def _energies(nominal: Scales) -> Iterator[Variable]:
     yield _output("energy.kinetic", "J", "Kinetic energy", nominal, minimum=0.0)
     yield _output(
-        "energy.elastic", "J", "Elastic energy of the flexures, 0 in the straight shape", nominal,
+        "energy.elastic", "J",
+        "Elastic energy of the flexures and of compliant stops, 0 in the straight shape", nominal,
         minimum=0.0,
     )  # fmt: skip
     yield _output(

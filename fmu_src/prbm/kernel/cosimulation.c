@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "hybrid/arc.h"
+#include "hybrid/compliant.h"
 #include "hybrid/configuration.h"
 #include "hybrid/contact_modes.h"
 #include "hybrid/events.h"
@@ -21,9 +22,12 @@
 static bool leave_arc(Simulation *sim, bool shown, Problem *problem) {
     State *state = &sim->state;
     bool within = state->arc.valid && state->time < state->front_time;
-    bool ok = true;
     if (within) {
         drop_peaks(sim);
+    }
+    bool ok = latch_peaks(sim, state->time, problem);
+    if (!ok) {
+        return false;
     }
     if (within && !shown) {
         ok = end_step(sim, state->time, problem);
@@ -53,11 +57,24 @@ static bool event_due(const State *state, double time) {
     return state->arc.valid && state->pending.kind != EVENT_NONE && state->pending.time <= time;
 }
 
-static bool apply_pending(Simulation *sim, Problem *problem) {
-    Event event = sim->state.pending;
+/* Leave the step that ends at the pending event, and store the event. */
+static bool leave_for_event(Simulation *sim, Event *event, Problem *problem) {
+    *event = sim->state.pending;
+    if (!latch_peaks(sim, event->time, problem)) {
+        return false;
+    }
     sim->state.arc.valid = false;
     sim->state.pending.kind = EVENT_NONE;
-    return apply_event(sim, &event, problem) && restart_peaks(sim, problem);
+    return true;
+}
+
+static bool apply_here(Simulation *sim, const Event *event, Problem *problem) {
+    return apply_event(sim, event, problem) && restart_peaks(sim, problem);
+}
+
+static bool apply_pending(Simulation *sim, Problem *problem) {
+    Event event;
+    return leave_for_event(sim, &event, problem) && apply_here(sim, &event, problem);
 }
 
 /* Reject a target time in the past or more than STEPS_MAX steps ahead. */
@@ -80,11 +97,25 @@ static bool check_time(const Simulation *sim, double time, Problem *problem) {
 
 /* Whether the motion goes on: nothing has been set, and all walls rest on their references. */
 static bool goes_on(const Simulation *sim) {
-    bool rest = true;
-    for (int i = 0; i < system_of(sim)->s; i++) {
-        rest = rest && sim->state.walls[i].rate == 0.0 && sim->state.walls[i].span == 0.0;
+    return sim->untouched && !sim->equations.walls_move && !sim->equations.walls_give;
+}
+
+/* Compute the walls with the displacements by forces of compliant stops in their motion. */
+static bool fold_present(Simulation *sim, Wall *walls, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    bool ok = true;
+    memcpy(walls, sim->state.walls, (size_t)system_of(sim)->s * sizeof(Wall));
+    if (sim->equations.walls_give) {
+        double *y = take(&sim->scratch, (size_t)state_size(sim));
+        ok = arc_state(sim, y, sim->present.e, &sim->present.reference, &sim->at_front, problem);
+        for (int i = 0; ok && i < system_of(sim)->s; i++) {
+            if (sim->configuration.mechanism->stops[i].compliant) {
+                fold_give(&walls[i], sim->state.time, extra_of(sim, y, i));
+            }
+        }
     }
-    return rest && sim->untouched;
+    sim->scratch.used = mark;
+    return ok;
 }
 
 /* Begin a communication step: join the walls to their references, and apply changed inputs and
@@ -93,7 +124,7 @@ static bool goes_on(const Simulation *sim) {
 static bool begin_step(Simulation *sim, double time, Problem *problem) {
     State *state = &sim->state;
     size_t bytes = (size_t)system_of(sim)->s * sizeof(Wall);
-    Wall joined[STOPS_MAX];
+    Wall present[STOPS_MAX], joined[STOPS_MAX];
     if (goes_on(sim)) {
         if (!state->interrupted) {
             (void)pass_point(sim, time);
@@ -101,11 +132,14 @@ static bool begin_step(Simulation *sim, double time, Problem *problem) {
         return true;
     }
     bool set = values_changed(sim);
+    if (!fold_present(sim, present, problem)) {
+        return false;
+    }
     sim->untouched = true;
     if (set || !state->interrupted || walls_changed(sim)) {
-        join_walls(sim, time, set, joined);
+        join_walls(sim, time, set, present, joined);
     } else {
-        memcpy(joined, state->walls, bytes);
+        memcpy(joined, present, bytes);
     }
     if (!set && !inputs_changed(sim) && memcmp(joined, state->walls, bytes) == 0) {
         copy(sim->configuration.mechanism->input_count, state->given, state->acting_given);
@@ -115,6 +149,7 @@ static bool begin_step(Simulation *sim, double time, Problem *problem) {
         (set && !keep_gaps(sim, joined, problem))) {
         return false;
     }
+    fold_gives(sim); /* They are part of the walls joined. */
     memcpy(state->walls, joined, bytes);
     return restart(sim, problem);
 }
@@ -146,7 +181,7 @@ static bool proceed(Simulation *sim, double time, Stops stops, int *effort, Endi
     for (int steps = 0;; steps++) {
         if (event_due(state, time)) {
             *ending = AT_EVENT;
-            if (stops.events) {
+            if (stops.events && state->pending.kind != EVENT_SWITCH) {
                 return true;
             }
             if (!apply_pending(sim, problem)) {
@@ -269,19 +304,21 @@ PRBM bool simulation_advance(Simulation *simulation, double time, Problem *probl
 
 /* Let changed velocities of walls and impulses act, and apply the pending event, if any.  Held
  * stops follow their walls unless impulses act on the body, too. */
-static bool apply_here(Simulation *sim, bool event, bool impulses, Problem *problem) {
+static bool apply_changes(Simulation *sim, bool at_event, bool impulses, Problem *problem) {
     bool moved = walls_changed(sim);
-    if (!event && !leave_arc(sim, true, problem)) {
+    Event event;
+    if (!(at_event ? leave_for_event(sim, &event, problem) : leave_arc(sim, true, problem))) {
         return false;
     }
+    fold_gives(sim);
     sim->state.interrupted = sim->state.interrupted && !moved;
     turn_walls(sim);
     take_inputs(sim);
-    if (moved && (event || !impulses) && !follow_walls(sim, NULL, 0.0, problem)) {
+    if (moved && (at_event || !impulses) && !follow_walls(sim, NULL, 0.0, problem)) {
         return false;
     }
-    return (!event || apply_pending(sim, problem)) &&
-           ((event && !impulses) || restart(sim, problem));
+    return (!at_event || apply_here(sim, &event, problem)) &&
+           ((at_event && !impulses) || restart(sim, problem));
 }
 
 PRBM bool simulation_handle_event(Simulation *simulation, Problem *problem) {
@@ -292,5 +329,5 @@ PRBM bool simulation_handle_event(Simulation *simulation, Problem *problem) {
     }
     keep_backup(sim);
     sim->present.fresh = NOTHING;
-    return attempt(sim, apply_here(sim, event, impulses, problem), problem);
+    return attempt(sim, apply_changes(sim, event, impulses, problem), problem);
 }

@@ -137,7 +137,6 @@ PRBM bool complete(Simulation *sim, double *q, double *v, Problem *problem) {
                       : fail(problem, "the states are not finite numbers"));
 }
 
-/* Copy the states of model exchange from y = (q, v, dissipated energy, work) to x. */
 PRBM void states_of(const Simulation *sim, const double *y, double *x) {
     const Mechanism *m = sim->configuration.mechanism;
     int n = m->coordinate_count, count = m->independent_count;
@@ -145,6 +144,24 @@ PRBM void states_of(const Simulation *sim, const double *y, double *x) {
         x[k] = y[m->independent[k]];
         x[count + k] = y[n + m->independent[k]];
     }
-    x[2 * count] = y[2 * n];
-    x[2 * count + 1] = y[2 * n + 1];
+    copy(2, y + 2 * n, x + 2 * count);
+    for (int c = 0; c < m->compliant_count; c++) {
+        const double *extra = extra_states(sim, y) + EXTRA_STATES * c;
+        copy(EXCHANGED_STATES, extra + EXTRA_IMPULSE, x + 2 * count + 2 + EXCHANGED_STATES * c);
+    }
+}
+
+PRBM void load_states(const Simulation *sim, const double *x, double *y) {
+    const Mechanism *m = sim->configuration.mechanism;
+    int n = m->coordinate_count, count = m->independent_count;
+    for (int k = 0; k < count; k++) {
+        y[m->independent[k]] = x[k];
+        y[n + m->independent[k]] = x[count + k];
+    }
+    copy(2, x + 2 * count, y + 2 * n);
+    for (int c = 0; c < m->compliant_count; c++) {
+        double *extra = y + 2 * n + 2 + EXTRA_STATES * c;
+        extra[EXTRA_GIVE] = extra[EXTRA_GIVE_RATE] = 0.0;
+        copy(EXCHANGED_STATES, x + 2 * count + 2 + EXCHANGED_STATES * c, extra + EXTRA_IMPULSE);
+    }
 }

@@ -15,7 +15,9 @@ PRBM Loops take_loops(Simulation *sim);
 PRBM bool factor_dependents(const Simulation *sim, Loops *loops);
 PRBM bool singular_choice(const Simulation *sim, const int *dependent, Problem *problem);
 PRBM bool complete(Simulation *sim, double *q, double *v, Problem *problem);
+/* Copy the states x of model exchange from a state y (ny,), or to it. */
 PRBM void states_of(const Simulation *sim, const double *y, double *x);
+PRBM void load_states(const Simulation *sim, const double *x, double *y);
 
 /* Return the slot of a coordinate (angle or strain), or of its rate. */
 PRBM int coordinate_slot(const Mechanism *m, int j, bool rate);

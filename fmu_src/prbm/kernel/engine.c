@@ -101,6 +101,7 @@ static void record_impact(void *listener, const Impact *impact) {
         impact->index,         impact->count,   impact->time,
         impact->approach_speed, impact->rebound_speed, impact->impulse,
         impact->energy_lost,   impact->modal_restitution, impact->impulse_sum,
+        impact->peak_force,    impact->indentation, impact->contact_duration,
     };
     memcpy(to, numbers, sizeof numbers);
     copy(n, impact->q, to + ENGINE_IMPACT);
@@ -248,8 +249,8 @@ EXPORTED bool prbm_sections(Engine *engine, double *faces, char *message) {
         size_t mark = sim->scratch.used;
         const Present *present = &sim->present;
         SectionState at = section_state(&sim->equations, present->e, present->y,
-                                        present->y + system->n, present->evaluation.a,
-                                        present->evaluation.lam, &sim->scratch);
+                                        present->y + system->n, &present->evaluation,
+                                        &sim->scratch);
         for (int i = 0; i < system->mechanism->flexure_count; i++) {
             const FreeBody *body = &system->free_bodies[i];
             if (has_stress(system->mechanism, i)) {

@@ -75,7 +75,7 @@ EXPORTED void prbm_record(Engine *engine, bool record);
  * approach speed, rebound speed, impulse, energy lost, modal restitution, sum of impulses, angles,
  * rates before, rates after. */
 EXPORTED void prbm_impacts(Engine *engine, double *numbers);
-enum { ENGINE_IMPACT = 9 };
+enum { ENGINE_IMPACT = 12 };
 
 /* The complete state as numbers, as simulation_save writes it. */
 EXPORTED size_t prbm_saved_count(const Engine *engine);

@@ -58,6 +58,19 @@ enum { EVENTS_MAX = 1000 };
 #define WALL_MOBILITY_MAX 1e+100
 enum { EVENTS_AT_ONCE_MAX = 16 };
 enum { IMPACT_COUNT_MAX = 2147483647 };
+#define DAMPING_ELASTIC_MIN 0.9999
+#define DAMPING_PLASTIC_MAX 0.03
+enum { DAMPING_BISECTIONS = 60 };
+#define PHASE_RTOL 1e-09
+#define SETTLED_DAMPING_RTOL 0.001
+#define SETTLED_FORCE_RTOL 0.01
+#define SETTLING_FACTOR 0.5
+#define TOUCH_STEP_FACTOR 0.5
+#define TOUCH_STEP_CURVED_FACTOR 0.05
+#define CONTACT_ERROR_FACTOR 100.0
+#define INDENTATION_MIN_RTOL 1e-07
+enum { PEAK_REFINEMENTS = 3 };
+#define PEAK_REFINEMENT_FACTOR 0.125
 #define EVENT_TIME_ATOL 1e-13
 #define EVENT_TIME_FACTOR 2.0
 #define EVENT_TIME_ULPS 8.0
@@ -129,6 +142,13 @@ typedef enum {
     CONTACT_SLIP_POSITIVE = 3,
     CONTACT_SLIP_NEGATIVE = 4,
 } ContactMode;
+typedef enum {
+    PHASE_NONE = 0,
+    PHASE_PRESSED = 1,
+    PHASE_RISING = 2,
+    PHASE_FREE = 3,
+    PHASE_SETTLED = 4,
+} Phase;
 
 /* --- prbm.hybrid.events ------------------------------------------------------------------------- */
 
@@ -137,8 +157,10 @@ typedef enum {
     EVENT_RELEASE = 1,
     EVENT_SLIP = 2,
     EVENT_REVERSAL = 3,
-    EVENT_IMPACT = 4,
-    EVENT_KINDS = 5,
+    EVENT_SWITCH = 4,
+    EVENT_SEPARATION = 5,
+    EVENT_IMPACT = 6,
+    EVENT_KINDS = 7,
 } EventKind;
 
 /* --- prbm.mechanism.parts ----------------------------------------------------------------------- */
@@ -166,7 +188,7 @@ typedef enum {
 
 /* --- prbm.interface.tables ---------------------------------------------------------------------- */
 
-enum { TABLES_VERSION = 6 };
+enum { TABLES_VERSION = 7 };
 enum { TABLES_HEAD = 16 };
 enum { COORDINATES_MAX = 512 };
 enum { DIRECTIONS_MAX = 1024 };
@@ -183,16 +205,17 @@ typedef enum {
     SLOTS_BASE = 4,
     SLOTS_ENERGIES = 5,
     SLOTS_LATCHED = 6,
-    SLOTS_LINKS = 7,
-    SLOTS_STRETCHES = 8,
-    SLOTS_PROBES = 9,
-    SLOTS_STRESSES = 10,
-    SLOTS_FREQUENCY = 11,
-    SLOTS_CALCULATED = 12,
-    SLOTS_DERIVATIVES = 13,
-    SLOTS_INDICATORS = 14,
-    SLOTS_TIME = 15,
-    SLOTS_GROUPS = 16,
+    SLOTS_COMPLIANT = 7,
+    SLOTS_LINKS = 8,
+    SLOTS_STRETCHES = 9,
+    SLOTS_PROBES = 10,
+    SLOTS_STRESSES = 11,
+    SLOTS_FREQUENCY = 12,
+    SLOTS_CALCULATED = 13,
+    SLOTS_DERIVATIVES = 14,
+    SLOTS_INDICATORS = 15,
+    SLOTS_TIME = 16,
+    SLOTS_GROUPS = 17,
 } SlotGroup;
 typedef enum {
     REAL = 0,
@@ -216,6 +239,16 @@ typedef enum {
     START_AMPLITUDE = 2,
     START_COUNT = 3,
 } ReleaseStart;
+
+/* --- prbm.mechanics.compliant_stops ------------------------------------------------------------- */
+
+typedef enum {
+    EXTRA_GIVE = 0,
+    EXTRA_GIVE_RATE = 1,
+    EXTRA_IMPULSE = 2,
+    EXTRA_LOSS = 3,
+} Extra;
+enum { EXTRA_STATES = 4 };
 
 /* --- prbm.interface.variables ------------------------------------------------------------------- */
 
@@ -264,6 +297,13 @@ typedef enum {
 } LatchedOutput;
 enum { PER_LATCHED = 9 };
 typedef enum {
+    COMPLIANT_PEAK_FORCE = 0,
+    COMPLIANT_INDENTATION = 1,
+    COMPLIANT_CONTACT_DURATION = 2,
+    COMPLIANT_CONTACT_LOSS = 3,
+} CompliantOutput;
+enum { PER_COMPLIANT = 4 };
+typedef enum {
     LINK_ANGLE = 0,
     LINK_OMEGA = 1,
 } LinkOutput;
@@ -289,6 +329,7 @@ typedef enum {
     STRESS_PEAK_STRESS_POSITION = 5,
 } StressOutput;
 enum { PER_STRESS = 6 };
+enum { EXCHANGED_STATES = 2 };
 typedef enum {
     INDICATOR_IMPACT = 0,
     INDICATOR_RELEASE = 1,

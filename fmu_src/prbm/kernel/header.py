@@ -24,6 +24,8 @@ from ..interface import tables
 from ..interface.variables import (
     BASE_OUTPUTS,
     BODY_OUTPUTS,
+    COMPLIANT_OUTPUTS,
+    COMPLIANT_STORED,
     ENERGIES,
     INDICATORS,
     LATCHED,
@@ -34,7 +36,8 @@ from ..interface.variables import (
     STRESS_OUTPUTS,
     STRETCH_OUTPUTS,
 )
-from ..mechanics.contact_state import ContactMode
+from ..mechanics.compliant_stops import COMPLIANT_STATES, Extra
+from ..mechanics.contact_state import ContactMode, Phase
 from ..mechanics.inputs import BASE_AXES, INPUT_GROUPS, LOADS, WALL_INPUTS
 from ..mechanism.flexure import (
     ENDS,
@@ -68,7 +71,10 @@ def header() -> str:
         _section(tolerances, _tolerances()),
         _section(
             sys.modules[ContactMode.__module__],
-            [_enumeration("ContactMode", "CONTACT", {m.name: m for m in ContactMode})],
+            [
+                _enumeration("ContactMode", "CONTACT", {m.name: m for m in ContactMode}),
+                _enumeration("Phase", "PHASE", {"NONE": 0} | {p.name: p for p in Phase}),
+            ],
         ),
         _section(
             sys.modules[EventKind.__module__],
@@ -89,6 +95,13 @@ def header() -> str:
             ],
         ),
         _section(tables, _tables()),
+        _section(
+            sys.modules[Extra.__module__],
+            [
+                _enumeration("Extra", "EXTRA", {m.name: m for m in Extra}),
+                _constant("EXTRA_STATES", COMPLIANT_STATES),
+            ],
+        ),
         _section("prbm.interface.variables", _groups()),
         _section("prbm.mechanics.inputs", _inputs()),
         _section("prbm.hybrid.runge_kutta", _tableau(TSITOURAS_PAPAKOSTAS)),
@@ -169,6 +182,7 @@ def _groups() -> Iterator[str]:
         ("BASE", tuple(output.partition(".")[2] for output in BASE_OUTPUTS)),
         ("ENERGY", tuple(energy.partition(".")[2] for energy in ENERGIES)),
         ("LATCHED", LATCHED),
+        ("COMPLIANT", COMPLIANT_OUTPUTS),
         ("LINK", LINK_OUTPUTS),
         ("STRETCH", STRETCH_OUTPUTS),
         ("PROBE", PROBE_OUTPUTS),
@@ -176,6 +190,7 @@ def _groups() -> Iterator[str]:
     ):
         yield _enumeration(f"{name.capitalize()}Output", name, _numbers(outputs))
         yield _constant(f"PER_{name}", len(outputs))
+    yield _constant("EXCHANGED_STATES", len(COMPLIANT_STORED))  # Of a compliant stop.
     yield _enumeration("StopIndicator", "INDICATOR", _numbers(INDICATORS))
     yield _constant("STOP_INDICATORS", len(INDICATORS))
 

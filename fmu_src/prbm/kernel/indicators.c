@@ -13,12 +13,15 @@ PRBM int exchange_indicators(const Simulation *simulation) {
     return STOP_INDICATORS * m->stop_count + m->friction_count;
 }
 
-/* Slip and reversal share an indicator, because a contact either sticks or slips. */
+/* Slip and reversal share an indicator, because a contact either sticks or slips.  So do impact and
+ * separation, and release and switch: a stop is open, pressed or held. */
 PRBM int indicator_place(const Simulation *sim, EventKind kind, int contact) {
     static const int PLACE[EVENT_KINDS] = {
         [EVENT_RELEASE] = INDICATOR_RELEASE,
         [EVENT_SLIP] = INDICATOR_SLIP,
         [EVENT_REVERSAL] = INDICATOR_SLIP,
+        [EVENT_SWITCH] = INDICATOR_RELEASE,
+        [EVENT_SEPARATION] = INDICATOR_IMPACT,
         [EVENT_IMPACT] = INDICATOR_IMPACT,
     };
     int s = system_of(sim)->s;
@@ -30,8 +33,10 @@ PRBM int indicator_place(const Simulation *sim, EventKind kind, int contact) {
 PRBM double guard_scale(const Simulation *sim, EventKind kind) {
     const Scales *scales = &sim->configuration.scales;
     switch (kind) {
-    case EVENT_IMPACT: return scales->length;
+    case EVENT_IMPACT:
+    case EVENT_SEPARATION: return scales->length;
     case EVENT_REVERSAL: return scales->rate * scales->length;
+    case EVENT_SWITCH: return 1.0;
     default: return scales->energy / scales->length;
     }
 }
@@ -39,25 +44,32 @@ PRBM double guard_scale(const Simulation *sim, EventKind kind) {
 /* A guard plus a margin, so that its event occurs when the sum is zero: a gap closes a little below
  * zero, and sliding ends at a speed within round-off. */
 PRBM double lifted_guard(const Simulation *sim, const Instant *at, EventKind kind, int contact) {
+    if (kind == EVENT_SWITCH && sim->state.touching[contact].phase == PHASE_RISING) {
+        const Scales *scales = &sim->configuration.scales;
+        return rising_guard(&sim->equations, at, contact) /
+               (scales->length * (scales->rate * scales->rate));
+    }
     double z = transition(kind)->guard.value(&sim->equations, at, contact);
-    if (kind == EVENT_IMPACT) {
+    if (kind == EVENT_IMPACT || kind == EVENT_SEPARATION) {
         return z + sim->state.floors[contact];
     }
     return kind == EVENT_REVERSAL ? z + SLIDING_ENDS_FACTOR * zero_speed(&sim->configuration)
                                  : z;
 }
 
-/* Compute an indicator that is positive while a gap is open.  The rate of an opening gap is added,
- * so that the indicator is positive directly after an impact, when the gap is round-off. */
-static double impact_indicator(const Simulation *sim, const Instant *at, int i) {
-    double speed = gap_rate(&sim->equations, i, at->time, at->e, at->v);
+/* Compute an indicator that is positive while a gap is open, or while a contact is pressed.  The
+ * rate of an opening gap, or of a growing indentation, is added: the indicator is then positive
+ * directly after an impact or a touch, when gap and indentation are round-off. */
+static double closing_indicator(const Simulation *sim, const Instant *at, EventKind kind, int i) {
+    double speed = gap_rate(&sim->equations, i, at->time, at->e, at->v, at->extra);
+    speed = kind == EVENT_IMPACT ? speed : -speed;
     double ahead = INDICATOR_LEAD_RTOL * sim->configuration.scales.time * greater(speed, 0.0);
-    return (lifted_guard(sim, at, EVENT_IMPACT, i) + ahead) / guard_scale(sim, EVENT_IMPACT);
+    return (lifted_guard(sim, at, kind, i) + ahead) / guard_scale(sim, kind);
 }
 
 /* The rate at which a closed stop leaves its wall. */
 PRBM double leaving_rate(const Simulation *sim, const Instant *at, int i) {
-    return gap_rate(&sim->equations, i, at->time, at->e, at->v);
+    return gap_rate(&sim->equations, i, at->time, at->e, at->v, at->extra);
 }
 
 /* Compute an indicator that is positive while a closed stop is pressed and its gap rate is below
@@ -72,7 +84,8 @@ PRBM double release_indicator(const Simulation *sim, const Instant *at, int i) {
 
 static double indicator(const Simulation *sim, const Instant *at, EventKind kind, int contact) {
     switch (kind) {
-    case EVENT_IMPACT: return impact_indicator(sim, at, contact);
+    case EVENT_IMPACT:
+    case EVENT_SEPARATION: return closing_indicator(sim, at, kind, contact);
     case EVENT_RELEASE: return release_indicator(sim, at, contact);
     default: return lifted_guard(sim, at, kind, contact) / guard_scale(sim, kind);
     }

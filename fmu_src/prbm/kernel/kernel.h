@@ -31,6 +31,7 @@
 #include "core/factors.h"
 #include "core/forces.h"
 #include "core/contact_state.h"
+#include "core/compliance.h"
 #include "core/equations.h"
 #include "core/evaluation.h"
 #include "core/dynamics.h"

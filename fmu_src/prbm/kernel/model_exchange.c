@@ -5,6 +5,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "hybrid/compliant.h"
 #include "hybrid/configuration.h"
 #include "hybrid/contact_modes.h"
 #include "hybrid/events.h"
@@ -23,12 +24,28 @@
 /* --- states ----------------------------------------------------------------------------------- */
 
 PRBM int exchange_states(const Simulation *simulation) {
-    return 2 * simulation->configuration.mechanism->independent_count + 2;
+    const Mechanism *m = simulation->configuration.mechanism;
+    return 2 * m->independent_count + 2 + EXCHANGED_STATES * m->compliant_count;
+}
+
+/* The slot of the k-th state of the compliant stops. */
+static int contact_slot(const Mechanism *m, int k) {
+    int stop = 0, extra = EXTRA_STATES * (k / EXCHANGED_STATES);
+    while (!m->stops[stop].compliant || m->stops[stop].extra != extra) {
+        stop++;
+    }
+    return k % EXCHANGED_STATES == 0
+               ? m->slots.latched + PER_LATCHED * stop + LATCHED_IMPULSE_SUM
+               : m->slots.compliant + PER_COMPLIANT * (k / EXCHANGED_STATES) +
+                     COMPLIANT_CONTACT_LOSS;
 }
 
 PRBM int exchange_slot(const Simulation *simulation, int k) {
     const Mechanism *m = simulation->configuration.mechanism;
     int count = m->independent_count;
+    if (k >= 2 * count + 2) {
+        return contact_slot(m, k - 2 * count - 2);
+    }
     if (k >= 2 * count) {
         return m->slots.energies + ENERGY_DISSIPATED + (k - 2 * count);
     }
@@ -41,7 +58,7 @@ PRBM int exchange_slot(const Simulation *simulation, int k) {
 PRBM bool exchange_refresh(Simulation *sim, Problem *problem) {
     const Mechanism *m = sim->configuration.mechanism;
     State *state = &sim->state;
-    int n = system_of(sim)->n, count = m->independent_count;
+    int n = system_of(sim)->n;
     if (sim->present.fresh & FRONT) {
         return true;
     }
@@ -52,12 +69,7 @@ PRBM bool exchange_refresh(Simulation *sim, Problem *problem) {
     place_walls(sim);
     set_inputs(sim);
     copy(n, state->accepted, state->front); /* first guess of the loops */
-    for (int k = 0; k < count; k++) {
-        state->front[m->independent[k]] = state->states[k];
-        state->front[n + m->independent[k]] = state->states[count + k];
-    }
-    state->front[2 * n] = state->states[2 * count];
-    state->front[2 * n + 1] = state->states[2 * count + 1];
+    load_states(sim, state->states, state->front);
     if (!complete(sim, state->front, state->front + n, problem)) {
         return false;
     }
@@ -175,6 +187,12 @@ PRBM void exchange_nominals(const Simulation *simulation, double *x) {
         x[count + k] = rate;
     }
     x[2 * count] = x[2 * count + 1] = nearest_power_of_ten(state->energy);
+    double speed = state->angle * simulation->configuration.scales.rate *
+                   simulation->configuration.scales.length;
+    for (int k = 2 * count + 2; k < exchange_states(simulation); k += EXCHANGED_STATES) {
+        x[k] = nearest_power_of_ten(state->energy / speed);
+        x[k + 1] = x[2 * count];
+    }
 }
 
 PRBM bool exchange_derivatives(Simulation *simulation, double *dx, Problem *problem) {
@@ -208,7 +226,9 @@ static double speed_drift(const Simulation *sim, double speed) {
  * wall moves, its acceleration is unknown.  A larger distance is then allowed, and the release
  * indicator limits the speed instead. */
 static double stop_drift(const Simulation *sim, const Instant *at, int i) {
-    double off = fabs(gap(&sim->equations, i, at->time, at->e)) / system_of(sim)->length;
+    double depth = sim->state.touching[i].depth;
+    double off = fabs(gap(&sim->equations, i, at->time, at->e, at->extra) + depth) /
+                 system_of(sim)->length;
     return sim->state.walls[i].rate != 0.0
                ? off / MOVING_DRIFT_FACTOR
                : greater(off, speed_drift(sim, leaving_rate(sim, at, i)));
@@ -241,7 +261,12 @@ PRBM bool exchange_completed_step(Simulation *simulation, bool *event, Problem *
     pass_peaks(sim);
     sim->present.fresh &= ~STRESSES;
     *event = drift(sim, &now.at) > DRIFT_RTOL;
-    return true;
+    if (sim->equations.pressed_count == 0) {
+        return true;
+    }
+    sim->present.fresh &= ~PLACES; /* The maxima are outputs. */
+    return latch_present(sim, now.evaluation, true, problem) &&
+           (*event || settles_here(sim, event, problem));
 }
 
 /* --- events ----------------------------------------------------------------------------------- */
@@ -267,11 +292,17 @@ static void stop_sliding(Simulation *sim, int contact) {
 
 /* Whether the gap of an open stop closes at this state. */
 static bool closes_here(const Simulation *sim, const Instant *at, int stop) {
-    double distance = gap(&sim->equations, stop, at->time, at->e);
-    double speed = gap_rate(&sim->equations, stop, at->time, at->e, at->v);
+    double distance = gap(&sim->equations, stop, at->time, at->e, at->extra);
+    double speed = gap_rate(&sim->equations, stop, at->time, at->e, at->v, at->extra);
     bool touches = distance <= TOUCHING_RTOL * system_of(sim)->length;
     return (touches && speed < -zero_speed(&sim->configuration)) ||
            (lifted_guard(sim, at, EVENT_IMPACT, stop) <= 0.0 && speed < 0.0);
+}
+
+/* Whether the contact of a compliant stop ends at this state. */
+static bool opens_here(const Simulation *sim, const Instant *at, int stop) {
+    return lifted_guard(sim, at, EVENT_SEPARATION, stop) <= 0.0 &&
+           gap_rate(&sim->equations, stop, at->time, at->e, at->v, at->extra) > 0.0;
 }
 
 /* Whether an event is due at this state.  A stop that has been struck is not struck again. */
@@ -280,8 +311,11 @@ static bool due(const Simulation *sim, const Instant *at, const bool *struck, Ev
     if (!transition(kind)->watched(&sim->equations, contact)) {
         return false;
     }
-    return kind == EVENT_IMPACT ? !struck[contact] && closes_here(sim, at, contact)
-                                : lifted_guard(sim, at, kind, contact) <= 0.0;
+    switch (kind) {
+    case EVENT_IMPACT: return !struck[contact] && closes_here(sim, at, contact);
+    case EVENT_SEPARATION: return opens_here(sim, at, contact);
+    default: return lifted_guard(sim, at, kind, contact) <= 0.0;
+    }
 }
 
 /* Return the first event that is due at a state, in the order of TRANSITIONS. */
@@ -305,7 +339,7 @@ static void arm(Simulation *sim, const Instant *at) {
     for (int i = 0; i < system_of(sim)->s; i++) {
         state->floors[i] = GAP_CLOSED_RTOL * system_of(sim)->length;
         if (state->modes[i] == CONTACT_OPEN) {
-            state->floors[i] += greater(0.0, -gap(&sim->equations, i, at->time, at->e));
+            state->floors[i] += greater(0.0, -gap(&sim->equations, i, at->time, at->e, at->extra));
         }
     }
     state->point = state->time;
@@ -321,7 +355,7 @@ static bool apply_inputs(Simulation *sim, Problem *problem) {
     if (impulses_changed(sim)) {
         ok = receive_impulses(sim, problem) && settle_moved(sim, problem);
     } else if (sim->equations.walls_move || drift(sim, &now.at) > DRIFT_CORRECTED_RTOL) {
-        ok = follow_walls(sim, now.at.lam, sim->state.time - sim->state.point, problem);
+        ok = follow_walls(sim, now.evaluation->lam, sim->state.time - sim->state.point, problem);
     }
     forget_outputs(sim);
     return ok;
@@ -363,17 +397,27 @@ static bool apply_due_events(Simulation *sim, Moment *now, Problem *problem) {
     }
 }
 
-/* Count the stress before an event. */
+/* Count the stress and the contact forces before an event. */
 static bool sample_before(Simulation *sim, Problem *problem) {
     Moment now;
-    if (!has_peaks(sim)) {
+    if (!has_peaks(sim) && sim->equations.pressed_count == 0) {
         return true;
     }
     if (!exchange_moment(sim, &now, problem)) {
         return false;
     }
     step_peaks(sim, now.evaluation);
-    return true;
+    return latch_present(sim, now.evaluation, true, problem);
+}
+
+/* Settle the contacts that have been calm for a contact time. */
+static bool settle_contacts(Simulation *sim, Problem *problem) {
+    if (sim->equations.pressed_count == 0) {
+        return true;
+    }
+    bool ok = settle_calm(sim, problem);
+    forget_outputs(sim);
+    return ok;
 }
 
 PRBM bool exchange_event(Simulation *simulation, bool *changed, Problem *problem) {
@@ -387,7 +431,9 @@ PRBM bool exchange_event(Simulation *simulation, bool *changed, Problem *problem
     keep_backup(sim);
     Moment now;
     bool ok = sample_before(sim, problem) && apply_inputs(sim, problem) &&
-              apply_due_events(sim, &now, problem);
+              settle_contacts(sim, problem) && apply_due_events(sim, &now, problem) &&
+              (sim->equations.pressed_count == 0 ||
+               latch_present(sim, now.evaluation, false, problem));
     if (ok) {
         restart_peaks_from(sim, now.evaluation);
         arm(sim, &now.at);
@@ -429,8 +475,8 @@ PRBM const char *exchange_deepest(Simulation *simulation, double *depth) {
         return NULL;
     }
     for (int i = 0; i < system_of(sim)->s; i++) {
-        double inside = -gap(&sim->equations, i, now.at.time, now.at.e);
-        if (inside > *depth) {
+        double inside = -gap(&sim->equations, i, now.at.time, now.at.e, now.at.extra);
+        if (inside > *depth && sim->state.touching[i].phase == PHASE_NONE) {
             *depth = inside;
             found = sim->configuration.mechanism->stops[i].name;
         }

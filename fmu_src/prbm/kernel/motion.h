@@ -11,7 +11,7 @@ typedef struct {
     int index; /* of the stop */
     const char *stop;
     double time, approach_speed, rebound_speed, impulse, energy_lost, modal_restitution,
-        impulse_sum;
+        impulse_sum, peak_force, indentation, contact_duration;
     int count;
     const double *q, *before, *after; /* (n,): angles, and rates before and after the impact */
 } Impact;

@@ -33,6 +33,7 @@
 #include "core/complementarity.c"
 #include "core/contact.c"
 #include "core/contact_state.c"
+#include "core/compliance.c"
 #include "core/equations.c"
 #include "core/evaluation.c"
 #include "core/dynamics.c"
@@ -45,6 +46,7 @@
 #include "hybrid/guards.c"
 #include "hybrid/walls.c"
 #include "hybrid/impacts.c"
+#include "hybrid/compliant.c"
 #include "hybrid/rest.c"
 #include "hybrid/contact_modes.c"
 #include "hybrid/stability.c"
@@ -62,6 +64,7 @@
 #include "tangent.c"
 #include "tangent_indicators.c"
 #include "tangent_stress.c"
+#include "tangent_contact.c"
 #ifdef PRBM_ENGINE
 #include "engine.c"
 #else

@@ -19,12 +19,13 @@ from ..base.tolerances import TOLERANCE_USED_MAX
 from ..hybrid.configuration import Configuration, Scales, checked_tolerance
 from ..hybrid.front import Latched
 from ..hybrid.given import changed_values, checked_times, start_values
-from ..hybrid.impacts import Impact
 from ..hybrid.outputs import Outputs
+from ..hybrid.records import Impact
 from ..hybrid.simulation import Simulation
 from ..interface import tables
 from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble, calculated
+from ..mechanics.compliant_stops import COMPLIANT_STATES
 from ..mechanics.independent import independent
 from ..mechanics.stress import SectionStresses, section_positions
 from ..mechanics.system import System
@@ -34,11 +35,11 @@ from .library import MESSAGE_LENGTH, library
 
 Slots = NDArray[np.intc]
 UNFINISHED = -2  # Result of a call that is to be repeated, ENGINE_UNFINISHED in C.
-IMPACT = 9  # Numbers of a recorded impact before its states, ENGINE_IMPACT in C.
+IMPACT = 12  # Numbers of a recorded impact before its states, ENGINE_IMPACT in C.
 MOTION_GROUPS = ("bodies", "probes")
 OUTPUT_GROUPS = (
-    *MOTION_GROUPS, "stops", "base", "energies", "latched", "links", "stretches", "stresses",
-    "frequency", "calculated",
+    *MOTION_GROUPS, "stops", "base", "energies", "latched", "compliant", "links", "stretches",
+    "stresses", "frequency", "calculated",
 )  # fmt: skip
 """The groups of values that are outputs, in the order of the Python engine."""
 
@@ -265,10 +266,10 @@ class KernelSimulation:
         self._library.prbm_impacts(self._address, numbers.ctypes.data)
         for row in numbers:
             q, before, after = row[IMPACT:].reshape(3, n)
-            stop, hits, time, approach, rebound, impulse, lost, modal, total = row[:IMPACT].tolist()
-            latched = Latched(int(hits), time, approach, rebound, impulse, lost, modal, total)
+            stop, hits, *numbers = row[:IMPACT].tolist()
+            latched, time = Latched(int(hits), *numbers), numbers[0]
             name = self.mechanism.stops[int(stop)].name
-            self._record.append(Impact(name, time, q, before, after, impulse, latched))
+            self._record.append(Impact(name, time, q, before, after, latched.impulse, latched))
 
     # -- state and outputs --
 
@@ -278,8 +279,12 @@ class KernelSimulation:
         return int(self._library.prbm_coordinates(self._address))
 
     def state(self) -> Real:
-        """Return y = (q, v, dissipated energy, work) at the present time, on the constraints."""
-        y = np.empty(2 * self._size + 2)
+        """Return y = (q, v, dissipated energy, work) at the present time, on the constraints.
+
+        The states of compliant stops follow, see :mod:`prbm.mechanics.compliant_stops`.
+        """
+        compliant = sum(stop.compliant for stop in self.mechanism.stops)
+        y = np.empty(2 * self._size + 2 + COMPLIANT_STATES * compliant)
         with self._lock:
             if not self._library.prbm_state(self._address, y.ctypes.data, self._message):
                 raise self._error()

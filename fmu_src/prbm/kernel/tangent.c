@@ -6,6 +6,7 @@
 #include "hybrid/simulation.h"
 #include "dependents.h"
 #include "tangent.h"
+#include "tangent_contact.h"
 #include "tangent_indicators.h"
 #include "tangent_stress.h"
 #include "values.h"
@@ -84,8 +85,7 @@ PRBM double rate_change(const Tangent *t, const Rows *rows, int i) {
     return sum;
 }
 
-/* Change of the second time derivative of a row at constant accelerations. */
-static double second_change(const Tangent *t, const Rows *rows, int i) {
+PRBM double second_change(const Tangent *t, const Rows *rows, int i) {
     double sum = 0.0;
     Arm part;
     for (int j = 0; j <= rows->system->d; j++) {
@@ -94,9 +94,7 @@ static double second_change(const Tangent *t, const Rows *rows, int i) {
     return sum;
 }
 
-/* Add the change of the load of a constant force along row i, as the gradient of the row turns with
- * the arms.  The opposite load acts on the body that carries the wall. */
-static void add_pull(const Tangent *t, const Rows *rows, int i, double force) {
+PRBM void add_pull(const Tangent *t, const Rows *rows, int i, double force) {
     int d = rows->system->d, on = seen_from(rows, i);
     Arm part;
     for (int j = 0; j <= d; j++) {
@@ -245,8 +243,12 @@ static double lift_change(const Tangent *t, int i) {
     return value_change(t, &lifts, i);
 }
 
-/* Change of the limit of friction of a friction point. */
-PRBM double limit_change(const Tangent *t, int i) {
+PRBM double limit_change(const Tangent *t, int contact) {
+    if (is_stop(t->q->system, contact)) {
+        bool presses = t->evaluation->pressure[contact] > 0.0;
+        return presses ? t->q->stop_friction[contact] * t->dpressure[contact] : 0.0;
+    }
+    int i = contact - t->q->system->s;
     const double *law = t->q->rub_law + 3 * i;
     return rub_limit(t->q, i, t->e) > 0.0 ? law[0] * law[2] * lift_change(t, i) : 0.0;
 }
@@ -259,14 +261,13 @@ static void rub_change(const Tangent *t) {
     const Equations *q = t->q;
     Scratch *scratch = &t->sim->scratch;
     size_t mark = scratch->used;
-    int s = q->system->s;
     double *row = take(scratch, (size_t)q->system->n);
-    Rows rubs = rub_rows(q->system);
     for (int k = q->slipping_stops; k < q->slipping_count; k++) {
-        int i = q->slipping[k] - s;
-        row_jacobian(&rubs, i, t->e, row);
-        add_scaled(q->system->n, -sliding_sign(t, s + i) * limit_change(t, i), row, t->dx);
-        add_pull(t, &rubs, i, rub_force(q, i, t->e));
+        int contact = q->slipping[k], i;
+        Rows rows = tangential_rows(q->system, contact, &i);
+        row_jacobian(&rows, i, t->e, row);
+        add_scaled(q->system->n, -sliding_sign(t, contact) * limit_change(t, contact), row, t->dx);
+        add_pull(t, &rows, i, slip_force(q, t->e, t->evaluation, contact));
     }
     scratch->used = mark;
 }
@@ -434,6 +435,7 @@ static void energy_changes(const Tangent *t, const double *dx, double *out) {
     }
     Complex moved = along_arms(system->d, system->S, t->dE);
     out[ENERGY_GRAVITATIONAL] = -product(conjugate(system->gravity), moved).re;
+    out[ENERGY_ELASTIC] += contact_energy_change(t);
     out[ENERGY_DISSIPATED] = dx[2 * count];
     out[ENERGY_WORK] = dx[2 * count + 1];
 }
@@ -489,7 +491,7 @@ static bool mobility_change(const Tangent *t, int i, double *result, Problem *pr
 static double dissipation_change(const Tangent *t) {
     const Equations *q = t->q;
     const System *system = q->system;
-    Rows walls = slide_rows(system), rubs = rub_rows(system);
+    Rows walls = slide_rows(system);
     int n = system->n;
     double sum = 2.0 * q->mass_damping * kinetic_change(t);
     for (int i = 0; i < n; i++) {
@@ -498,10 +500,14 @@ static double dissipation_change(const Tangent *t) {
         }
     }
     for (int k = q->slipping_stops; k < q->slipping_count; k++) {
-        int i = q->slipping[k] - system->s;
-        double change = -sliding_sign(t, system->s + i) * limit_change(t, i);
-        sum -= change * row_rate(&rubs, i, t->e, t->v) +
-               rub_force(q, i, t->e) * rate_change(t, &rubs, i);
+        int contact = q->slipping[k], i;
+        Rows rows = tangential_rows(system, contact, &i);
+        double change = -sliding_sign(t, contact) * limit_change(t, contact);
+        sum -= change * row_rate(&rows, i, t->e, t->v) +
+               slip_force(q, t->e, t->evaluation, contact) * rate_change(t, &rows, i);
+    }
+    for (int k = 0; k < q->pressed_count; k++) {
+        sum += contact_loss_change(t, q->pressed[k]);
     }
     for (int k = 0; k < q->slipping_stops; k++) {
         int i = q->slipping[k], h = q->first_hold + held_at(q, i);
@@ -526,6 +532,12 @@ static double power_change(const Tangent *t, const Complex *dw, const double *dm
         double w = wall_motion(&q->inputs.walls[i], t->at->time).v;
         sum -= t->dlam[h] * w + t->lam[h] * velocity;
     }
+    for (int k = 0; k < q->pressed_count; k++) {
+        int i = q->pressed[k];
+        double velocity = wall_inputs(system->mechanism, t->du, i)[1];
+        double w = wall_motion(&q->inputs.walls[i], t->at->time).v;
+        sum -= t->dpressure[i] * w + t->evaluation->pressure[i] * velocity;
+    }
     return sum;
 }
 
@@ -548,6 +560,7 @@ static void all_changes(const Tangent *t, const double *dx, const Complex *dw,
     double *powers = out + slots->derivatives + m->independent_count;
     powers[0] = dissipation_change(t);
     powers[1] = power_change(t, dw, dmoment);
+    contact_changes(t, dx, out);
     indicator_changes(t, out + slots->indicators);
 }
 
@@ -564,6 +577,7 @@ static Tangent begin_tangent(Simulation *sim, const Moment *now, const double *d
     t.q = &sim->equations;
     t.e = at->at.e;
     t.factors = &at->factors;
+    t.evaluation = at;
     t.at = &now->at;
     t.y = now->at.q;
     t.v = now->at.v;
@@ -577,6 +591,7 @@ static Tangent begin_tangent(Simulation *sim, const Moment *now, const double *d
     t.dv = take(scratch, (size_t)n);
     t.dx = take(scratch, (size_t)system->even);
     t.dlam = take(scratch, (size_t)t.q->r);
+    t.dpressure = take(scratch, (size_t)system->s);
     zeros(system->even, t.dx);
     memset(t.pull, 0, (size_t)d * sizeof *t.pull);
     turning(system, t.v, t.w);
@@ -601,6 +616,7 @@ PRBM bool exchange_directional(Simulation *simulation, const double *dx, const d
         load_row_change(&t, dw, dmoment);
         arm_load_change(&t, dw, dmoment);
         spring_change(&t);
+        pressure_changes(&t);
         rub_change(&t);
         row_change(&t);
         apply_pull(&t);

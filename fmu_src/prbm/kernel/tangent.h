@@ -11,9 +11,11 @@ typedef struct {
     const Equations *q;
     const Complex *e;
     const Factors *factors;
+    const Evaluation *evaluation;
     const Instant *at;
     const double *y, *v, *a, *lam, *du;
     double *dq, *dv, *dx, *dlam;    /* (n,), (n,), (even,), (r,); dx ends as da */
+    double *dpressure;              /* (s,) forces of pressed stops */
     Complex *w, *alpha, *dphi, *dw; /* (d,) of the arms: rates, accelerations, changes */
     Complex *dE;                    /* (d,) i E dphi */
     Complex *swing, *dswing;        /* (d,) E w */
@@ -24,8 +26,13 @@ typedef struct {
 PRBM double rate_change(const Tangent *t, const Rows *rows, int i);
 PRBM double gap_change(const Tangent *t, int i);
 PRBM double gap_rate_change(const Tangent *t, int i);
-/* Change of the friction limit of a friction point. */
-PRBM double limit_change(const Tangent *t, int i);
+/* Change of the second time derivative of a row at constant accelerations. */
+PRBM double second_change(const Tangent *t, const Rows *rows, int i);
+/* Add the change of the load of a constant force along row i, as the gradient of the row turns with
+ * the arms.  The opposite load acts on the body that carries the wall. */
+PRBM void add_pull(const Tangent *t, const Rows *rows, int i, double force);
+/* Change of the friction limit of a friction point or of a pressed stop. */
+PRBM double limit_change(const Tangent *t, int contact);
 /* Sign of the sliding velocity of a contact. */
 PRBM int sliding_sign(const Tangent *t, int contact);
 

@@ -3,6 +3,7 @@
 #include "hybrid/guards.h"
 #include "hybrid/simulation.h"
 #include "indicators.h"
+#include "tangent_contact.h"
 #include "tangent_indicators.h"
 
 /* Change of |x|; at zero, the mean of both one-sided derivatives. */
@@ -12,9 +13,20 @@ static double sign_times(double x, double change) {
 
 static double impact_indicator_change(const Tangent *t, int i) {
     const Scales *scales = &t->sim->configuration.scales;
-    bool opens = gap_rate(t->q, i, t->at->time, t->e, t->v) > 0.0;
+    bool opens = gap_rate(t->q, i, t->at->time, t->e, t->v, t->at->extra) > 0.0;
     double ahead = opens ? INDICATOR_LEAD_RTOL * scales->time * gap_rate_change(t, i) : 0.0;
     return (gap_change(t, i) + ahead) / scales->length;
+}
+
+/* Change of the force of a held stop, or of the margin of a settled one. */
+static double margin_change(const Tangent *t, int i) {
+    const Touching *touching = &t->q->contacts.touching[i];
+    double change = stop_force(t->q, t->dlam, i);
+    if (touching->phase != PHASE_SETTLED) {
+        return change;
+    }
+    double off = stop_force(t->q, t->lam, i) - elastic_force(&t->q->laws[i], touching->depth);
+    return -sign_times(off, change);
 }
 
 static double release_indicator_change(const Tangent *t, int i) {
@@ -22,7 +34,7 @@ static double release_indicator_change(const Tangent *t, int i) {
     double force = guard_scale(sim, EVENT_RELEASE), speed = guard_scale(sim, EVENT_REVERSAL);
     double pressed = lifted_guard(sim, t->at, EVENT_RELEASE, i) / force;
     return pressed <= release_indicator(sim, t->at, i)
-               ? t->dlam[t->q->first_hold + held_at(t->q, i)] / force
+               ? margin_change(t, i) / force
                : -sign_times(leaving_rate(sim, t->at, i), gap_rate_change(t, i)) / speed;
 }
 
@@ -30,11 +42,10 @@ static double slip_indicator_change(const Tangent *t, int contact) {
     const Equations *q = t->q;
     int row = q->first_stick + place_in(q->sticking, contact);
     double friction = sign_times(t->lam[row], t->dlam[row]), limit;
-    if (is_stop(q->system, contact)) {
-        int held = q->first_hold + held_at(q, contact);
-        limit = q->stop_friction[contact] * t->dlam[held];
+    if (is_stop(q->system, contact) && is_held(&q->contacts, contact)) {
+        limit = q->stop_friction[contact] * stop_force(q, t->dlam, contact);
     } else {
-        limit = limit_change(t, contact - q->system->s);
+        limit = limit_change(t, contact);
     }
     return ((1.0 + FRICTION_EXCESS_RTOL) * limit - friction) /
            guard_scale(t->sim, EVENT_SLIP);
@@ -51,6 +62,8 @@ static double indicator_change(const Tangent *t, EventKind kind, int contact) {
     switch (kind) {
     case EVENT_IMPACT: return impact_indicator_change(t, contact);
     case EVENT_RELEASE: return release_indicator_change(t, contact);
+    case EVENT_SWITCH: return switch_indicator_change(t, contact);
+    case EVENT_SEPARATION: return separation_indicator_change(t, contact);
     case EVENT_SLIP: return slip_indicator_change(t, contact);
     default: return reversal_indicator_change(t, contact);
     }

@@ -4,6 +4,7 @@
 #include "core/sections.h"
 #include "core/vectors.h"
 #include "hybrid/simulation.h"
+#include "tangent_contact.h"
 #include "tangent_stress.h"
 
 /* Compute the changes of the loads of all mass points. */
@@ -32,14 +33,16 @@ static void add_change(Complex *on, int body, Complex change) {
 static void stop_pull_changes(const Tangent *t, Complex *on) {
     const Equations *q = t->q;
     const System *system = q->system;
-    for (int k = 0; k < q->held_count; k++) {
-        int i = q->held[k], carrier = system->on[i];
+    for (int k = 0; k < q->held_count + q->pressed_count; k++) {
+        bool held = k < q->held_count;
+        int i = held ? q->held[k] : q->pressed[k - q->held_count], carrier = system->on[i];
         const Stop *stop = &system->mechanism->stops[i];
-        double share = -q->stop_friction[i] * sliding_sign(t, i);
         bool sticks = q->contacts.modes[i] == CONTACT_STICK;
-        double force = stop_force(q, t->lam, i), dforce = stop_force(q, t->dlam, i);
-        double along = sticks ? stick_force(q, t->lam, i) : share * force;
-        double dalong = sticks ? stick_force(q, t->dlam, i) : share * dforce;
+        double force = held ? stop_force(q, t->lam, i) : t->evaluation->pressure[i];
+        double dforce = stop_force_change(t, i);
+        double dlimit = held ? q->stop_friction[i] * dforce : limit_change(t, i);
+        double along = sticks ? stick_force(q, t->lam, i) : slip_force(q, t->e, t->evaluation, i);
+        double dalong = sticks ? stick_force(q, t->dlam, i) : -sliding_sign(t, i) * dlimit;
         Complex change = complex_of(-dforce, dalong);
         if (carrier != FIXED) {
             change = plus(product(t->e[carrier], change),
@@ -60,7 +63,7 @@ static void pull_changes(const Tangent *t, Complex *on) {
         int contact = system->s + i;
         bool sticks = q->contacts.modes[contact] == CONTACT_STICK;
         double size = sticks ? stick_force(q, t->dlam, contact)
-                             : -sliding_sign(t, contact) * limit_change(t, i);
+                             : -sliding_sign(t, contact) * limit_change(t, contact);
         Complex change = scaled(size, unit(m->frictions[i].direction));
         add_change(on, m->frictions[i].body, change);
         add_change(on, GROUND, scaled(-1.0, change));
@@ -120,7 +123,7 @@ PRBM void stress_changes(const Tangent *t, double *out) {
     if (m->stressed_count == 0) {
         return;
     }
-    SectionState at = section_state(t->q, t->e, t->y, t->v, t->a, t->lam, scratch);
+    SectionState at = section_state(t->q, t->e, t->y, t->v, t->evaluation, scratch);
     SectionState change = state_change(t);
     for (int i = 0, k = 0; i < m->flexure_count; i++) {
         if (m->types[m->flexures[i].type].stress) {

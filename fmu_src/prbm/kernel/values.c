@@ -65,7 +65,11 @@ static bool get_derivative(Simulation *sim, int k, double *x, Problem *problem) 
     if (!present_moment(sim, &now, problem)) {
         return false;
     }
-    *x = now.rates[k < count ? n + m->independent[k] : 2 * n + k - count];
+    int contact = k - count - 2, stored = contact % EXCHANGED_STATES;
+    int extra = EXTRA_STATES * (contact / EXCHANGED_STATES) + EXTRA_IMPULSE + stored;
+    *x = now.rates[k < count     ? n + m->independent[k]
+                   : contact < 0 ? 2 * n + k - count
+                                 : 2 * n + 2 + extra];
     return true;
 }
 

@@ -1,6 +1,7 @@
 """The modes of the contacts: the discrete state of a mechanism.
 
-Contacts are numbered in one list, the stops first, then the friction points.
+Contacts are numbered in one list, the stops first, then the friction points.  A closed stop is a
+constraint (it is held) or, if it is compliant and not settled, a force (it is pressed).
 """
 
 from dataclasses import dataclass, replace
@@ -43,6 +44,38 @@ class ContactMode(IntEnum):
 _SLIP_SIGNS = (0, 0, 0, 1, -1)
 
 
+class Phase(IntEnum):
+    """The phase of a contact at a compliant stop; see :mod:`prbm.mechanics.compliance`."""
+
+    PRESSED = 1
+    """The force follows the law with a constant reference speed."""
+    RISING = 2
+    """The reference speed follows the closing speed, which exceeds it and grows."""
+    FREE = 3
+    """There is no force: the surfaces have separated while the indentation recovers."""
+    SETTLED = 4
+    """The indentation is constant: the stop is a constraint."""
+
+
+@dataclass(frozen=True)
+class Touching:
+    """A contact at a compliant stop.
+
+    Parameters
+    ----------
+    phase : Phase
+        Phase of the contact.
+    reference_speed : float
+        Largest closing speed so far in this contact, at least ``rest_speed`` [m/s].
+    depth : float
+        Indentation of a settled stop [m]; 0 in other phases.
+    """
+
+    phase: Phase
+    reference_speed: float
+    depth: float = 0.0
+
+
 @dataclass(frozen=True)
 class ContactState:
     """The modes of all contacts.
@@ -53,31 +86,28 @@ class ContactState:
         Modes of the s stops, then of the f friction points.
     stops : int
         Number of stops s.
+    touching : (s,) tuple of Touching or None
+        The contacts at compliant stops that are closed; None for all other stops.
 
     Examples
     --------
-    >>> state = ContactState.free(stops=2, points=1).with_mode(1, ContactMode.STICK)
+    >>> state = ContactState.free(stops=2, points=1).held_with(1, ContactMode.STICK)
     >>> state.held, state.is_stop(2), state.without_friction().modes[1].name
     ((1,), False, 'FRICTIONLESS')
     """
 
     modes: tuple[ContactMode, ...]
     stops: int
+    touching: tuple[Touching | None, ...] = ()
+
+    def __post_init__(self) -> None:
+        if len(self.touching) != self.stops:
+            object.__setattr__(self, "touching", (None,) * self.stops)
 
     @classmethod
     def free(cls, stops: int, points: int) -> "ContactState":
         """Return the state with all stops open and no friction at the friction points."""
-        return cls.holding((), stops, points)
-
-    @classmethod
-    def holding(
-        cls, held: "tuple[int, ...] | list[int]", stops: int, points: int
-    ) -> "ContactState":
-        """Return the state in which some stops are closed, without friction anywhere."""
-        modes = [ContactMode.OPEN] * stops + [ContactMode.FRICTIONLESS] * points
-        for i in held:
-            modes[i] = ContactMode.FRICTIONLESS
-        return cls(tuple(modes), stops)
+        return cls((ContactMode.OPEN,) * stops + (ContactMode.FRICTIONLESS,) * points, stops)
 
     @property
     def points(self) -> int:
@@ -86,8 +116,15 @@ class ContactState:
 
     @cached_property
     def held(self) -> tuple[int, ...]:
-        """The closed stops in rising order."""
-        return tuple(i for i in range(self.stops) if self.modes[i].closed)
+        """The closed stops that are constraints, in rising order."""
+        return tuple(i for i in range(self.stops) if self.modes[i].closed and i not in self.pressed)
+
+    @cached_property
+    def pressed(self) -> tuple[int, ...]:
+        """The closed stops that are forces, in rising order."""
+        return tuple(
+            i for i, one in enumerate(self.touching) if one and one.phase is not Phase.SETTLED
+        )
 
     @cached_property
     def open_stops(self) -> tuple[int, ...]:
@@ -98,20 +135,69 @@ class ContactState:
         """Return whether a contact is a stop, not a friction point."""
         return contact < self.stops
 
+    def is_free(self, stop: int) -> bool:
+        """Return whether the contact at a compliant stop is free of force."""
+        touching = self.touching[stop]
+        return touching is not None and touching.phase is Phase.FREE
+
+    def depth(self, stop: int) -> float:
+        """Return the indentation at which a held stop is a constraint [m]."""
+        touching = self.touching[stop]
+        return touching.depth if touching else 0.0
+
     def with_mode(self, contact: int, mode: ContactMode) -> "ContactState":
         """Return the state in which one contact has another mode."""
         modes = list(self.modes)
         modes[contact] = mode
         return replace(self, modes=tuple(modes))
 
+    def with_touching(self, stop: int, touching: Touching | None) -> "ContactState":
+        """Return the state in which a compliant stop has another contact; None: it is open."""
+        every, mode = list(self.touching), self.modes[stop]
+        every[stop] = touching
+        if touching is None:
+            mode = ContactMode.OPEN
+        elif touching.phase is Phase.FREE or not mode.closed:
+            mode = ContactMode.FRICTIONLESS
+        return replace(self, touching=tuple(every)).with_mode(stop, mode)
+
+    def held_with(self, stop: int, mode: ContactMode) -> "ContactState":
+        """Return the state in which a stop that touches is a constraint with a mode."""
+        touching, result = self.touching[stop], self
+        if touching:
+            result = self.with_touching(stop, replace(touching, phase=Phase.SETTLED))
+        return result.with_mode(stop, mode)
+
     def released(self, stop: int) -> "ContactState":
-        """Return the state in which a stop is open."""
-        return self.with_mode(stop, ContactMode.OPEN)
+        """Return the state in which a stop is no constraint: open, or pressed if compliant."""
+        touching = self.touching[stop]
+        if touching is None:
+            return self.with_mode(stop, ContactMode.OPEN)
+        return self.with_touching(stop, replace(touching, phase=Phase.PRESSED))
 
     def opened(self) -> "ContactState":
-        """Return the state in which all stops are open; friction points keep their modes."""
-        open_stops = (ContactMode.OPEN,) * self.stops
-        return replace(self, modes=open_stops + self.modes[self.stops :])
+        """Return the state in which no stop is a constraint; other contacts keep their modes."""
+        result = self
+        for stop in self.held:
+            result = result.released(stop)
+        return result
+
+    def unloaded(self) -> "ContactState":
+        """Return the state in which stops that are constraints have no force."""
+        result = self.opened()
+        for stop in self.held:
+            touching = self.touching[stop]
+            if touching:
+                result = result.with_touching(stop, replace(touching, phase=Phase.FREE))
+        return result
+
+    def holding(self, stops: "tuple[int, ...] | list[int]") -> "ContactState":
+        """Return the state in which only these stops are constraints, without friction anywhere."""
+        result = self.opened()
+        for stop in stops:
+            result = result.held_with(stop, ContactMode.FRICTIONLESS)
+        modes = (m if m is ContactMode.OPEN else ContactMode.FRICTIONLESS for m in result.modes)
+        return replace(result, modes=tuple(modes))
 
     def without_friction(self) -> "ContactState":
         """Return the state in which sticking contacts are frictionless."""

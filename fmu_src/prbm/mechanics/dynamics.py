@@ -8,7 +8,8 @@ the loops, of the held stops and of the sticking contacts.  The terms are formed
 with the squares w^2 of the rates of the arms in place of v^2 (:mod:`prbm.mechanics.system`).  Then
 they are pulled back to the coordinates (:mod:`prbm.mechanics.direction_map`).  The force of a held
 stop that slips acts along its gap and, by Coulomb's law, along its wall; its column in R^T
-therefore differs from its row in R.
+therefore differs from its row in R.  Stops with the compliant law are loads while they are pressed
+(:mod:`prbm.mechanics.compliant_stops`).
 """
 
 from typing import NamedTuple
@@ -19,6 +20,7 @@ from scipy.linalg import block_diag
 from ..mechanism.parts import value
 from . import constraints, forces
 from .arrays import Complex, Real
+from .compliant_stops import CompliantStops, Extra, Pressure
 from .contact_state import ContactMode, ContactState
 from .inputs import Inputs
 from .kinetics import kinetic_energy, mass_accelerations
@@ -39,12 +41,15 @@ class Evaluation(NamedTuple):
         Mass matrix [kg m^2].
     factors : Factors
         Factors of the matrix of the equations, for :meth:`Equations.project_near`.
+    pressure : Pressure or None
+        Forces of the pressed compliant stops, if there are any.
     """
 
     a: Real
     lam: Real
     M: Real
     factors: constraints.Factors
+    pressure: Pressure | None = None
 
 
 class FrictionLaw(NamedTuple):
@@ -85,6 +90,7 @@ class Equations:
             FrictionLaw(*(value(f, name, values) for name in FrictionLaw._fields))
             for f in mechanism.frictions
         ]
+        self.compliant = CompliantStops(mechanism, values, contacts)
         self._number_contacts()
         self._collect_loads()
         self._stack_rows()
@@ -97,12 +103,13 @@ class Equations:
     def _number_contacts(self) -> None:
         """Sort the contacts by their modes, and number their rows."""
         modes, stops = self.contacts.modes, self.contacts.stops
-        self.held = list(self.contacts.held)
+        self.held, self.pressed = list(self.contacts.held), list(self.contacts.pressed)
         self.sticking = [c for c, mode in enumerate(modes) if mode is ContactMode.STICK]
         self.slipping_stops = [i for i in self.held if modes[i].slip]
+        # Contacts whose limit of friction does not depend on the multipliers.
         self.slipping_points = [
-            c for c in range(stops, len(modes))
-            if modes[c].slip and self.friction_laws[c - stops].coefficient > 0.0
+            c for c in [*self.pressed, *range(stops, len(modes))]
+            if modes[c].slip and self.friction_coefficient(c) > 0.0
         ]  # fmt: skip
         self.first_hold = len(self.system.loops)
         self.first_stick = self.first_hold + len(self.held)
@@ -132,6 +139,7 @@ class Equations:
         c[:loops] = system.loops_c
         for k, i in enumerate(held):
             c[self.first_hold + k] = system.gaps_c[i] + self.inputs.walls[i].position
+            c[self.first_hold + k] += self.contacts.depth(i)
         z = np.zeros(len(B), complex)
         on = np.full(len(B), FIXED)
         z[loops:end] = [*system.gaps_z[held], *system.slides_z[stuck]]
@@ -165,7 +173,12 @@ class Equations:
 
     # -- motion --
 
-    def evaluate(self, t: float, q: Real, v: Real) -> Evaluation:
+    def at(self, t: float, y: Real) -> Evaluation:
+        """Return the evaluation at a state y, as :meth:`evaluate`."""
+        n = self.n
+        return self.evaluate(t, y[:n], y[n : 2 * n], y[2 * n + 2 :])
+
+    def evaluate(self, t: float, q: Real, v: Real, extras: Real | None = None) -> Evaluation:
         """Return accelerations, multipliers, mass matrix and factors.
 
         Parameters
@@ -174,6 +187,8 @@ class Equations:
             Time, for the accelerations of walls [s].
         q, v : (n,)
             Angles and rates [rad], [rad/s].
+        extras : (4 c,) or None
+            States of the c compliant stops; None: zeros.
 
         Raises
         ------
@@ -181,7 +196,7 @@ class Equations:
             If the equations are singular.
         """
         torques = self.torques(np.concatenate([q, v]))
-        return self._solve(t, q, v, torques[: self.n])
+        return self._solve(t, q, v, torques[: self.n], extras)
 
     def torques(self, y: Real) -> Real:
         """Return the torques of springs and their damping, and those of the damping alone.
@@ -199,7 +214,9 @@ class Equations:
         result: Real = self._K_y.dot(y) - self._straight
         return result
 
-    def _solve(self, t: float, q: Real, v: Real, torques: Real) -> Evaluation:
+    def _solve(
+        self, t: float, q: Real, v: Real, torques: Real, extras: Real | None = None
+    ) -> Evaluation:
         """Solve the equations for given torques of the springs.
 
         One product gives all terms, with u = (e, 1, ..., 1):
@@ -234,13 +251,19 @@ class Equations:
             Q += self.moment
         if self.mass_damping:
             Q -= self.mass_damping * (M @ v)
+        pressure = None
+        if self.pressed:
+            gaps, rates = self.gaps(t, e, extras), self.gap_rates(t, e, v, extras)
+            pressure = self.compliant.pressure(gaps, rates)
+            Q += pressure.force @ self.system.gap_rows.jacobian(e)[self.pressed]
         for c in self.slipping_points:
-            Q -= self.contacts.modes[c].slip * self.friction_limit(c, e) * self.slip_row(c, e)
+            limit = self.friction_limit(c, e, pressure)
+            Q -= self.contacts.modes[c].slip * limit * self.slip_row(c, e)
         for i in self.slipping_stops:
             share = -self.stop_friction[i] * self.contacts.modes[i].slip
-            kkt[:n, n + self._hold_row(i)] += share * self.slip_row(i, e)
+            kkt[:n, n + self.hold_row(i)] += share * self.slip_row(i, e)
         x, factors = constraints.factor_and_solve(kkt, right)
-        return Evaluation(x[:n], -x[n:], M, factors)
+        return Evaluation(x[:n], -x[n:], M, factors, pressure)
 
     def mass_and_loops(self, q: Real) -> tuple[Complex, Real, Real]:
         """Return e, the mass matrix (n, n) and the Jacobian of the loops (r, n) at a position."""
@@ -250,53 +273,30 @@ class Equations:
     # -- rates of the state --
 
     def rate(self, t: float, y: Real) -> Real:
-        """Return dy/dt for y = (q, v, dissipated energy, work), (2 n + 2,)."""
+        """Return dy/dt for y = (q, v, dissipated energy, work, states of compliant stops)."""
         return self.rate_and_evaluation(t, y)[0]
 
     def rate_and_evaluation(self, t: float, y: Real) -> tuple[Real, Evaluation]:
-        """Return dy/dt for y = (q, v, dissipated energy, work), and the evaluation there."""
+        """Return dy/dt as :meth:`rate`, and the evaluation there."""
         n = self.n
-        q, v = y[:n], y[n : 2 * n]
+        q, v, extras = y[:n], y[n : 2 * n], y[2 * n + 2 :]
         torques = self.torques(y[: 2 * n])
-        evaluation = self._solve(t, q, v, torques[:n])
-        lam = evaluation.lam
+        evaluation = self._solve(t, q, v, torques[:n], extras)
         loss, power = v.dot(torques[n:]), 0.0
         if self.mass_damping:
             loss += 2.0 * self.mass_damping * kinetic_energy(evaluation.M, v)
         if self.slipping_points or self.slipping_stops:
-            loss += self._friction_power(q, v, lam)
+            loss += friction_power(self, q, v, evaluation)
         if self.driven or self.moving_walls:
-            power = self._input_power(t, q, v, lam)
-        result = np.empty(2 * n + 2)
+            power = input_power(self, t, q, v, evaluation.lam)
+        result = np.empty(len(y))
         result[:n] = v
-        result[n:-2] = evaluation.a
-        result[-2] = loss
-        result[-1] = power
+        result[n : 2 * n] = evaluation.a
+        result[2 * n] = loss
+        result[2 * n + 1] = power
+        if len(extras):
+            add_compliant_rates(self, t, extras, evaluation, result)
         return result, evaluation
-
-    def _friction_power(self, q: Real, v: Real, lam: Real) -> float:
-        """Return the power that friction dissipates [W]."""
-        e = self.system.directions(q)
-        power = 0.0
-        for c in self.slipping_points:
-            limit = self.friction_limit(c, e)
-            power += self.contacts.modes[c].slip * limit * self.slip_rate(c, e, v)
-        for i in self.slipping_stops:
-            rate = self.slip_rate(i, e, v)
-            force = float(lam[self._hold_row(i)])
-            power += self.stop_friction[i] * force * self.contacts.modes[i].slip * rate
-        return power
-
-    def _input_power(self, t: float, q: Real, v: Real, lam: Real) -> float:
-        """Return the power of the inputs and of the moving walls of held stops [W]."""
-        power = 0.0
-        if self.driven:
-            e = self.system.directions(q)
-            load = self.system.Phi.pull(forces.generalised(self.w_input, e))
-            power += float((load + self.moment) @ v)
-        if self.moving_walls:
-            power -= float(lam[self.first_hold : self.first_stick] @ self.held_motions(t)[1])
-        return power
 
     # -- constraints --
 
@@ -309,7 +309,8 @@ class Equations:
         if not self.moving_walls:
             return self.rows.c
         c = self.rows.c.copy()
-        c[self.first_hold : self.first_stick] = self.system.gaps_c[self.held]
+        depths = [self.contacts.depth(i) for i in self.held]
+        c[self.first_hold : self.first_stick] = self.system.gaps_c[self.held] + depths
         c[self.first_hold : self.first_stick] += self.held_motions(t)[0]
         return c
 
@@ -373,32 +374,46 @@ class Equations:
 
     # -- stops --
 
-    def gaps(self, t: float | Real, e: Complex) -> Real:
-        """Return the gaps of all stops [m]; ``e`` may be a stack (m, d), one row per time t."""
+    def gaps(self, t: float | Real, e: Complex, extras: Real | None = None) -> Real:
+        """Return the gaps of all stops [m]; ``e`` may be a stack (m, d), one row per time t.
+
+        Without the states ``extras`` (4 c,) of the compliant stops, their walls do not give way.
+        """
         walls = np.array([wall.motion(t)[0] for wall in self.inputs.walls]).T
         result: Real = self.system.gap_rows.values(e) + walls
+        self.compliant.add_gives(extras, result, Extra.GIVE)
         return result
 
-    def gap_rates(self, t: float | Real, e: Complex, v: Real) -> Real:
-        """Return the rates of all gaps [m/s]; e and v may be stacks, as for :meth:`gaps`."""
+    def gap_rates(self, t: float | Real, e: Complex, v: Real, extras: Real | None = None) -> Real:
+        """Return the rates of all gaps [m/s]; arguments may be stacks, as for :meth:`gaps`."""
         walls = np.array([wall.motion(t)[1] for wall in self.inputs.walls]).T
         result: Real = self.system.gap_rows.rates(e, v) + walls
+        self.compliant.add_gives(extras, result, Extra.GIVE_RATE)
         return result
 
-    def gap_accelerations(self, t: float, e: Complex, v: Real, a: Real) -> Real:
-        """Return the accelerations of all gaps [m/s^2] for accelerations a (n,) [rad/s^2]."""
+    def gap_accelerations(
+        self, t: float, e: Complex, v: Real, a: Real, pressure: Pressure | None = None
+    ) -> Real:
+        """Return the accelerations of all gaps [m/s^2] for accelerations a (n,) [rad/s^2].
+
+        Walls give way to the forces of pressed stops.
+        """
         rows = self.system.gap_rows
         walls = np.array([wall.motion(t)[2] for wall in self.inputs.walls])
         result: Real = rows.jacobian(e) @ a - rows.convective(e, v) + walls
+        if pressure is not None:
+            result[self.pressed] += np.array(self.inputs.mobilities)[self.pressed] * pressure.force
         return result
 
-    def stop_forces(self, lam: Real) -> Real:
+    def stop_forces(self, lam: Real, pressure: Pressure | None = None) -> Real:
         """Return the normal forces of all stops, (s,), zero where open [N]."""
         result = np.zeros(self.contacts.stops)
         result[self.held] = lam[self.first_hold : self.first_stick]
+        if pressure is not None:
+            result[self.pressed] = pressure.force
         return result
 
-    def _hold_row(self, stop: int) -> int:
+    def hold_row(self, stop: int) -> int:
         """Return the row of the gap of a held stop."""
         return self.first_hold + self.held.index(stop)
 
@@ -427,19 +442,96 @@ class Equations:
         rows, i = self.slip_rows(contact)
         return float(rows.jacobian(e)[i] @ a - rows.convective(e, v)[i])
 
-    def friction(self, contact: int, e: Complex, lam: Real) -> tuple[float, float]:
+    def friction_coefficient(self, contact: int) -> float:
+        """Return the coefficient of friction of a contact [-]."""
+        stops = self.contacts.stops
+        if contact < stops:
+            return self.stop_friction[contact]
+        return self.friction_laws[contact - stops].coefficient
+
+    def friction(
+        self, contact: int, e: Complex, lam: Real, pressure: Pressure | None = None
+    ) -> tuple[float, float]:
         """Return the friction force of a sticking contact, and its limit mu N [N]."""
         force = float(lam[self.first_stick + self.sticking.index(contact)])
-        if self.contacts.is_stop(contact):
-            return force, self.stop_friction[contact] * float(lam[self._hold_row(contact)])
-        return force, self.friction_limit(contact, e)
+        if contact in self.held:
+            return force, self.stop_friction[contact] * float(lam[self.hold_row(contact)])
+        return force, self.friction_limit(contact, e, pressure)
 
-    def friction_limit(self, contact: int, e: Complex) -> float:
-        """Return mu N of a friction point [N]."""
+    def friction_limit(self, contact: int, e: Complex, pressure: Pressure | None = None) -> float:
+        """Return mu N of a friction point, or of a pressed stop [N]."""
+        if self.contacts.is_stop(contact):
+            assert pressure is not None
+            force = float(pressure.force[self.pressed.index(contact)])
+            return self.stop_friction[contact] * max(force, 0.0)
         point = contact - self.contacts.stops
         mu, preload, stiffness = self.friction_laws[point]
         lift = float((self.system.lifts[point] @ e).real) + self.system.lifts_c[point]
         return mu * forces.normal_force(lift, preload, stiffness)
+
+
+def sliding_friction(
+    equations: Equations, contact: int, e: Complex, evaluation: Evaluation
+) -> float:
+    """Return the friction force of a slipping contact against its motion [N]."""
+    if contact in equations.held:
+        force = float(evaluation.lam[equations.hold_row(contact)])
+        return equations.stop_friction[contact] * force
+    return equations.friction_limit(contact, e, evaluation.pressure)
+
+
+def friction_power(equations: Equations, q: Real, v: Real, evaluation: Evaluation) -> float:
+    """Return the power that friction dissipates [W]."""
+    e, modes, power = equations.system.directions(q), equations.contacts.modes, 0.0
+    for c in (*equations.slipping_points, *equations.slipping_stops):
+        force = sliding_friction(equations, c, e, evaluation)
+        power += modes[c].slip * force * equations.slip_rate(c, e, v)
+    return power
+
+
+def input_power(equations: Equations, t: float, q: Real, v: Real, lam: Real) -> float:
+    """Return the power of the inputs and of the moving walls of held stops [W]."""
+    power, system = 0.0, equations.system
+    if equations.driven:
+        e = system.directions(q)
+        load = system.Phi.pull(forces.generalised(equations.w_input, e))
+        power += float((load + equations.moment) @ v)
+    if equations.moving_walls:
+        held = lam[equations.first_hold : equations.first_stick]
+        power -= float(held @ equations.held_motions(t)[1])
+    return power
+
+
+def add_compliant_rates(
+    equations: Equations, t: float, extras: Real, evaluation: Evaluation, result: Real
+) -> None:
+    """Add losses, the work of walls and the rates of the states of compliant stops to dy/dt.
+
+    Parameters
+    ----------
+    equations : Equations
+        Equations of motion.
+    t : float
+        Time [s].
+    extras : (4 c,)
+        States of the compliant stops.
+    evaluation : Evaluation
+        Evaluation at the state.
+    result : (2 n + 2 + 4 c,)
+        dy/dt, which is changed.
+    """
+    own, n, inputs = equations.compliant, equations.n, equations.inputs
+    result[2 * n + 2 :] = own.rates(
+        extras, inputs, equations.stop_forces(evaluation.lam, evaluation.pressure)
+    )
+    pressure = evaluation.pressure
+    if pressure is None:
+        return
+    for i, force, loss in zip(equations.pressed, pressure.force, pressure.loss, strict=True):
+        give_rate = extras[own.index(i, Extra.GIVE_RATE)]
+        result[2 * n] += loss
+        result[2 * n + 1] -= force * (inputs.walls[i].motion(t)[1] + give_rate)
+        result[2 * n + 2 + own.index(i, Extra.LOSS)] = loss
 
 
 def base_reaction(equations: Equations, q: Real, v: Real, a: Real) -> tuple[complex, float]:

@@ -109,6 +109,10 @@ class Wall:
         position = self.position - change * (t - self.since)
         return replace(self, position=position, rate=self.rate + change)
 
+    def displaced(self, change: float) -> "Wall":
+        """Return the wall and its reference, displaced [m]."""
+        return replace(self, position=self.position + change)
+
     def arrived(self) -> "Wall":
         """Return the wall on its reference."""
         return replace(self, offset=0.0, excess=0.0, span=0.0)

@@ -123,10 +123,23 @@ def simulated_restitution(phi: Real, M: Real, before: Real, after: Real) -> floa
     0.5
     """
     momentum = M @ phi
-    arriving = float(momentum @ before)
-    if abs(arriving) <= ZERO_MODE_RTOL * float(np.abs(momentum) @ (np.abs(before) + np.abs(after))):
+    return modal_ratio(momentum, before, momentum, after)
+
+
+def modal_ratio(first: Real, before: Real, last: Real, after: Real) -> float:
+    """Return -(last^T after) / (first^T before) [-]; zero if first^T before is round-off.
+
+    Parameters
+    ----------
+    first, last : (n,)
+        M phi of the fundamental mode before and after an impact.
+    before, after : (n,)
+        Rates before and after the impact [rad/s].
+    """
+    arriving = float(first @ before)
+    if abs(arriving) <= ZERO_MODE_RTOL * float(np.abs(first) @ (np.abs(before) + np.abs(after))):
         return 0.0
-    return -float(momentum @ after) / arriving
+    return -float(last @ after) / arriving
 
 
 def modal_restitution(system: System, shape: Equilibrium, stop: int, restitution: float) -> float:

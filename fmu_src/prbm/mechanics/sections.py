@@ -27,7 +27,7 @@ from collections.abc import Iterable, Mapping
 from ..mechanism.parts import GROUND
 from .arrays import Complex, Real
 from .contact_state import ContactMode
-from .dynamics import Equations
+from .dynamics import Equations, Evaluation, sliding_friction
 from .free_body import SectionLoads
 from .kinetics import mass_accelerations
 from .statics import Equilibrium
@@ -90,7 +90,7 @@ def connection_loads(
 
 
 def section_loads(
-    equations: Equations, q: Real, v: Real, a: Real, lam: Real
+    equations: Equations, q: Real, v: Real, found: Evaluation
 ) -> tuple[list[SectionLoads], complex]:
     """Return the forces and moments of all flexures in motion, and the force on the ground [N].
 
@@ -100,17 +100,17 @@ def section_loads(
     ----------
     equations : Equations
         Equations of motion.
-    q, v, a : (n,)
-        Coordinates [rad], rates [rad/s] and accelerations [rad/s^2].
-    lam : (r,)
-        Multipliers of the evaluation [N].
+    q, v : (n,)
+        Coordinates [rad] and rates [rad/s].
+    found : Evaluation
+        Evaluation there.
     """
     system = equations.system
     e, deflection = system.directions(q), q - system.q0
-    loads = point_loads(equations, e, v, a)
-    pulls = [*_inputs(equations), *contact_forces(equations, e, lam)]
+    loads = point_loads(equations, e, v, found.a)
+    pulls = [*_inputs(equations), *contact_forces(equations, e, found)]
     strained = deflection + equations.beta * v
-    return connection_loads(system, e, deflection, strained, loads, pulls, lam)
+    return connection_loads(system, e, deflection, strained, loads, pulls, found.lam)
 
 
 def static_section_loads(
@@ -157,19 +157,20 @@ def _inputs(equations: Equations) -> Pulls:
         yield force.body, pull
 
 
-def contact_forces(equations: Equations, e: Complex, lam: Real) -> Pulls:
+def contact_forces(equations: Equations, e: Complex, found: Evaluation) -> Pulls:
     """Yield the forces of closed stops and of friction points on bodies and on the ground."""
     system, modes = equations.system, equations.contacts.modes
-    for i, force in enumerate(equations.stop_forces(lam).tolist()):
+    lam, pressure = found.lam, found.pressure
+    for i, force in enumerate(equations.stop_forces(lam, pressure).tolist()):
         if not modes[i].closed:
             continue
         stop = system.mechanism.stops[i]
         u = unit(stop.direction) * (1.0 if system.on[i] == FIXED else complex(e[system.on[i]]))
         along = 0.0
         if modes[i] is ContactMode.STICK:
-            along = equations.friction(i, e, lam)[0]
+            along = equations.friction(i, e, lam, pressure)[0]
         elif modes[i].slip:
-            along = -equations.stop_friction[i] * modes[i].slip * force
+            along = -modes[i].slip * sliding_friction(equations, i, e, found)
         pull = u * complex(-force, along)
         yield stop.body, pull
         yield stop.on, -pull

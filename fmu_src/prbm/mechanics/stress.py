@@ -18,7 +18,7 @@ import numpy as np
 from ..base.tolerances import STRESS_TIE_RTOL
 from ..mechanism.description import Mechanism
 from .arrays import Real
-from .dynamics import Equations
+from .dynamics import Equations, Evaluation
 from .free_body import SectionLoads
 from .sections import section_loads, static_section_loads
 from .statics import Equilibrium
@@ -86,7 +86,7 @@ def stress(loads: SectionLoads) -> Stress:
     return Stress(float(left[0]), float(left[-1]), largest, place, float(loads.position[k]))
 
 
-def stresses(equations: Equations, q: Real, v: Real, a: Real, lam: Real) -> dict[str, Stress]:
+def stresses(equations: Equations, q: Real, v: Real, found: Evaluation) -> dict[str, Stress]:
     """Return the stress in the flexures whose stress is an output, by name.
 
     The arguments are those of :func:`prbm.mechanics.sections.section_loads`.
@@ -94,16 +94,16 @@ def stresses(equations: Equations, q: Real, v: Real, a: Real, lam: Real) -> dict
     wanted = stressed(equations.system.mechanism)
     if not wanted:
         return {}
-    loads, _ = section_loads(equations, q, v, a, lam)
+    loads, _ = section_loads(equations, q, v, found)
     return {loads[i].name: stress(loads[i]) for i in wanted}
 
 
-def section_stresses(equations: Equations, q: Real, v: Real, a: Real, lam: Real) -> SectionStresses:
+def section_stresses(equations: Equations, q: Real, v: Real, found: Evaluation) -> SectionStresses:
     """Return the stress in all sections of the flexures whose stress is an output.
 
     The arguments are those of :func:`prbm.mechanics.sections.section_loads`.
     """
-    loads, _ = section_loads(equations, q, v, a, lam)
+    loads, _ = section_loads(equations, q, v, found)
     return {loads[i].name: faces(loads[i]) for i in stressed(equations.system.mechanism)}
 
 

@@ -46,6 +46,7 @@ from .flexure import (
 from .parameters import Parameter
 from .parts import (
     GROUND,
+    LAWS,
     MODE_MAX,
     Body,
     Flexure,
@@ -282,6 +283,7 @@ class Mechanism:
             if part.body not in bodies:
                 raise MechanismError(_undefined(f"{part.name}.body", part.body, bodies))
         for stop in self.stops:
+            _check_law(stop)
             if stop.on != GROUND and stop.on not in bodies:
                 raise MechanismError(_undefined(f"{stop.name}.on", stop.on, (GROUND, *bodies)))
             if stop.on == stop.body:
@@ -391,6 +393,26 @@ class Mechanism:
                 "bodies"
             )
 
+    def check_rigid(self, use: str) -> None:
+        """Reject compliant stops, for a computation that has rigid impacts only.
+
+        Parameters
+        ----------
+        use : str
+            The computation, with an article.
+
+        Raises
+        ------
+        MechanismError
+            If a stop is compliant.
+        """
+        for stop in self.stops:
+            if stop.compliant:
+                raise MechanismError(
+                    f'{stop.name}.law = "{stop.law}": {use} has rigid impacts only; choose the '
+                    "law rigid, or simulate the mechanism"
+                )
+
     def point(self, reference: str, user: str) -> Point:
         """Return the coordinates of the point ``body.point`` as drawn [m].
 
@@ -438,6 +460,25 @@ def _undefined(key: str, name: str, known: Iterable[str]) -> str:
     """Return the message for a key whose value is not the name of a known part."""
     remedy = f"choose one of {', '.join(known)}" if known else "define it"
     return f"{key} = {name!r} is not defined; {remedy}"
+
+
+def _check_law(stop: Stop) -> None:
+    """Reject an unknown law of impact, and keys that belong to another law."""
+    if stop.law not in LAWS:
+        raise MechanismError(f"{stop.name}.law = {stop.law!r}: choose one of {', '.join(LAWS)}")
+    if stop.compliant:
+        if stop.stiffness is None:
+            raise MechanismError(
+                f"{stop.name}.stiffness is missing: a compliant stop needs the force over "
+                "indentation^exponent; add the key, or remove law"
+            )
+        return
+    for name in ("stiffness", "exponent"):
+        if getattr(stop, name) is not None:
+            raise MechanismError(
+                f"{stop.name}.{name} = {getattr(stop, name)}: a rigid stop has no {name}; remove "
+                'it, or choose law = "compliant"'
+            )
 
 
 def _check_profile(kind: FlexureType) -> None:

@@ -11,6 +11,7 @@ from .flexure import CLAMP, LEAF, NOTCH, TAPER
 Point = tuple[Quantity, Quantity]
 
 GROUND = "ground"
+LAWS = RIGID, COMPLIANT = ("rigid", "compliant")
 
 
 @dataclass(frozen=True)
@@ -208,6 +209,13 @@ class Stop:
         wall [m/s].
     on : str
         Body that carries the wall, or ``ground``.
+    law : str
+        Law of impact, a member of :data:`LAWS`: ``rigid`` (Newton's or Stronge's law), or
+        ``compliant`` (:mod:`prbm.mechanics.compliance`).
+    stiffness : Quantity or None
+        Stiffness of a compliant stop, force over indentation^exponent [N/m^exponent].
+    exponent : Quantity or None
+        Exponent of a compliant stop: 1 for a plate or a pad (default), 1.5 for a sphere.
     """
 
     name: str
@@ -220,6 +228,18 @@ class Stop:
     friction: Quantity = 0.0
     rest_speed: Quantity = 1e-3
     on: str = GROUND
+    law: str = RIGID
+    stiffness: Quantity | None = None
+    exponent: Quantity | None = None
+
+    def __post_init__(self) -> None:
+        if self.compliant and self.exponent is None:
+            object.__setattr__(self, "exponent", 1.0)
+
+    @property
+    def compliant(self) -> bool:
+        """Whether the stop has the compliant law."""
+        return self.law == COMPLIANT
 
 
 @dataclass(frozen=True)
@@ -325,6 +345,7 @@ Part = Body | FlexureType | Flexure | Joint | Stop | Friction | Force | Probe | 
 LENGTH_MIN = 1e-9  # m; smallest dimension of a mechanism.
 MASS_MIN = 1e-15  # kg; half the mass of a cubic micrometre of silicon.
 LENGTH_MAX = 1e3  # m; largest dimension of a mechanism.
+RESTITUTION_MIN = 0.01  # Smallest coefficient of restitution of a compliant stop.
 ANGLE_MAX = 100.0  # rad; largest rotation of a release.
 MODE_MAX = 512  # Largest number of the mode of a release.
 
@@ -397,6 +418,10 @@ FIELDS: dict[type, dict[str, tuple[str, str, float, float, float | None, bool]]]
             "pressed against the wall",
             0.0, 1e3, 1e-3, tunable=True,
         ),
+        "stiffness": _meta(
+            "N/m", "Contact stiffness: force over indentation^exponent", 1e-6, 1e18, 1e6,
+        ),
+        "exponent": _meta("", "Exponent of the contact force", 1.0, 10.0),
     },
     Friction: {
         "coefficient": _meta("", "Coefficient of Coulomb friction", 0.0, 100.0, tunable=True),
@@ -437,7 +462,22 @@ def fields_of(part: Part) -> dict[str, Meta]:
     >>> [*fields_of(Release("lever", angle=0.1))]
     ['angle', 'velocity']
     """
-    return {n: meta for n, meta in FIELDS[type(part)].items() if field_of(part, n) is not None}
+    fields = {n: meta for n, meta in FIELDS[type(part)].items() if field_of(part, n) is not None}
+    if isinstance(part, Stop) and part.compliant:
+        fields |= _compliant_fields(part)
+    return fields
+
+
+def _compliant_fields(stop: Stop) -> dict[str, Meta]:
+    """Return the fields of a compliant stop that differ from those of a rigid stop."""
+    restitution = _meta(
+        "", "Coefficient of restitution of a point mass", RESTITUTION_MIN, 1.0, tunable=True
+    )
+    if stop.exponent == 1.0:
+        return {"restitution": restitution}
+    _, description, minimum, maximum, nominal, tunable = FIELDS[Stop]["stiffness"]
+    stiffness = ("", f"{description} [N/m^exponent]", minimum, maximum, nominal, tunable)
+    return {"restitution": restitution, "stiffness": stiffness}
 
 
 def field_of(part: Part, name: str) -> Quantity | None:

@@ -64,6 +64,8 @@ def march(
 
     Raises
     ------
+    MechanismError
+        If a stop is compliant.
     ParameterError
         If the step is not positive, or :class:`prbm.Simulation` rejects a value.
     SimulationError
@@ -71,6 +73,7 @@ def march(
     """
     if not 0.0 < step <= stop_time:
         raise ParameterError(f"step = {step:g} s must be positive and within {stop_time:g} s")
+    mechanism.check_rigid("the integration with fixed steps")
     simulation = Simulation(mechanism, values)
     system, n, y = simulation.system, simulation.system.n, simulation.front.y
     contacts = ContactState.free(len(mechanism.stops), len(mechanism.frictions))

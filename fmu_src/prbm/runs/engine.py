@@ -7,8 +7,8 @@ from typing import Any, Protocol
 
 from ..base.errors import MechanismError, ParameterError, PrbmError
 from ..hybrid.configuration import Configuration
-from ..hybrid.impacts import Impact
 from ..hybrid.outputs import Outputs
+from ..hybrid.records import Impact
 from ..hybrid.simulation import Simulation
 from ..kernel.library import library
 from ..kernel.simulation import KernelSimulation

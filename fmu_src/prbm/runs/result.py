@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..base.errors import PrbmError
 from ..base.names import proposal
-from ..hybrid.impacts import Impact
+from ..hybrid.records import Impact
 from ..mechanics.arrays import Real
 from ..mechanism.description import Mechanism
 from .quantities import QUANTITIES

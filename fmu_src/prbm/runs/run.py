@@ -11,7 +11,7 @@ from ..base.errors import ParameterError, SimulationError
 from ..base.names import unknown
 from ..base.progress import Progress
 from ..hybrid.configuration import replaced_tolerance
-from ..hybrid.impacts import Impact
+from ..hybrid.records import Impact
 from ..mechanism.description import Mechanism
 from .driving import Driver
 from .engine import Engine, simulation

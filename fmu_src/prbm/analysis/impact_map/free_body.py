@@ -60,6 +60,7 @@ def closed_form(
         * the body has less than :data:`ENERGY_SHARE_MIN` of the kinetic energy of the fundamental
           mode along the path.
     """
+    mechanism.check_rigid("the closed form")
     which = MovedStop.of(mechanism, stop)
     s = mechanism.stops[which.index]
     if s.on != GROUND:

@@ -1,7 +1,7 @@
 """The first impact after a release, and the energies of the modes before and after it."""
 
 from ...base.errors import EquilibriumError
-from ...hybrid.impacts import Impact
+from ...hybrid.records import Impact
 from ...mechanics.modal import modes_at
 from ...mechanics.system import System
 from ...mechanism.parts import value

@@ -113,6 +113,7 @@ def algebraic(
     EquilibriumError
         If a wall cannot be reached by a force on the released body.
     """
+    mechanism.check_rigid("the algebraic map")
     which = MovedStop.of(mechanism, stop)
     count = point_counter(progress, len(walls) * len(offsets))
 
@@ -151,6 +152,7 @@ def by_elements(
     FiniteElementError
         If Exudyn is not installed.
     """
+    mechanism.check_rigid("the map by finite elements")
     which = MovedStop.of(mechanism, stop)
     count = point_counter(progress, len(walls) * len(offsets))
 

@@ -9,6 +9,17 @@ PRBM ContactMode slipping_mode(double sign) {
     return sign > 0.0 ? CONTACT_SLIP_POSITIVE : CONTACT_SLIP_NEGATIVE;
 }
 
+/* Whether the contact is a force, not a constraint. */
+PRBM bool is_pressed(const Touching *touching) {
+    return touching->phase == PHASE_PRESSED || touching->phase == PHASE_RISING ||
+           touching->phase == PHASE_FREE;
+}
+
+/* Whether a stop is a constraint. */
+PRBM bool is_held(const ContactState *contacts, int stop) {
+    return contacts->modes[stop] != CONTACT_OPEN && !is_pressed(&contacts->touching[stop]);
+}
+
 PRBM bool is_stop(const System *system, int contact) {
     return contact < system->s;
 }

@@ -9,9 +9,19 @@
  * independently of other contacts. */
 PRBM int slip_sign(ContactMode mode); /* Sign of the sliding velocity: -1, 0 or +1. */
 
+/* A contact at a compliant stop.  Its phase is PHASE_NONE at other stops.  A settled stop whose
+ * mode is CONTACT_OPEN has no force; this occurs only while modes are tried. */
+typedef struct {
+    Phase phase;
+    double reference_speed, depth;
+} Touching;
+
 typedef struct {
     ContactMode *modes; /* (s + f,) */
+    Touching *touching; /* (s,) */
 } ContactState;
+PRBM bool is_pressed(const Touching *touching);
+PRBM bool is_held(const ContactState *contacts, int stop);
 PRBM ContactMode slipping_mode(double sign);
 PRBM bool is_stop(const System *system, int contact);
 PRBM Rows tangential_rows(const System *system, int contact, int *i);

@@ -8,17 +8,10 @@
 
 /* The power that friction dissipates. */
 static double rubbing_power(const Equations *q, const Evaluation *at, const double *v) {
-    Rows rubs = rub_rows(q->system), walls = slide_rows(q->system);
     double power = 0.0;
-    for (int k = q->slipping_stops; k < q->slipping_count; k++) {
-        int i = q->slipping[k] - q->system->s;
-        power -= rub_force(q, i, at->at.e) * row_rate(&rubs, i, at->at.e, v);
-    }
-    for (int k = 0; k < q->slipping_stops; k++) {
-        int i = q->slipping[k];
-        double force = at->lam[q->first_hold + held_at(q, i)];
-        double speed = row_rate(&walls, i, at->at.e, v);
-        power += q->stop_friction[i] * force * slip_sign(q->contacts.modes[i]) * speed;
+    for (int k = 0; k < q->slipping_count; k++) {
+        double speed = sliding_velocity(q->system, q->slipping[k], at->at.e, v);
+        power -= slip_force(q, at->at.e, at, q->slipping[k]) * speed;
     }
     return power;
 }
@@ -38,11 +31,39 @@ static double input_power(const Equations *q, const Evaluation *at, const double
     return power;
 }
 
+/* Compute the rates of the states of compliant stops.  Add the losses and the work of the walls to
+ * the rates of the energies.  The walls of settled stops do not give way. */
+RARE void compliant_rates(const Equations *q, const Evaluation *at, double *dy) {
+    const Mechanism *m = q->system->mechanism;
+    double *energies = dy + 2 * q->system->n;
+    for (int i = 0; i < m->stop_count; i++) {
+        if (!m->stops[i].compliant) {
+            continue;
+        }
+        bool pressed = is_pressed(&q->contacts.touching[i]);
+        const double *now = at->at.extra + m->stops[i].extra;
+        double *rates = energies + 2 + m->stops[i].extra;
+        double force = pressed ? at->pressure[i]
+                       : is_held(&q->contacts, i) ? stop_force(q, at->lam, i)
+                                                  : 0.0;
+        rates[EXTRA_GIVE] = now[EXTRA_GIVE_RATE];
+        rates[EXTRA_GIVE_RATE] = pressed ? q->inputs.mobilities[i] * force : 0.0;
+        rates[EXTRA_IMPULSE] = force;
+        rates[EXTRA_LOSS] = pressed ? at->contact_loss[i] : 0.0;
+        if (pressed) {
+            double velocity = wall_motion(&q->inputs.walls[i], at->at.time).v;
+            energies[0] += at->contact_loss[i];
+            energies[1] -= force * (velocity + now[EXTRA_GIVE_RATE]);
+        }
+    }
+}
+
 SIZED bool rates_of_length(int even, const Equations *q, const double *y, const Reference *near,
                            Evaluation *result, double *dy) {
     int n = q->system->n;
     pad_of(even, n, y, result->at.angle);
     pad_second(even, n, y, result->at.speed);
+    result->at.extra = y + 2 * n + 2;
     if (!motion_of_length(even, q, near, result)) {
         return false;
     }
@@ -79,6 +100,7 @@ PRBM bool rate_at_time(const Equations *equations, const double *y, const Refere
     }
     if (q->driven) {
         dy[2 * n + 1] = input_power(q, result, v);
+        compliant_rates(q, result, dy);
     }
     return true;
 }
@@ -91,22 +113,36 @@ PRBM bool rate(const Equations *equations, double t, const double *y, const Refe
 
 /* --- stops ------------------------------------------------------------------------------------ */
 
-PRBM double gap(const Equations *equations, int i, double t, const Complex *e) {
+PRBM double give_of(const Equations *q, int i, const double *extra, Extra which) {
+    if (extra == NULL) {
+        return 0.0;
+    }
+    const Stop *stop = &q->system->mechanism->stops[i];
+    return stop->compliant ? extra[stop->extra + (int)which] : 0.0;
+}
+
+PRBM double gap(const Equations *equations, int i, double t, const Complex *e,
+                const double *extra) {
     Rows rows = gap_rows(equations->system);
-    return row_value(&rows, i, e) + rows.c[i] + wall_motion(&equations->inputs.walls[i], t).x;
+    return row_value(&rows, i, e) + rows.c[i] + wall_motion(&equations->inputs.walls[i], t).x +
+           give_of(equations, i, extra, EXTRA_GIVE);
 }
 
 PRBM double gap_rate(const Equations *equations, int i, double t, const Complex *e,
-                     const double *v) {
+                     const double *v, const double *extra) {
     Rows rows = gap_rows(equations->system);
-    return row_rate(&rows, i, e, v) + wall_motion(&equations->inputs.walls[i], t).v;
+    return row_rate(&rows, i, e, v) + wall_motion(&equations->inputs.walls[i], t).v +
+           give_of(equations, i, extra, EXTRA_GIVE_RATE);
 }
 
 PRBM double gap_acceleration(const Equations *equations, int i, double t, const Complex *e,
-                             const double *v, const double *a) {
-    Rows rows = gap_rows(equations->system);
-    return row_rate(&rows, i, e, a) - row_convective(&rows, i, e, v) +
-           wall_motion(&equations->inputs.walls[i], t).a;
+                             const double *v, const Evaluation *found) {
+    const Equations *q = equations;
+    Rows rows = gap_rows(q->system);
+    double result = row_rate(&rows, i, e, found->a) - row_convective(&rows, i, e, v) +
+                    wall_motion(&q->inputs.walls[i], t).a;
+    bool pressed = is_pressed(&q->contacts.touching[i]);
+    return pressed ? result + q->inputs.mobilities[i] * found->pressure[i] : result;
 }
 
 /* --- reactions -------------------------------------------------------------------------------- */

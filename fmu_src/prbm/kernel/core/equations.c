@@ -20,7 +20,10 @@ PRBM void equations_place(Equations *equations, const System *system, Memory *me
     Equations q = {0};
     q.system = system;
     q.contacts.modes = place(memory, s + f, sizeof(ContactMode));
+    q.contacts.touching = place(memory, s, sizeof(Touching));
     q.held = place(memory, s, sizeof(int));
+    q.pressed = place(memory, s, sizeof(int));
+    q.laws = place(memory, s, sizeof(ComplianceLaw));
     q.sticking = place(memory, s + f, sizeof(int));
     q.slipping = place(memory, s + f, sizeof(int));
     q.stop_friction = place(memory, s, sizeof(double));
@@ -53,7 +56,31 @@ static void add_row(Equations *q, const Rows *rows, int i, double c) {
     q->r++;
 }
 
-/* Set the active rows: those of the loops, of closed stops and of sticking contacts. */
+PRBM double friction_coefficient(const Equations *q, int contact) {
+    return is_stop(q->system, contact) ? q->stop_friction[contact]
+                                       : q->rub_law[3 * (contact - q->system->s)];
+}
+
+/* List the contacts that slip: held stops, then pressed stops and friction points. */
+static void list_slipping(Equations *q) {
+    const ContactMode *modes = q->contacts.modes;
+    int s = q->system->s;
+    q->slipping_count = 0;
+    for (int k = 0; k < q->held_count; k++) {
+        if (slip_sign(modes[q->held[k]]) != 0) {
+            q->slipping[q->slipping_count++] = q->held[k];
+        }
+    }
+    q->slipping_stops = q->slipping_count;
+    for (int contact = 0; contact < s + q->system->f; contact++) {
+        bool held = contact < s && is_held(&q->contacts, contact);
+        if (!held && slip_sign(modes[contact]) != 0 && friction_coefficient(q, contact) > 0.0) {
+            q->slipping[q->slipping_count++] = contact;
+        }
+    }
+}
+
+/* Set the active rows: those of the loops, of held stops and of sticking contacts. */
 static void set_rows(Equations *q) {
     const System *system = q->system;
     Rows loops = plain_rows(system, system->r, system->loops, system->loops_c);
@@ -63,25 +90,26 @@ static void set_rows(Equations *q) {
         add_row(q, &loops, k, system->loops_c[k]);
     }
     q->first_hold = q->r;
-    q->held_count = q->sticking_count = q->slipping_count = 0;
+    q->held_count = q->sticking_count = q->pressed_count = 0;
     for (int i = 0; i < system->s; i++) {
-        if (q->contacts.modes[i] != CONTACT_OPEN) {
+        const Touching *touching = &q->contacts.touching[i];
+        if (is_held(&q->contacts, i)) {
+            double depth = touching->phase == PHASE_SETTLED ? touching->depth : 0.0;
             q->held[q->held_count++] = i;
-            add_row(q, &gaps, i, system->gaps_c[i] + q->inputs.walls[i].position);
+            add_row(q, &gaps, i, system->gaps_c[i] + q->inputs.walls[i].position + depth);
+        } else if (is_pressed(touching)) {
+            q->pressed[q->pressed_count++] = i;
         }
     }
     q->first_stick = q->r;
     for (int contact = 0; contact < system->s + system->f; contact++) {
-        ContactMode mode = q->contacts.modes[contact];
         int point = contact - system->s;
-        if (mode == CONTACT_STICK) {
+        if (q->contacts.modes[contact] == CONTACT_STICK) {
             q->sticking[q->sticking_count++] = contact;
             add_row(q, point < 0 ? &walls : &rubs, point < 0 ? contact : point, 0.0);
-        } else if (slip_sign(mode) != 0 && (point < 0 || q->rub_law[3 * point] > 0.0)) {
-            q->slipping[q->slipping_count++] = contact;
         }
-        q->slipping_stops = point < 0 ? q->slipping_count : q->slipping_stops;
     }
+    list_slipping(q);
     Rows active = {system, q->r, q->B, q->c, q->z, q->on};
     q->active = active;
 }
@@ -124,7 +152,13 @@ static void set_laws(Equations *q) {
     q->beta = values[m->damping_beta];
     q->mass_damping = 2.0 * values[m->damping_zeta] * q->omega;
     for (int i = 0; i < m->stop_count; i++) {
-        q->stop_friction[i] = evaluate(m->stops[i].friction, values);
+        const Stop *stop = &m->stops[i];
+        q->stop_friction[i] = evaluate(stop->friction, values);
+        if (stop->compliant) {
+            q->laws[i].stiffness = evaluate(stop->stiffness, values);
+            q->laws[i].exponent = evaluate(stop->exponent, values);
+            q->laws[i].damping = damping_factor(evaluate(stop->restitution, values));
+        }
     }
     for (int i = 0; i < m->friction_count; i++) {
         q->rub_law[3 * i] = evaluate(m->frictions[i].coefficient, values);
@@ -163,8 +197,13 @@ static void set_loads(Equations *q) {
         const Wall *wall = &q->inputs.walls[i];
         q->walls_move = q->walls_move || wall->rate != 0.0 || wall->span > 0.0;
     }
-    q->driven = q->driven || q->walls_move;
-    q->friction_or_walls = q->walls_move || q->slipping_count > 0;
+    q->walls_give = false;
+    for (int i = 0; m->compliant_count > 0 && i < system->s; i++) {
+        bool gives = m->stops[i].compliant && q->inputs.mobilities[i] > 0.0;
+        q->walls_give = q->walls_give || gives;
+    }
+    q->driven = q->driven || q->walls_move || m->compliant_count > 0;
+    q->contacts_or_walls = q->walls_move || q->slipping_count > 0 || q->pressed_count > 0;
 }
 
 PRBM void set_equations(Equations *equations, const Inputs *inputs,
@@ -173,8 +212,8 @@ PRBM void set_equations(Equations *equations, const Inputs *inputs,
     size_t count = (size_t)(q->system->s + q->system->f);
     q->inputs = *inputs;
     q->omega = omega;
-    q->slipping_stops = 0;
     memmove(q->contacts.modes, contacts->modes, count * sizeof(ContactMode));
+    memmove(q->contacts.touching, contacts->touching, (size_t)q->system->s * sizeof(Touching));
     set_laws(q);
     set_rows(q);
     set_row_parts(q);

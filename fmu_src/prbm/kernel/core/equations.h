@@ -3,7 +3,7 @@
 #define PRBM_EQUATIONS_H
 
 #include "core/constraints.h"
-#include "core/contact_state.h"
+#include "core/compliance.h"
 
 /* A wall that joins its reference, a uniform motion, along a cubic.  At the time since, the wall is
  * ahead of the reference by the offset [m] and faster by the excess [m/s]; after the span [s] it
@@ -32,9 +32,12 @@ typedef struct {
     double omega, beta, mass_damping;
     int r, first_hold, first_stick;
     int held_count, sticking_count, slipping_count;
-    int *held;              /* the stops that are closed */
+    int *held;              /* the stops that are constraints */
+    int *pressed;           /* the compliant stops that are forces */
+    int pressed_count;
+    ComplianceLaw *laws;    /* (s,) of compliant stops */
     int *sticking;          /* contacts; the k-th has the row first_stick + k */
-    int *slipping;          /* contacts; the first slipping_stops of them are stops */
+    int *slipping;          /* contacts; the first slipping_stops of them are held stops */
     int slipping_stops;
     double *stop_friction;  /* (s,) */
     double *rub_law;        /* (f, 3): coefficient, normal force, normal stiffness */
@@ -46,8 +49,9 @@ typedef struct {
     Complex *w, *w_input;   /* (d,) */
     double *moment;         /* (wide,) */
     bool walls_move;
-    bool driven;            /* inputs or walls do work */
-    bool friction_or_walls; /* whether contacts slip or walls move */
+    bool walls_give;        /* whether forces of compliant stops may move their walls */
+    bool driven;            /* inputs or walls do work, or stops are compliant */
+    bool contacts_or_walls; /* whether contacts slip or are pressed, or walls move */
     Parts B_conjugate;      /* (r, wide) */
     Parts w_parts;          /* (wide,) */
 } Equations;
@@ -61,5 +65,6 @@ PRBM Parts place_parts(Memory *memory, size_t count);
 PRBM Parts parts_from(Parts parts, int start);
 PRBM int place_in(const int *list, int index);
 PRBM int held_at(const Equations *q, int stop);
+PRBM double friction_coefficient(const Equations *q, int contact);
 
 #endif

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/block_map.h"
+#include "core/dynamics.h"
 #include "core/evaluation.h"
 #include "core/forces.h"
 #include "core/kinetics.h"
@@ -23,6 +24,7 @@ PRBM Kinematics place_kinematics(const System *system, Memory *memory) {
     size_t even = (size_t)system->even, wide = (size_t)system->wide;
     Kinematics at;
     at.time = 0.0;
+    at.extra = NULL;
     at.angle = place(memory, even, sizeof(double));
     at.speed = place(memory, even + 2, sizeof(double));
     at.theta = system->mapped ? place(memory, wide, sizeof(double)) : at.angle;
@@ -53,6 +55,8 @@ PRBM void evaluation_place(Evaluation *evaluation, const System *system, Memory 
     result.a = place(memory, even + 2, sizeof(double));
     result.lam = place(memory, r, sizeof(double));
     result.block = place(memory, wide * wide, sizeof(double));
+    result.pressure = place(memory, (size_t)system->s, sizeof(double));
+    result.contact_loss = place(memory, (size_t)system->s, sizeof(double));
     result.factors.even = (int)even;
     result.factors.blocks = system->mass_blocks;
     result.factors.L = place(memory, n * n, sizeof(double));
@@ -499,7 +503,7 @@ PRBM double rub_limit(const Equations *equations, int i, const Complex *e) {
     return law[0] * normal_force(lift, law[1], law[2]);
 }
 
-/* The force of a closed stop. */
+/* The force of a held stop. */
 PRBM double stop_force(const Equations *q, const double *lam, int stop) {
     return lam[q->first_hold + held_at(q, stop)];
 }
@@ -510,24 +514,46 @@ PRBM double stick_force(const Equations *q, const double *lam, int contact) {
 }
 
 /* The largest friction force of a contact, by Coulomb's law. */
-PRBM double friction_limit(const Equations *q, const Complex *e, const double *lam,
+PRBM double friction_limit(const Equations *q, const Complex *e, const Evaluation *found,
                            int contact) {
-    return is_stop(q->system, contact) ? q->stop_friction[contact] * stop_force(q, lam, contact)
-                                       : rub_limit(q, contact - q->system->s, e);
+    if (!is_stop(q->system, contact)) {
+        return rub_limit(q, contact - q->system->s, e);
+    }
+    double force = is_held(&q->contacts, contact) ? stop_force(q, found->lam, contact)
+                                                  : greater(found->pressure[contact], 0.0);
+    return q->stop_friction[contact] * force;
 }
 
-/* The friction force of a slipping friction point along its direction. */
-PRBM double rub_force(const Equations *q, int i, const Complex *e) {
-    return -slip_sign(q->contacts.modes[q->system->s + i]) * rub_limit(q, i, e);
+/* The friction force of a slipping contact along its direction. */
+PRBM double slip_force(const Equations *q, const Complex *e, const Evaluation *found,
+                       int contact) {
+    return -slip_sign(q->contacts.modes[contact]) * friction_limit(q, e, found, contact);
 }
 
-/* Add slipping friction points, and the accelerations of the walls of held stops. */
-RARE void add_friction_and_walls(const Equations *q, Evaluation *result) {
-    Rows rubs = rub_rows(q->system);
+/* Add the forces of pressed compliant stops. */
+RARE void add_pressure(const Equations *q, Evaluation *result) {
+    Rows gaps = gap_rows(q->system);
+    double t = result->at.time;
+    for (int k = 0; k < q->pressed_count; k++) {
+        int i = q->pressed[k];
+        double d = -gap(q, i, t, result->at.e, result->at.extra);
+        double rate = -gap_rate(q, i, t, result->at.e, result->at.speed, result->at.extra);
+        double force = contact_force(&q->laws[i], &q->contacts.touching[i], d, rate);
+        result->pressure[i] = force;
+        result->contact_loss[i] = (force - elastic_force(&q->laws[i], d)) * rate;
+        row_jacobian(&gaps, i, result->at.e, result->row);
+        add_scaled(q->system->n, force, result->row, result->a);
+    }
+}
+
+/* Add pressed stops and their friction, slipping friction points, and the accelerations of the
+ * walls of held stops. */
+RARE void add_contacts_and_walls(const Equations *q, Evaluation *result) {
+    add_pressure(q, result);
     for (int k = q->slipping_stops; k < q->slipping_count; k++) {
-        int i = q->slipping[k] - q->system->s;
-        row_jacobian(&rubs, i, result->at.e, result->row);
-        add_scaled(q->system->n, rub_force(q, i, result->at.e), result->row, result->a);
+        double force = slip_force(q, result->at.e, result, q->slipping[k]);
+        tangential_row(q->system, q->slipping[k], result->at.e, result->row);
+        add_scaled(q->system->n, force, result->row, result->a);
     }
     for (int k = 0; q->walls_move && k < q->held_count; k++) {
         const Wall *wall = &q->inputs.walls[q->held[k]];
@@ -588,8 +614,8 @@ SHARED bool motion_of_length(int even, const Equations *q, const Reference *near
         rows_dispatch(even, q, &result->at, result->rows, result->lam);
     }
     add_springs(even, q, result);
-    if (q->friction_or_walls) {
-        add_friction_and_walls(q, result);
+    if (q->contacts_or_walls) {
+        add_contacts_and_walls(q, result);
     }
     if (!factor_motion(even, q, result)) {
         return false;
@@ -602,12 +628,13 @@ SHARED bool motion_of_length(int even, const Equations *q, const Reference *near
 }
 
 PRBM bool evaluate_equations(const Equations *equations, double t, const double *q,
-                             const double *v, const Reference *near, Evaluation *result,
-                             Problem *problem) {
+                             const double *v, const double *extra, const Reference *near,
+                             Evaluation *result, Problem *problem) {
     int n = equations->system->n;
     pad(n, q, result->at.angle);
     pad(n, v, result->at.speed);
     result->at.time = t;
+    result->at.extra = extra;
     return motion_of_length(equations->system->even, equations, near, result) ||
            fail(problem, "%s", SINGULAR);
 }

@@ -16,6 +16,7 @@ typedef struct {
  * to the directions is not the identity, theta is angle and turn is speed. */
 typedef struct {
     double time;             /* used if the walls of held stops move */
+    const double *extra;     /* states of compliant stops; NULL: zeros */
     double *angle, *speed;   /* (even,), (even + 2,) coordinates and their rates */
     double *theta, *turn;    /* (wide,) directions and their rates */
     double *squares;         /* (wide,): turn^2 */
@@ -35,17 +36,19 @@ typedef struct {
     double *turned;                  /* (wide,) working memory, if mapped */
     double *block;                   /* of M, below its diagonal */
     double spring_loss;              /* the power that the springs dissipate */
+    double *pressure, *contact_loss; /* (s,) forces and dissipated powers of pressed stops */
     Factors factors;
 } Evaluation;
 
 PRBM void reference_place(Reference *reference, const System *system, Memory *memory);
 PRBM void evaluation_place(Evaluation *evaluation, const System *system, Memory *memory);
 PRBM void set_reference(Reference *reference, const System *system, const double *angle);
-/* Compute the accelerations a (n,) and the multipliers lam (r,): forces of loops, of closed stops
- * (> 0 pushes), of sticking contacts.  near: a reference near q, or NULL. */
+/* Compute the accelerations a (n,) and the multipliers lam (r,): forces of loops, of held stops
+ * (> 0 pushes), of sticking contacts.  extra: the states of compliant stops, or NULL for zeros;
+ * near: a reference near q, or NULL. */
 PRBM bool evaluate_equations(const Equations *equations, double t, const double *q,
-                             const double *v, const Reference *near, Evaluation *result,
-                             Problem *problem);
+                             const double *v, const double *extra, const Reference *near,
+                             Evaluation *result, Problem *problem);
 /* Compute only the factors of the equations at a state. */
 PRBM bool factor_equations(const Equations *equations, const double *q, const double *v,
                            const Reference *near, Evaluation *result, Problem *problem);
@@ -66,8 +69,9 @@ PRBM void zero_placed(const Memory *memory, size_t begin);
 PRBM void find_directions(const System *system, const Reference *near, Kinematics *at);
 PRBM double stop_force(const Equations *q, const double *lam, int stop);
 PRBM double stick_force(const Equations *q, const double *lam, int contact);
-PRBM double friction_limit(const Equations *q, const Complex *e, const double *lam,
+PRBM double friction_limit(const Equations *q, const Complex *e, const Evaluation *found,
                            int contact);
-PRBM double rub_force(const Equations *q, int i, const Complex *e);
+PRBM double slip_force(const Equations *q, const Complex *e, const Evaluation *found,
+                       int contact);
 
 #endif

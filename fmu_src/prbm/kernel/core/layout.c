@@ -342,13 +342,14 @@ PRBM void lay_out_slots(Mechanism *m) {
         [SLOTS_BASE] = PER_BASE,
         [SLOTS_ENERGIES] = PER_ENERGY,
         [SLOTS_LATCHED] = PER_LATCHED * m->stop_count,
+        [SLOTS_COMPLIANT] = PER_COMPLIANT * m->compliant_count,
         [SLOTS_LINKS] = PER_LINK * m->link_count,
         [SLOTS_STRETCHES] = PER_STRETCH * m->strain_count,
         [SLOTS_PROBES] = PER_PROBE * m->probe_count,
         [SLOTS_STRESSES] = PER_STRESS * m->stressed_count,
         [SLOTS_FREQUENCY] = 1,
         [SLOTS_CALCULATED] = calculated_count(m),
-        [SLOTS_DERIVATIVES] = m->independent_count + 2,
+        [SLOTS_DERIVATIVES] = m->independent_count + 2 + EXCHANGED_STATES * m->compliant_count,
         [SLOTS_INDICATORS] = STOP_INDICATORS * m->stop_count + m->friction_count,
         [SLOTS_TIME] = 1,
     };
@@ -362,6 +363,7 @@ PRBM void lay_out_slots(Mechanism *m) {
         .base = at[SLOTS_BASE],
         .energies = at[SLOTS_ENERGIES],
         .latched = at[SLOTS_LATCHED],
+        .compliant = at[SLOTS_COMPLIANT],
         .links = at[SLOTS_LINKS],
         .stretches = at[SLOTS_STRETCHES],
         .probes = at[SLOTS_PROBES],
@@ -374,4 +376,5 @@ PRBM void lay_out_slots(Mechanism *m) {
         .count = at[SLOTS_GROUPS - 1] + counts[SLOTS_GROUPS - 1],
     };
     m->slots = slots;
+    m->state_count = 2 * m->coordinate_count + 2 + EXTRA_STATES * m->compliant_count;
 }

@@ -67,6 +67,9 @@ typedef struct {
     Point point;
     double direction; /* deg */
     Expression position, offset, restitution, friction, rest_speed;
+    bool compliant;
+    Expression stiffness, exponent; /* of a compliant stop */
+    int extra; /* Index of the first state of a compliant stop behind the energies. */
 } Stop;
 
 typedef struct {
@@ -113,8 +116,8 @@ typedef struct {
 
 /* The first slot of each group in the vector of all values. */
 typedef struct {
-    int parameters, inputs, bodies, stops, base, energies, latched, links, stretches, probes,
-        stresses, frequency, calculated, derivatives, indicators, time, count;
+    int parameters, inputs, bodies, stops, base, energies, latched, compliant, links, stretches,
+        probes, stresses, frequency, calculated, derivatives, indicators, time, count;
 } Slots;
 
 /* The first index of each group of inputs; the forces begin at 0. */
@@ -182,7 +185,9 @@ typedef struct {
     /* Sizes of the assembled system. */
     int coordinate_count, direction_count, loop_count, link_count, strain_count, stretch_count,
         mass_count, spring_count, corner_count;
-    int stressed_count; /* Number of flexures whose stress is an output. */
+    int compliant_count; /* Number of compliant stops. */
+    int state_count;     /* Size of a state: 2 n + 2, and 4 of each compliant stop. */
+    int stressed_count;  /* Number of flexures whose stress is an output. */
     int longest; /* Largest number of links or nodes of a flexure. */
     size_t beam_size; /* Largest number of doubles that a beam needs. */
     Slots slots;

@@ -11,7 +11,9 @@
 static double offset(const Equations *q, int k, double t) {
     if (q->walls_move && k >= q->first_hold && k < q->first_stick) {
         int i = q->held[k - q->first_hold];
-        return q->system->gaps_c[i] + wall_motion(&q->inputs.walls[i], t).x;
+        const Touching *touching = &q->contacts.touching[i];
+        double depth = touching->phase == PHASE_SETTLED ? touching->depth : 0.0;
+        return q->system->gaps_c[i] + wall_motion(&q->inputs.walls[i], t).x + depth;
     }
     return q->c[k];
 }

@@ -38,26 +38,41 @@ static void pull_body(Complex *on, int body, Complex force) {
     on[body] = plus(on[body], force);
 }
 
-PRBM void add_contact_pulls(const Equations *q, const Complex *e, const double *lam, Complex *on) {
+/* The friction force of a contact along its direction. */
+static double rubbing_force(const Equations *q, const Complex *e, const Evaluation *found,
+                            int contact) {
+    return q->contacts.modes[contact] == CONTACT_STICK ? stick_force(q, found->lam, contact)
+                                                       : slip_force(q, e, found, contact);
+}
+
+/* Let a closed stop push and rub its bodies. */
+static void pull_stop(const Equations *q, const Complex *e, int i, double force, double along,
+                      Complex *on) {
+    const System *system = q->system;
+    const Stop *stop = &system->mechanism->stops[i];
+    Complex u = unit(stop->direction);
+    u = system->on[i] == FIXED ? u : product(u, e[system->on[i]]);
+    Complex pull = product(u, complex_of(-force, along));
+    pull_body(on, stop->body, pull);
+    pull_body(on, stop->on, scaled(-1.0, pull));
+}
+
+PRBM void add_contact_pulls(const Equations *q, const Complex *e, const Evaluation *found,
+                            Complex *on) {
     const System *system = q->system;
     const Mechanism *m = system->mechanism;
+    const double *lam = found->lam;
     for (int k = 0; k < q->held_count; k++) {
         int i = q->held[k];
-        const Stop *stop = &m->stops[i];
-        ContactMode mode = q->contacts.modes[i];
-        double force = stop_force(q, lam, i);
-        double along = mode == CONTACT_STICK ? stick_force(q, lam, i)
-                                             : -q->stop_friction[i] * slip_sign(mode) * force;
-        Complex u = unit(stop->direction);
-        u = system->on[i] == FIXED ? u : product(u, e[system->on[i]]);
-        Complex pull = product(u, complex_of(-force, along));
-        pull_body(on, stop->body, pull);
-        pull_body(on, stop->on, scaled(-1.0, pull));
+        pull_stop(q, e, i, stop_force(q, lam, i), rubbing_force(q, e, found, i), on);
+    }
+    for (int k = 0; k < q->pressed_count; k++) {
+        int i = q->pressed[k];
+        pull_stop(q, e, i, found->pressure[i], rubbing_force(q, e, found, i), on);
     }
     for (int i = 0; i < system->f; i++) {
         const Friction *friction = &m->frictions[i];
-        bool sticks = q->contacts.modes[system->s + i] == CONTACT_STICK;
-        double size = sticks ? stick_force(q, lam, system->s + i) : rub_force(q, i, e);
+        double size = rubbing_force(q, e, found, system->s + i);
         Complex pull = scaled(size, unit(friction->direction));
         pull_body(on, friction->body, pull);
         pull_body(on, GROUND, scaled(-1.0, pull));
@@ -113,8 +128,7 @@ PRBM void transmit(const System *system, const double *lam, SectionState *at) {
 }
 
 PRBM SectionState section_state(const Equations *q, const Complex *e, const double *angle,
-                                const double *v, const double *a, const double *lam,
-                                Scratch *scratch) {
+                                const double *v, const Evaluation *found, Scratch *scratch) {
     const System *system = q->system;
     const Mechanism *m = system->mechanism;
     double *strained = take(scratch, (size_t)system->n);
@@ -124,7 +138,7 @@ PRBM SectionState section_state(const Equations *q, const Complex *e, const doub
     for (int j = 0; j < system->n; j++) {
         strained[j] = angle[j] - system->q0[j] + q->beta * v[j];
     }
-    point_loads_at(q, e, v, a, at.loads, scratch);
+    point_loads_at(q, e, v, found->a, at.loads, scratch);
     at.on[GROUND] = complex_of(0.0, 0.0);
     for (int body = 1; body <= system->b; body++) {
         at.on[body] = at.loads[system->body_masses[body - 1]];
@@ -133,8 +147,8 @@ PRBM SectionState section_state(const Equations *q, const Complex *e, const doub
         const double *given = q->inputs.forces + LOADS * i;
         pull_body(at.on, m->forces[i].body, complex_of(given[0], given[1]));
     }
-    add_contact_pulls(q, e, lam, at.on);
-    transmit(system, lam, &at);
+    add_contact_pulls(q, e, found, at.on);
+    transmit(system, found->lam, &at);
     return at;
 }
 
@@ -302,11 +316,11 @@ PRBM Stress *take_stresses(Scratch *scratch, int count) {
 }
 
 PRBM void stresses(const Equations *q, const Complex *e, const double *angle, const double *v,
-                   const double *a, const double *lam, Stress *found, Scratch *scratch) {
+                   const Evaluation *evaluation, Stress *found, Scratch *scratch) {
     const System *system = q->system;
     const Mechanism *m = system->mechanism;
     size_t mark = scratch->used;
-    SectionState at = section_state(q, e, angle, v, a, lam, scratch);
+    SectionState at = section_state(q, e, angle, v, evaluation, scratch);
     for (int i = 0, k = 0; i < m->flexure_count; i++) {
         if (m->types[m->flexures[i].type].stress) {
             const FreeBody *body = &system->free_bodies[i];

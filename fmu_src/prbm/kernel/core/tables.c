@@ -187,11 +187,17 @@ static void read_stops(Reader *reader, Mechanism *m) {
         }
         s->point = read_point(reader, m);
         s->direction = read_finite(reader);
+        s->compliant = read_index(reader, 0, 2) == 1;
         s->position = read_expression(reader, m);
         s->offset = read_expression(reader, m);
         s->restitution = read_expression(reader, m);
         s->friction = read_expression(reader, m);
         s->rest_speed = read_expression(reader, m);
+        if (s->compliant) {
+            s->stiffness = read_expression(reader, m);
+            s->exponent = read_expression(reader, m);
+            s->extra = EXTRA_STATES * m->compliant_count++;
+        }
     }
     m->stops = stops;
 }
@@ -286,7 +292,7 @@ static void read_variables(Reader *reader, Mechanism *m) {
         v->slot = read_index(reader, 0, m->slots.count);
         v->name = read_text(reader);
         int latched = v->slot - m->slots.latched;
-        bool of_stop = latched >= 0 && v->slot < m->slots.links;
+        bool of_stop = latched >= 0 && v->slot < m->slots.compliant;
         int output = of_stop ? latched % PER_LATCHED : -1;
         bool contact = output == LATCHED_CONTACT, counter = output == LATCHED_IMPACT_COUNT;
         bool fits = v->type == REAL ? !contact && !counter : v->type == BOOLEAN ? contact : counter;

@@ -38,7 +38,7 @@ static bool find_middle(Simulation *sim, Problem *problem) {
     const Arc *arc = &sim->state.arc;
     Located *located = &sim->stepping.located;
     Node *middle = &sim->stepping.middle;
-    int ny = state_size(sim), n = ny / 2 - 1;
+    int ny = state_size(sim), n = system_of(sim)->n;
     middle->time = arc->start + 0.5 * arc->h;
     if (!arc_cut(sim, middle->time, located->k, located->y, problem)) {
         return false;
@@ -52,7 +52,7 @@ static bool find_middle(Simulation *sim, Problem *problem) {
 /* Interpolate positions and rates through both ends of the step and a third node. */
 static void through(Simulation *sim, const Node *third, double t, double *y) {
     const Arc *arc = &sim->state.arc;
-    int ny = state_size(sim), n = ny / 2 - 1;
+    int ny = state_size(sim), n = system_of(sim)->n;
     double *end = sim->stepping.located.y, value[NODES * NODES], rate[NODES * NODES];
     double times[NODES] = {0.0, arc->h, third->time - arc->start};
     step_end(ny, arc->y, arc->k, arc->h, end);

@@ -41,6 +41,12 @@ PRBM void set_scales(Configuration *configuration, double frequency) {
     scales->rate = configuration->omega > 0.0 ? configuration->omega : spring_rate;
     scales->energy = torsion > 0.0 ? torsion : heaviest * (scales->rate * scales->rate);
     scales->time = TWO_PI / scales->rate;
+    configuration->controlled = (double)(2 * n + 2);
+    int extras = EXTRA_STATES * system->mechanism->compliant_count;
+    for (int j = 2 * n + 2; j < 2 * n + 2 + extras; j++) {
+        configuration->least[j] = HUGE_VAL; /* The error of these states is not controlled. */
+        configuration->share[j] = 0.0;
+    }
     for (int j = 0; j < 2 * n + 2; j++) {
         bool angle = j < n;
         configuration->least[j] = angle ? 1.0 : j < 2 * n ? scales->rate : scales->energy;

@@ -2,8 +2,10 @@
 #include <math.h>
 #include <string.h>
 
+#include "hybrid/compliant.h"
 #include "hybrid/configuration.h"
 #include "hybrid/contact_modes.h"
+#include "hybrid/guards.h"
 #include "hybrid/impacts.h"
 #include "hybrid/rest.h"
 #include "hybrid/simulation.h"
@@ -23,6 +25,8 @@ static const ContactFailure UNSETTLED = {
 /* Set up the trial equations in a contact state. */
 static void try_contacts(Simulation *sim, const ContactMode *modes) {
     memmove(sim->trial.contacts.modes, modes, (size_t)contact_count(sim) * sizeof *modes);
+    memmove(sim->trial.contacts.touching, sim->state.touching,
+            (size_t)system_of(sim)->s * sizeof *sim->state.touching);
     set_equations(&sim->trial.equations, &sim->equations.inputs, &sim->trial.contacts,
                   sim->configuration.omega);
 }
@@ -34,12 +38,15 @@ static ContactMode slip_mode(const Simulation *sim, double speed) {
 }
 
 static double friction_of(const Simulation *sim, int contact) {
-    const System *system = system_of(sim);
-    return is_stop(system, contact) ? sim->equations.stop_friction[contact]
-                                    : sim->equations.rub_law[3 * (contact - system->s)];
+    return friction_coefficient(&sim->equations, contact);
 }
 
-/* The contact state in which a set of stops is closed, and closed contacts and friction points slip
+/* Whether a contact is a compliant stop that is pressed. */
+static bool presses(const Simulation *sim, int contact) {
+    return is_stop(system_of(sim), contact) && is_pressed(&sim->state.touching[contact]);
+}
+
+/* The contact state in which a set of stops is held, and closed contacts and friction points slip
  * if they have a velocity and friction. */
 static void modes_holding(Simulation *sim, const HoldingSet *holding, const double *q,
                           const double *v, ContactMode *modes) {
@@ -47,7 +54,7 @@ static void modes_holding(Simulation *sim, const HoldingSet *holding, const doub
     const System *system = system_of(sim);
     Complex *e = directions_at(sim, q);
     for (int contact = 0; contact < contact_count(sim); contact++) {
-        bool open = is_stop(system, contact) &&
+        bool open = is_stop(system, contact) && !presses(sim, contact) &&
                     !has_contact(holding->count, holding->stops, contact);
         modes[contact] = open ? CONTACT_OPEN : CONTACT_FRICTIONLESS;
         if (!open && friction_of(sim, contact) > 0.0) {
@@ -74,7 +81,7 @@ static bool obeys_coulomb(Simulation *sim, int contact, double slack, const Comp
     const Evaluation *tried = &sim->trial.evaluation;
     ContactMode mode = sim->trial.contacts.modes[contact];
     if (mode == CONTACT_STICK) {
-        double limit = friction_limit(equations, e, tried->lam, contact);
+        double limit = friction_limit(equations, e, tried, contact);
         return fabs(stick_force(equations, tried->lam, contact)) <=
                limit + greater(FRICTION_EXCESS_RTOL * limit, slack);
     }
@@ -93,14 +100,15 @@ static bool modes_agree(Simulation *sim, const double *q, const double *v,
     double *row = take(&sim->scratch, (size_t)system_of(sim)->n);
     double zero = zero_acceleration(&sim->configuration);
     Complex *e = directions_at(sim, q);
-    bool ok = evaluate_equations(equations, sim->state.front_time, q, v, NULL,
+    bool ok = evaluate_equations(equations, sim->state.front_time, q, v,
+                                 extra_states(sim, sim->state.front), NULL,
                                  &sim->trial.evaluation, problem);
     *result = ok;
     for (int k = 0; *result && k < touching->count; k++) {
         int i = touching->stops[k];
-        *result = sim->trial.contacts.modes[i] != CONTACT_OPEN
+        *result = is_held(&sim->trial.contacts, i)
                       ? stop_force(equations, tried->lam, i) > 0.0
-                      : !(gap_acceleration(equations, i, sim->state.front_time, e, v, tried->a) <
+                      : !(gap_acceleration(equations, i, sim->state.front_time, e, v, tried) <
                           -zero);
     }
     for (int j = 0; *result && j < rest->count; j++) {
@@ -116,9 +124,12 @@ static bool modes_agree(Simulation *sim, const double *q, const double *v,
  * that was released because its force was round-off, and then penetrated, was pressed. */
 static double least_pressing(Simulation *sim, int stop, const double *q) {
     size_t mark = sim->scratch.used;
-    double distance = gap(&sim->equations, stop, sim->state.front_time, directions_at(sim, q));
+    double distance = gap(&sim->equations, stop, sim->state.front_time, directions_at(sim, q),
+                          extra_states(sim, sim->state.front));
     const Configuration *configuration = &sim->configuration;
     sim->scratch.used = mark;
+    const Touching *touching = &sim->state.touching[stop];
+    distance += touching->phase == PHASE_SETTLED ? touching->depth : 0.0;
     return distance > -closing_depth(configuration) / 2.0 ? zero_acceleration(configuration) : 0.0;
 }
 
@@ -269,18 +280,24 @@ static bool stick_or_slip(Simulation *sim, const RestContacts *rest, const RestF
     return ok;
 }
 
-/* Collect the given stops, and the contacts with friction at rest.  Contacts that cannot move
- * independently are left out: loops and held stops carry their load.  sliding: the modes of the
- * contacts with friction that slide. */
+/* Whether a compliant stop is pressed and not free of force. */
+static bool rubs_pressed(const Simulation *sim, int contact) {
+    return presses(sim, contact) && sim->state.touching[contact].phase != PHASE_FREE;
+}
+
+/* Collect the given stops, and the contacts with friction at rest, pressed stops among them.
+ * Contacts that cannot move independently are left out: loops and held stops carry their load.
+ * sliding: the modes of the contacts with friction that slide. */
 static bool find_rest(Simulation *sim, const HoldingSet *stops, const FrictionEvent *event,
                       const ContactMode *modes, RestContacts *rest,
                       ContactMode *sliding, Problem *problem) {
     bool ok = true, mobile = false;
     rest->stop_count = rest->count = 0;
     for (int contact = 0; ok && contact < contact_count(sim); contact++) {
-        bool stop = is_stop(system_of(sim), contact);
+        bool stop = is_stop(system_of(sim), contact) &&
+                    has_contact(stops->count, stops->stops, contact);
         sliding[contact] = CONTACT_FRICTIONLESS;
-        if (stop && !has_contact(stops->count, stops->stops, contact)) {
+        if (is_stop(system_of(sim), contact) && !stop && !rubs_pressed(sim, contact)) {
             continue;
         }
         if (friction_of(sim, contact) > 0.0) {
@@ -304,9 +321,11 @@ static bool friction_jams(const Simulation *sim, const HoldingSet *touching, Pro
     int all[CONTACTS_MAX], count = 0;
     for (int contact = 0; contact < contact_count(sim); contact++) {
         bool stop = is_stop(system_of(sim), contact);
+        bool rough = friction_of(sim, contact) > 0.0;
         all[count] = contact;
-        count += stop ? has_contact(touching->count, touching->stops, contact)
-                      : friction_of(sim, contact) > 0.0;
+        count += stop ? has_contact(touching->count, touching->stops, contact) ||
+                            (rough && rubs_pressed(sim, contact))
+                      : rough;
     }
     return contacts_fail(sim, &JAMMED, count, all, problem);
 }
@@ -333,7 +352,7 @@ static bool modes_by_forces(Simulation *sim, const HoldingSet *stops, const Hold
         return true;
     }
     for (int i = 0; i < system->s; i++) {
-        modes[i] = CONTACT_OPEN;
+        modes[i] = presses(sim, i) ? modes[i] : CONTACT_OPEN;
     }
     try_contacts(sim, modes);
     if (!rest_forces(sim, q, v, &rest, &found, problem)) {
@@ -395,8 +414,8 @@ static bool slide_acceleration(Simulation *sim, int contact, double *result, Pro
     const System *system = system_of(sim);
     Evaluation *evaluation = &sim->at_front;
     const double *q = sim->state.front, *v = q + system->n;
-    if (!evaluate_equations(&sim->equations, sim->state.front_time, q, v, NULL, evaluation,
-                            problem)) {
+    if (!evaluate_equations(&sim->equations, sim->state.front_time, q, v, extra_states(sim, q),
+                            NULL, evaluation, problem)) {
         return false;
     }
     double *row = take(&sim->scratch, (size_t)system->n);
@@ -433,14 +452,14 @@ static int resting_candidates(Simulation *sim, const int *touching, int touching
     int count = 0;
     Complex *e = directions_at(sim, sim->state.front);
     for (int i = 0; i < system->s; i++) {
-        if (sim->state.modes[i] != CONTACT_OPEN) {
+        if (held_stop(&sim->equations, i)) {
             candidates[count++] = i;
         }
     }
     for (int k = 0; k < touching_count; k++) {
         int i = touching[k];
-        if (sim->state.modes[i] == CONTACT_OPEN && gap(&sim->equations, i, t, e) <= near &&
-            gap_rate(&sim->equations, i, t, e, v) <= bound) {
+        if (sim->state.modes[i] == CONTACT_OPEN && gap(&sim->equations, i, t, e, NULL) <= near &&
+            gap_rate(&sim->equations, i, t, e, v, NULL) <= bound) {
             candidates[count++] = i;
         }
     }
@@ -458,10 +477,22 @@ static bool choose_modes(Simulation *sim, const HoldingSet *touching, const Fric
         return false;
     }
     for (int contact = 0; contact < contact_count(sim); contact++) {
-        bool open = is_stop(system, contact) && !has_contact(holding.count, holding.stops, contact);
+        bool open = is_stop(system, contact) && !presses(sim, contact) &&
+                    !has_contact(holding.count, holding.stops, contact);
         modes[contact] = open ? CONTACT_OPEN : CONTACT_FRICTIONLESS;
     }
     return settle_friction(sim, &holding, touching, event, modes, problem);
+}
+
+/* Remove the compliant stops that are pressed: they are no constraints. */
+static void remove_pressed(const Simulation *sim, HoldingSet *stops) {
+    int count = 0;
+    for (int k = 0; k < stops->count; k++) {
+        int i = stops->stops[k];
+        stops->stops[count] = i;
+        count += !is_pressed(&sim->state.touching[i]);
+    }
+    stops->count = count;
 }
 
 /* Choose the contact state at the front from its positions and velocities.  The projection closes
@@ -492,6 +523,9 @@ PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const
         }
         bool same = k > 0 && memcmp(modes, sim->state.modes, bytes) == 0;
         set_contacts(sim, modes);
+        if (press_released(sim)) {
+            remove_pressed(sim, &all);
+        }
         if (same || sim->equations.held_count == 0) {
             return true;
         }
@@ -506,10 +540,11 @@ PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const
 PRBM void gaps_and_rates(Simulation *sim, double *gaps, double *rates) {
     size_t mark = sim->scratch.used;
     double *front = sim->state.front, t = sim->state.front_time;
+    const double *extra = extra_states(sim, front);
     Complex *e = directions_at(sim, front);
     for (int i = 0; i < system_of(sim)->s; i++) {
-        gaps[i] = gap(&sim->equations, i, t, e);
-        rates[i] = gap_rate(&sim->equations, i, t, e, front + system_of(sim)->n);
+        gaps[i] = gap(&sim->equations, i, t, e, extra);
+        rates[i] = gap_rate(&sim->equations, i, t, e, front + system_of(sim)->n, extra);
     }
     sim->scratch.used = mark;
 }
@@ -522,13 +557,15 @@ static int release_moving(Simulation *sim) {
     double gaps[STOPS_MAX], rates[STOPS_MAX], bound = zero_speed(&sim->configuration);
     gaps_and_rates(sim, gaps, rates);
     for (int i = 0; i < system->s; i++) {
-        bool closed = sim->state.modes[i] != CONTACT_OPEN;
+        bool closed = held_stop(&sim->equations, i);
+        bool compliant = system->mechanism->stops[i].compliant;
         if (closed && fabs(rates[i]) > bound) {
             set_mode(sim, i, CONTACT_OPEN);
-        } else if (closed || gaps[i] > TOUCHING_RTOL * system->length) {
+            (void)press_released(sim);
+        } else if (compliant || closed || gaps[i] > TOUCHING_RTOL * system->length) {
             continue;
         }
-        struck = rates[i] < -bound ? i : struck;
+        struck = rates[i] < -bound && !compliant ? i : struck;
     }
     return struck;
 }
@@ -536,6 +573,9 @@ static int release_moving(Simulation *sim) {
 /* Choose the contact state after changes of the walls' velocities or impulses. */
 PRBM bool settle_moved(Simulation *sim, Problem *problem) {
     int struck = release_moving(sim);
+    if (!rephase(sim, problem)) {
+        return false;
+    }
     if (struck >= 0) {
         return impact(sim, struck, problem);
     }

@@ -1,5 +1,6 @@
 /* Events: the table of guards and resets, the first event of a step, and the limit of the number of
  * events: the twin of hybrid/events.py. */
+#include "hybrid/compliant.h"
 #include "hybrid/contact_modes.h"
 #include "hybrid/events.h"
 #include "hybrid/guards.h"
@@ -14,7 +15,16 @@ static bool apply_impact(Simulation *sim, const Event *event, Problem *problem) 
 
 static bool apply_release(Simulation *sim, const Event *event, Problem *problem) {
     set_mode(sim, event->contact, CONTACT_OPEN);
+    (void)press_released(sim);
     return settle(sim, NULL, 0, NULL, problem);
+}
+
+static bool apply_switch(Simulation *sim, const Event *event, Problem *problem) {
+    return switch_phase(sim, event->contact, problem);
+}
+
+static bool apply_separation(Simulation *sim, const Event *event, Problem *problem) {
+    return separate(sim, event->contact, problem);
 }
 
 /* A slip or a reversal. */
@@ -31,6 +41,10 @@ static const Transition TRANSITIONS[EVENT_KINDS] = {
                     apply_friction},
     [EVENT_REVERSAL] = {{"reversal", reversal_guard, false}, slipping_contact, reversal_near, true,
                         reversal_time, apply_friction},
+    [EVENT_SWITCH] = {{"switch", switching_guard, false}, pressed_stop, pressed_near, true,
+                      switching_time, apply_switch},
+    [EVENT_SEPARATION] = {{"separation", indentation_guard, false}, pressed_stop, pressed_near,
+                          true, closing_time, apply_separation},
     [EVENT_IMPACT] = {{"impact", gap_guard, false}, open_stop, impact_near, true, closing_time,
                       apply_impact},
 };
@@ -58,18 +72,29 @@ static bool find_events(Simulation *sim, EventKind kind, Event *first, Problem *
     return true;
 }
 
+/* The first kind of events that the present contacts allow: an open stop has impacts only. */
+static EventKind first_kind(const Equations *q) {
+    bool closed = q->held_count > 0 || q->sticking_count > 0 || q->slipping_count > 0;
+    return closed ? EVENT_NONE + 1 : q->pressed_count > 0 ? EVENT_SWITCH : EVENT_IMPACT;
+}
+
 PRBM bool first_event(Simulation *sim, Event *first, Problem *problem) {
     const Event none = {EVENT_NONE, 0, 0.0};
-    bool near[EVENT_KINDS], samples = false, ok = true;
+    bool near[EVENT_KINDS], any = false, samples = false, ok = true;
+    EventKind begin = first_kind(&sim->equations);
     *first = none;
-    for (EventKind kind = EVENT_NONE + 1; kind < EVENT_KINDS; kind++) {
+    for (EventKind kind = begin; kind < EVENT_KINDS; kind++) {
         near[kind] = transition(kind)->near(sim);
+        any = any || near[kind];
         samples = samples || (near[kind] && transition(kind)->samples);
+    }
+    if (!any) {
+        return true;
     }
     if (samples) {
         sample_arc(sim);
     }
-    for (EventKind kind = EVENT_NONE + 1; ok && kind < EVENT_KINDS; kind++) {
+    for (EventKind kind = begin; ok && kind < EVENT_KINDS; kind++) {
         ok = !near[kind] || find_events(sim, kind, first, problem);
     }
     return ok;

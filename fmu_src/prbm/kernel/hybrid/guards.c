@@ -12,20 +12,52 @@
 /* --- guards ----------------------------------------------------------------------------------- */
 
 PRBM double gap_guard(const Equations *equations, const Instant *at, int contact) {
-    return gap(equations, contact, at->time, at->e);
+    return gap(equations, contact, at->time, at->e, at->extra);
 }
 
 static double gap_rate_guard(const Equations *equations, const Instant *at, int contact) {
-    return gap_rate(equations, contact, at->time, at->e, at->v);
+    return gap_rate(equations, contact, at->time, at->e, at->v, at->extra);
+}
+
+PRBM double indentation_guard(const Equations *equations, const Instant *at, int contact) {
+    return -gap_guard(equations, at, contact);
+}
+
+/* The sign of the gap in a guard that is the gap or the indentation. */
+static double sign_of_gap(const Guard *guard) {
+    return guard->value == indentation_guard ? -1.0 : 1.0;
+}
+
+/* The margin of the phase of a contact.  It begins to rise when its rate exceeds the reference
+ * speed; it becomes free when its damping exceeds the elastic force. */
+PRBM double switching_guard(const Equations *equations, const Instant *at, int contact) {
+    const Touching *touching = &equations->contacts.touching[contact];
+    double rate = -gap_rate_guard(equations, at, contact);
+    double ratio = damping_ratio(&equations->laws[contact], touching, rate);
+    if (touching->phase == PHASE_FREE) {
+        return PHASE_RTOL - ratio;
+    }
+    return lesser(PHASE_RTOL + ratio, 1.0 + PHASE_RTOL - rate / touching->reference_speed);
+}
+
+/* The second derivative of the indentation, with which the reference speed rises. */
+PRBM double rising_guard(const Equations *equations, const Instant *at, int contact) {
+    return -gap_acceleration(equations, contact, at->time, at->e, at->v, at->found);
 }
 
 PRBM double release_guard(const Equations *equations, const Instant *at, int contact) {
-    return stop_force(equations, at->lam, contact);
+    const Touching *touching = &equations->contacts.touching[contact];
+    double force = stop_force(equations, at->found->lam, contact);
+    if (touching->phase != PHASE_SETTLED) {
+        return force;
+    }
+    double elastic = elastic_force(&equations->laws[contact], touching->depth);
+    return SETTLED_FORCE_RTOL * elastic - fabs(force - elastic);
 }
 
 PRBM double slip_guard(const Equations *equations, const Instant *at, int contact) {
-    double friction = fabs(stick_force(equations, at->lam, contact));
-    double limit = friction_limit(equations, at->e, at->lam, contact);
+    double friction = fabs(stick_force(equations, at->found->lam, contact));
+    double limit = friction_limit(equations, at->e, at->found, contact);
     return (1.0 + FRICTION_EXCESS_RTOL) * limit - friction;
 }
 
@@ -37,7 +69,7 @@ PRBM double reversal_guard(const Equations *equations, const Instant *at, int co
 /* --- contacts and steps in which events may occur --------------------------------------------- */
 
 PRBM bool held_stop(const Equations *equations, int contact) {
-    return is_stop(equations->system, contact) && !open_stop(equations, contact);
+    return is_stop(equations->system, contact) && is_held(&equations->contacts, contact);
 }
 
 PRBM bool sticking_contact(const Equations *equations, int contact) {
@@ -45,14 +77,22 @@ PRBM bool sticking_contact(const Equations *equations, int contact) {
 }
 
 PRBM bool slipping_contact(const Equations *equations, int contact) {
-    const System *system = equations->system;
     return slip_sign(equations->contacts.modes[contact]) != 0 &&
-           (is_stop(system, contact) || equations->rub_law[3 * (contact - system->s)] > 0.0);
+           (held_stop(equations, contact) || friction_coefficient(equations, contact) > 0.0);
 }
 
 PRBM bool open_stop(const Equations *equations, int contact) {
     return is_stop(equations->system, contact) &&
            equations->contacts.modes[contact] == CONTACT_OPEN;
+}
+
+PRBM bool pressed_stop(const Equations *equations, int contact) {
+    return is_stop(equations->system, contact) &&
+           is_pressed(&equations->contacts.touching[contact]);
+}
+
+PRBM bool pressed_near(Simulation *sim) {
+    return sim->equations.pressed_count > 0;
 }
 
 PRBM bool release_near(Simulation *sim) {
@@ -62,7 +102,8 @@ PRBM bool release_near(Simulation *sim) {
         return true;
     }
     for (int k = 0; k < q->held_count; k++) {
-        if (forces->least[k] <= RELEASE_WATCH_FACTOR * forces->largest[k]) {
+        if (q->contacts.touching[q->held[k]].phase == PHASE_SETTLED ||
+            forces->least[k] <= RELEASE_WATCH_FACTOR * forces->largest[k]) {
             return true;
         }
     }
@@ -111,8 +152,10 @@ static double gap_reach(const Simulation *sim, int stop, const Complex *e, const
     const System *system = system_of(sim);
     const Complex *row = system->gaps + stop * system->d;
     const Wall *wall = &sim->state.walls[stop];
-    double reach = fabs(wall->rate) * sim->state.arc.h + 2.0 * fabs(wall->offset) +
-                   fabs(wall->excess) * wall->span;
+    const double *extra = extra_states(sim, sim->state.arc.y);
+    double given = give_of(&sim->equations, stop, extra, EXTRA_GIVE_RATE);
+    double reach = (fabs(wall->rate) + fabs(given)) * sim->state.arc.h +
+                   2.0 * fabs(wall->offset) + fabs(wall->excess) * wall->span;
     for (int j = 0; j < system->d; j++) {
         reach += (fabs(row[j].re) + fabs(row[j].im)) * arms[j];
     }
@@ -132,10 +175,11 @@ PRBM bool impact_near(Simulation *sim) {
         return false;
     }
     bound_arms(sim, arms);
+    double near = TOUCHING_RTOL * system->length, start = sim->state.arc.start;
+    const double *extra = extra_states(sim, sim->state.arc.y);
     for (int s = 0; s < system->s; s++) {
-        double near = TOUCHING_RTOL * system->length;
-        if (open_stop(&sim->equations, s) && !(gap(&sim->equations, s, sim->state.arc.start, e) >
-                                               near + gap_reach(sim, s, e, arms))) {
+        if (sim->state.modes[s] == CONTACT_OPEN &&
+            !(gap(&sim->equations, s, start, e, extra) > near + gap_reach(sim, s, e, arms))) {
             return true;
         }
     }
@@ -187,16 +231,17 @@ static double guard_at(const ArcGuard *guard, double t) {
     const System *system = system_of(sim);
     Located *located = &sim->stepping.located;
     double *y = located->y;
-    Instant at = {t, y, y + system->n, located->e, NULL};
+    Instant at = {t, y, y + system->n, extra_states(sim, y), located->e, NULL};
     arc_at(sim, t, y);
     if (guard->forces) {
         Problem problem;
         Evaluation *evaluation = &located->evaluation;
-        if (!evaluate_equations(&sim->equations, t, y, y + system->n, NULL, evaluation, &problem)) {
+        if (!evaluate_equations(&sim->equations, t, y, at.v, at.extra, NULL, evaluation,
+                                &problem)) {
             return no_guard(search, problem.text);
         }
         at.e = evaluation->at.e;
-        at.lam = evaluation->lam;
+        at.found = evaluation;
     } else {
         directions(system, y, located->e);
     }
@@ -282,6 +327,7 @@ static bool polish_impact(const Search *search, double apex, double *time) {
     int n = system_of(sim)->n, stop = search->contact;
     Located *located = &sim->stepping.located;
     double t = *time, *y = located->y;
+    double sign = sign_of_gap(search->guard);
     Complex *e = located->e;
     if (t <= sim->state.arc.start) {
         return true;
@@ -297,8 +343,8 @@ static bool polish_impact(const Search *search, double apex, double *time) {
             return false;
         }
         directions(system_of(sim), y, e);
-        double distance = gap(&sim->equations, stop, t, e);
-        double speed = gap_rate(&sim->equations, stop, t, e, y + n);
+        double distance = sign * gap(&sim->equations, stop, t, e, extra_states(sim, y));
+        double speed = sign * gap_rate(&sim->equations, stop, t, e, y + n, extra_states(sim, y));
         double change = -distance / speed;
         if (speed >= 0.0 || fabs(distance) <= EVENT_TIME_ATOL * fabs(speed) ||
             fabs(change) > EVENT_CORRECTION_RTOL * located->h) {
@@ -316,18 +362,25 @@ static double sample_time(const Simulation *sim, int k) {
     return sim->state.arc.start + sim->state.arc.h * ((double)k / (double)GUARD_INTERVALS);
 }
 
-/* Compute positions, rates and directions at the samples of the step. */
+/* The number of states that are computed at a sample: positions, rates and, with compliant stops,
+ * all others. */
+static int sample_size(const Simulation *sim) {
+    bool compliant = system_of(sim)->mechanism->compliant_count > 0;
+    return compliant ? state_size(sim) : 2 * system_of(sim)->n;
+}
+
+/* Compute states and directions at the samples of the step. */
 PRBM void sample_arc(Simulation *sim) {
     const Arc *arc = &sim->state.arc;
     Stepping *stepping = &sim->stepping;
-    int n = system_of(sim)->n, ny = state_size(sim);
+    int size = sample_size(sim), ny = state_size(sim);
     for (int k = 0; k <= GUARD_INTERVALS; k++) {
-        double *y = stepping->sample_y + k * 2 * n;
-        zeros(2 * n, y);
+        double *y = stepping->sample_y + k * size;
+        zeros(size, y);
         for (int i = 0; i < STAGES; i++) {
-            add_scaled(2 * n, stepping->weights[k][i], arc->k + i * ny, y);
+            add_scaled(size, stepping->weights[k][i], arc->k + i * ny, y);
         }
-        for (int j = 0; j < 2 * n; j++) {
+        for (int j = 0; j < size; j++) {
             y[j] = arc->y[j] + arc->h * y[j];
         }
         directions(system_of(sim), y, stepping->sample_e + k * system_of(sim)->d);
@@ -336,9 +389,9 @@ PRBM void sample_arc(Simulation *sim) {
 
 static Instant sample(const Simulation *sim, int k) {
     int n = system_of(sim)->n;
-    const double *y = sim->stepping.sample_y + k * 2 * n;
+    const double *y = sim->stepping.sample_y + k * sample_size(sim);
     const Complex *e = sim->stepping.sample_e + k * system_of(sim)->d;
-    Instant at = {sample_time(sim, k), y, y + n, e, NULL};
+    Instant at = {sample_time(sim, k), y, y + n, extra_states(sim, y), e, NULL};
     return at;
 }
 
@@ -359,7 +412,8 @@ static bool detect_closing(Search *search, const double *gaps, const double *rat
                            Closing *closing) {
     Simulation *sim = search->sim;
     double length = system_of(sim)->length, depth = closing_depth(&sim->configuration);
-    ArcGuard guard = arc_guard(search), rate = {search, gap_rate_guard, false, 1.0, 0.0};
+    double sign = sign_of_gap(search->guard);
+    ArcGuard guard = arc_guard(search), rate = {search, gap_rate_guard, false, sign, 0.0};
     bool dips = rates[0] < 0.0 && 0.0 < rates[1];
     closing->a = sample_time(sim, k);
     closing->b = sample_time(sim, k + 1);
@@ -388,7 +442,7 @@ static bool detect_closing(Search *search, const double *gaps, const double *rat
         return closing->at_a || gaps[1] < lesser(gaps[0], -depth);
     }
     if (dips) {
-        rate.sign = -1.0;
+        rate.sign = -sign;
         closing->b = locate(&rate, closing->a, closing->b);
         return guard_at(&guard, closing->b) <= 0.0;
     }
@@ -414,11 +468,11 @@ static bool locate_closing(Search *search, const Closing *closing, double *time)
 PRBM bool closing_time(Simulation *sim, const Guard *guard, int stop, Fall *fall,
                        Problem *problem) {
     Search search = {sim, guard, stop, false, problem};
-    double gaps[GUARD_INTERVALS + 1], rates[GUARD_INTERVALS + 1];
+    double gaps[GUARD_INTERVALS + 1], rates[GUARD_INTERVALS + 1], sign = sign_of_gap(guard);
     for (int k = 0; k <= GUARD_INTERVALS; k++) {
         Instant at = sample(sim, k);
-        gaps[k] = guard->value(&sim->equations, &at, stop);
-        rates[k] = gap_rate_guard(&sim->equations, &at, stop);
+        gaps[k] = sign * gap_guard(&sim->equations, &at, stop);
+        rates[k] = sign * gap_rate_guard(&sim->equations, &at, stop);
     }
     for (int k = 0; !fall->found && k < GUARD_INTERVALS; k++) {
         Closing closing;
@@ -470,6 +524,30 @@ PRBM bool yield_time(Simulation *sim, const Guard *guard, int contact, Fall *fal
         double after = guard_at(&on_arc, times[part + 1]);
         if (after <= 0.0) {
             double a = times[part], b = times[part + 1];
+            fall->found = true;
+            fall->time = before > 0.0 ? locate(&on_arc, a, b) : a;
+        }
+        before = after;
+    }
+    return !search.failed;
+}
+
+/* Find the time at which the phase of a pressed contact changes. */
+PRBM bool switching_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
+                         Problem *problem) {
+    const Guard rising = {guard->event, rising_guard, true};
+    if (sim->equations.contacts.touching[contact].phase == PHASE_RISING) {
+        return yield_time(sim, &rising, contact, fall, problem);
+    }
+    Search search = {sim, guard, contact, false, problem};
+    ArcGuard on_arc = arc_guard(&search);
+    Instant start = sample(sim, 0);
+    double before = guard->value(&sim->equations, &start, contact);
+    for (int k = 0; !fall->found && k < GUARD_INTERVALS; k++) {
+        Instant at = sample(sim, k + 1);
+        double after = guard->value(&sim->equations, &at, contact);
+        if (after <= 0.0) {
+            double a = sample_time(sim, k), b = sample_time(sim, k + 1);
             fall->found = true;
             fall->time = before > 0.0 ? locate(&on_arc, a, b) : a;
         }

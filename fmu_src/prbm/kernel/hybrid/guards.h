@@ -5,12 +5,13 @@
 
 #include "hybrid/state.h"
 
-/* A state at which guards are evaluated; lam may be NULL for guards without forces. */
+/* A state at which guards are evaluated.  found: the evaluation there; NULL for guards without
+ * forces. */
 typedef struct {
     double time;
-    const double *q, *v;
+    const double *q, *v, *extra;
     const Complex *e;
-    const double *lam;
+    const Evaluation *found;
 } Instant;
 
 typedef double GuardValue(const Equations *equations, const Instant *at, int contact);
@@ -32,20 +33,27 @@ PRBM double release_guard(const Equations *equations, const Instant *at, int con
 PRBM double slip_guard(const Equations *equations, const Instant *at, int contact);
 PRBM double reversal_guard(const Equations *equations, const Instant *at, int contact);
 PRBM double gap_guard(const Equations *equations, const Instant *at, int contact);
+PRBM double indentation_guard(const Equations *equations, const Instant *at, int contact);
+PRBM double switching_guard(const Equations *equations, const Instant *at, int contact);
+PRBM double rising_guard(const Equations *equations, const Instant *at, int contact);
 /* The contacts at which events may occur. */
 PRBM bool held_stop(const Equations *equations, int contact);
 PRBM bool sticking_contact(const Equations *equations, int contact);
 PRBM bool slipping_contact(const Equations *equations, int contact);
+PRBM bool pressed_stop(const Equations *equations, int contact);
 PRBM bool open_stop(const Equations *equations, int contact);
 /* Whether events may occur in the latest step at any contact. */
 PRBM bool release_near(Simulation *sim);
 PRBM bool slip_near(Simulation *sim);
 PRBM bool reversal_near(Simulation *sim);
+PRBM bool pressed_near(Simulation *sim);
 PRBM bool impact_near(Simulation *sim);
 /* Find the first time in the latest step at which the guard of a contact falls to zero.  The caller
  * sets fall->found to false.  Return false on failure. */
 PRBM bool yield_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
                      Problem *problem);
+PRBM bool switching_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
+                         Problem *problem);
 PRBM bool reversal_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
                         Problem *problem);
 PRBM bool closing_time(Simulation *sim, const Guard *guard, int stop, Fall *fall,

@@ -2,8 +2,10 @@
 #include <math.h>
 #include <string.h>
 
+#include "hybrid/compliant.h"
 #include "hybrid/configuration.h"
 #include "hybrid/contact_modes.h"
+#include "hybrid/guards.h"
 #include "hybrid/impacts.h"
 #include "hybrid/rest.h"
 #include "hybrid/simulation.h"
@@ -261,7 +263,7 @@ static bool with_released_stops(Simulation *sim, Approach *approach, Hits *hits,
     for (int a = 0; a < held_count; a++) {
         int i = hits->held[a];
         double rate = gap_rate(&sim->equations, i, sim->state.front_time, approach->at->e,
-                               hits->after);
+                               hits->after, NULL);
         closing = closing || (!has_contact(kept_count, kept, i) &&
                               rate < -zero_speed(&sim->configuration));
     }
@@ -308,7 +310,8 @@ static bool impact_impulses(Simulation *sim, const double *q, const double *v, H
     Inertia at = inertia_at(sim, q);
     Approach approach = {&at, v, {0.0}, {0.0}};
     for (int i = 0; i < system_of(sim)->s; i++) {
-        approach.rates[i] = gap_rate(&sim->equations, i, sim->state.front_time, at.e, v);
+        approach.rates[i] = gap_rate(&sim->equations, i, sim->state.front_time, at.e, v,
+                                     NULL);
         hits->normal[i] = hits->tangential[i] = 0.0;
         hits->with_normal[i] = false;
     }
@@ -335,7 +338,8 @@ static bool bounce_vanishes(Simulation *sim, int stop, const HoldingSet *resting
     double *G = take(&sim->scratch, (size_t)system->n), free;
     Rows gaps = gap_rows(system);
     const Equations *holding = equations_holding(sim, resting, q, v);
-    if (!evaluate_equations(holding, sim->state.front_time, q, v, NULL, tried, problem)) {
+    if (!evaluate_equations(holding, sim->state.front_time, q, v,
+                            extra_states(sim, sim->state.front), NULL, tried, problem)) {
         return false;
     }
     Inertia at = inertia_at(sim, q);
@@ -391,7 +395,7 @@ static bool captured(Simulation *sim, int stop, const Hits *hits, const double *
 /* --- bookkeeping ------------------------------------------------------------------------------ */
 
 /* Report an impact at angles q, with the rates v before and after. */
-static void report_impact(const Simulation *sim, int i, const double *q, const double *v,
+PRBM void report_impact(const Simulation *sim, int i, const double *q, const double *v,
                           const double *after) {
     const Latched *last = &sim->state.latched[i];
     Impact report = {i,
@@ -403,6 +407,9 @@ static void report_impact(const Simulation *sim, int i, const double *q, const d
                      last->energy_lost,
                      last->modal_restitution,
                      last->impulse_sum,
+                     last->peak_force,
+                     last->indentation,
+                     last->contact_duration,
                      last->count,
                      q,
                      v,
@@ -430,9 +437,9 @@ static void book_energies(Simulation *sim, const Hits *hits, const double *q, co
     Complex *e = directions_at(sim, q);
     for (int i = 0; i < system->s; i++) {
         double P = hits->normal[i];
-        account->before[i] = gap_rate(&sim->equations, i, t, e, v);
+        account->before[i] = gap_rate(&sim->equations, i, t, e, v, NULL);
         work += hits->with_normal[i] ? push_wall(sim, i, P) : 0.0;
-        account->after[i] = gap_rate(&sim->equations, i, t, e, hits->after);
+        account->after[i] = gap_rate(&sim->equations, i, t, e, hits->after, NULL);
         double slid = row_rate(&walls, i, e, v) + row_rate(&walls, i, e, hits->after);
         account->lost[i] = -P * (account->before[i] + account->after[i]) / 2 -
                            hits->tangential[i] * slid / 2;
@@ -486,13 +493,14 @@ static void find_partners(Simulation *sim, int hit, const double *q, const doubl
     size_t mark = sim->scratch.used;
     double near = TOUCHING_RTOL * system_of(sim)->length, t = sim->state.front_time;
     Complex *e = directions_at(sim, q);
+    const Stop *stops = sim->configuration.mechanism->stops;
     hits->struck_count = hits->held_count = 0;
     for (int i = 0; i < system_of(sim)->s; i++) {
-        double distance = gap(&sim->equations, i, t, e);
-        rates[i] = gap_rate(&sim->equations, i, t, e, v);
-        if (sim->state.modes[i] != CONTACT_OPEN) {
+        double distance = gap(&sim->equations, i, t, e, NULL);
+        rates[i] = gap_rate(&sim->equations, i, t, e, v, NULL);
+        if (held_stop(&sim->equations, i)) {
             hits->held[hits->held_count++] = i;
-        } else if (rates[i] < 0.0 && (i == hit || distance <= near)) {
+        } else if (!stops[i].compliant && rates[i] < 0.0 && (i == hit || distance <= near)) {
             hits->struck[hits->struck_count++] = i;
         }
     }
@@ -519,7 +527,7 @@ static bool choose_restitutions(Simulation *sim, const double *q, const double *
     return ok;
 }
 
-/* Open all stops.  List those that took part and do not separate; return their number. */
+/* Open all held stops.  List those that took part and do not separate; return their number. */
 static int open_all(Simulation *sim, const Hits *hits, int *touching) {
     size_t mark = sim->scratch.used;
     double bound = zero_speed(&sim->configuration), t = sim->state.front_time;
@@ -527,12 +535,13 @@ static int open_all(Simulation *sim, const Hits *hits, int *touching) {
     Complex *e = directions_at(sim, sim->state.front);
     for (int k = 0; k < hits->struck_count + hits->held_count; k++) {
         int i = partner(hits, k);
-        if (gap_rate(&sim->equations, i, t, e, hits->after) <= bound) {
+        if (gap_rate(&sim->equations, i, t, e, hits->after, NULL) <= bound) {
             touching[count++] = i;
         }
     }
     for (int i = 0; i < system_of(sim)->s; i++) {
-        sim->state.modes[i] = CONTACT_OPEN;
+        bool held = held_stop(&sim->equations, i);
+        sim->state.modes[i] = held ? CONTACT_OPEN : sim->state.modes[i];
     }
     set_inputs(sim);
     sim->scratch.used = mark;
@@ -551,7 +560,15 @@ PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
     hits.after = take(&sim->scratch, (size_t)n);
     copy(n, sim->state.front, q);
     copy(n, sim->state.front + n, v);
+    if (sim->configuration.mechanism->stops[hit].compliant) {
+        sim->scratch.used = mark;
+        return touch(sim, hit, problem);
+    }
     find_partners(sim, hit, q, v, &hits, rates);
+    if (hits.struck_count > 0) {
+        unsettle(sim);
+        find_partners(sim, hit, q, v, &hits, rates);
+    }
     if (hits.struck_count == 0) {
         sim->scratch.used = mark;
         return settle(sim, &hit, fabs(rates[hit]) <= zero_speed(&sim->configuration), NULL,
@@ -567,7 +584,7 @@ PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
         touching_count = open_all(sim, &hits, touching);
     }
     sim->scratch.used = mark;
-    return ok && settle(sim, touching, touching_count, NULL, problem);
+    return ok && rephase(sim, problem) && settle(sim, touching, touching_count, NULL, problem);
 }
 
 /* --- impulses of the inputs ------------------------------------------------------------------- */

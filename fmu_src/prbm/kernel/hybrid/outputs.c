@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "core/sections.h"
+#include "hybrid/compliant.h"
 #include "hybrid/configuration.h"
 #include "hybrid/impacts.h"
 #include "hybrid/outputs.h"
@@ -44,16 +45,36 @@ static void output_stops(const Simulation *sim, double *out) {
     const System *system = system_of(sim);
     const Complex *e = sim->present.e;
     const double *v = sim->present.y + system->n;
+    const double *extra = extra_states(sim, sim->present.y), none[EXTRA_STATES] = {0.0};
     Rows gaps = gap_rows(system);
     for (int i = 0; i < system->s; i++) {
+        const Stop *stop = &system->mechanism->stops[i];
+        const double *given = stop->compliant ? extra + stop->extra : none;
         double *values = out + PER_STOP * i;
         WallMotion wall = wall_motion(&sim->state.walls[i], sim->state.time);
         double value = row_value(&gaps, i, e) + gaps.c[i], rate = row_rate(&gaps, i, e, v);
-        values[STOP_GAP] = value + wall.x;
-        values[STOP_GAP_RATE] = rate + wall.v;
+        values[STOP_GAP] = value + wall.x + given[EXTRA_GIVE];
+        values[STOP_GAP_RATE] = rate + wall.v + given[EXTRA_GIVE_RATE];
         values[STOP_POINT_DISPLACEMENT] =
-            -value - field_value(sim, system->mechanism->stops[i].position);
+            -value - field_value(sim, stop->position);
         values[STOP_POINT_VELOCITY] = -rate;
+    }
+}
+
+static void output_compliant(Simulation *sim, double *out, double *latched) {
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        if (!sim->configuration.mechanism->stops[i].compliant) {
+            continue;
+        }
+        double depth, force;
+        peaks_until(sim, i, sim->state.time, &depth, &force);
+        out[COMPLIANT_PEAK_FORCE] = force;
+        out[COMPLIANT_INDENTATION] = depth;
+        out[COMPLIANT_CONTACT_DURATION] = sim->state.latched[i].contact_duration;
+        out[COMPLIANT_CONTACT_LOSS] = extra_of(sim, sim->present.y, i)[EXTRA_LOSS];
+        out += PER_COMPLIANT;
+        latched[PER_LATCHED * i + LATCHED_IMPULSE_SUM] =
+            extra_of(sim, sim->present.y, i)[EXTRA_IMPULSE];
     }
 }
 
@@ -98,6 +119,7 @@ static void output_places(Simulation *sim) {
     output_probes(sim, out + slots->probes);
     output_stops(sim, out + slots->stops);
     output_latched(sim, out + slots->latched);
+    output_compliant(sim, out + slots->compliant, out + slots->latched);
     output_links(sim, out + slots->links, out + slots->stretches);
     out[slots->energies + ENERGY_DISSIPATED] = sim->present.y[2 * system->n];
     out[slots->energies + ENERGY_WORK] = sim->present.y[2 * system->n + 1];
@@ -112,8 +134,8 @@ static bool output_motion(Simulation *sim, bool near, Problem *problem) {
     const Equations *q = &sim->equations;
     Present *present = &sim->present;
     double *out = present->outputs, *v = present->y + system_of(sim)->n;
-    if (!evaluate_equations(q, sim->state.time, present->y, v, near ? &present->reference : NULL,
-                            &present->evaluation, problem)) {
+    if (!evaluate_equations(q, sim->state.time, present->y, v, extra_states(sim, present->y),
+                            near ? &present->reference : NULL, &present->evaluation, problem)) {
         return false;
     }
     for (int i = 0; i < system_of(sim)->s; i++) {
@@ -122,6 +144,10 @@ static bool output_motion(Simulation *sim, bool near, Problem *problem) {
     for (int k = 0; k < q->held_count; k++) {
         double force = present->evaluation.lam[q->first_hold + k];
         out[slots->stops + PER_STOP * q->held[k] + STOP_FORCE] = force;
+    }
+    for (int k = 0; k < q->pressed_count; k++) {
+        int i = q->pressed[k];
+        out[slots->stops + PER_STOP * i + STOP_FORCE] = present->evaluation.pressure[i];
     }
     out[slots->energies + ENERGY_KINETIC] = kinetic_energy_of(q, &present->evaluation, v);
     return true;
@@ -144,7 +170,7 @@ static void output_stresses(Simulation *sim) {
     double *out = sim->present.outputs + m->slots.stresses;
     Stress *found = take_stresses(&sim->scratch, m->stressed_count);
     stresses(&sim->equations, present->e, present->y, present->y + system_of(sim)->n,
-             present->evaluation.a, present->evaluation.lam, found, &sim->scratch);
+             &present->evaluation, found, &sim->scratch);
     for (int i = 0; i < m->stressed_count; i++) {
         out[PER_STRESS * i + STRESS_STRESS_START] = found[i].start;
         out[PER_STRESS * i + STRESS_STRESS_END] = found[i].end;
@@ -164,6 +190,13 @@ static void output_energies(Simulation *sim) {
         deflection[j] = sim->present.y[j] - system->q0[j];
     }
     out[ENERGY_ELASTIC] = elastic_energy(n, system->K, deflection);
+    for (int i = 0; i < system->s; i++) {
+        if (sim->state.touching[i].phase != PHASE_NONE) {
+            double distance = gap(&sim->equations, i, sim->state.time, sim->present.e,
+                                  extra_states(sim, sim->present.y));
+            out[ENERGY_ELASTIC] += contact_energy(&sim->equations.laws[i], distance);
+        }
+    }
     out[ENERGY_GRAVITATIONAL] = gravitational_energy(system, sim->present.e);
     sim->scratch.used = mark;
 }

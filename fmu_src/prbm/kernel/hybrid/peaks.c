@@ -99,8 +99,7 @@ static void sample_front(Simulation *sim, const Evaluation *at) {
     const System *system = system_of(sim);
     const double *front = sim->state.front;
     Stress *found = take_stresses(&sim->scratch, peak_count(sim));
-    stresses(&sim->equations, at->at.e, front, front + system->n, at->a, at->lam, found,
-             &sim->scratch);
+    stresses(&sim->equations, at->at.e, front, front + system->n, at, found, &sim->scratch);
     for (int i = 0; i < peak_count(sim); i++) {
         Peak peak = peak_at(sim, i);
         const Sample sample = {sim->state.front_time, found[i].largest, found[i].place,
@@ -130,7 +129,7 @@ PRBM void restart_peaks_from(Simulation *sim, const Evaluation *at) {
 static bool evaluate_front(Simulation *sim, Problem *problem) {
     const double *y = sim->state.front;
     return evaluate_equations(&sim->equations, sim->state.front_time, y, y + system_of(sim)->n,
-                              NULL, &sim->at_front, problem);
+                              extra_states(sim, y), NULL, &sim->at_front, problem);
 }
 
 PRBM bool restart_peaks(Simulation *sim, Problem *problem) {

@@ -21,7 +21,8 @@ PRBM bool moment_at(Simulation *sim, const double *y, Moment *now, Problem *prob
         }
         present->fresh |= RATES;
     }
-    Instant at = {time, y, y + system_of(sim)->n, present->rated.at.e, present->rated.lam};
+    Instant at = {time, y, y + system_of(sim)->n, extra_states(sim, y), present->rated.at.e,
+                  &present->rated};
     now->at = at;
     now->rates = present->rates;
     now->evaluation = &present->rated;

@@ -36,11 +36,12 @@ static void rest_rows(Simulation *sim, const RestContacts *rest, const Complex *
 static void rest_accelerations(const Simulation *sim, const RestContacts *rest, const Complex *e,
                                const double *v, const double *rows, double *u) {
     const System *system = system_of(sim);
-    const double *a = sim->trial.evaluation.a;
+    const Evaluation *found = &sim->trial.evaluation;
+    const double *a = found->a;
     int n = system->n, k = rest->stop_count;
     for (int i = 0; i < k; i++) {
         u[i] = gap_acceleration(&sim->trial.equations, rest->stops[i], sim->state.front_time, e, v,
-                                a);
+                                found);
     }
     for (int i = k; i < k + rest->count; i++) {
         u[i] = dot(n, rows + i * n, a) - tangential_convective(system, rest->contacts[i - k], e, v);
@@ -50,17 +51,17 @@ static void rest_accelerations(const Simulation *sim, const RestContacts *rest, 
 /* Set the limits of friction of the contacts at rest, see coulomb. */
 static void rest_laws(const Simulation *sim, const RestContacts *rest, const Complex *e,
                       double *friction, double *fixed, int *normal) {
-    const System *system = system_of(sim);
     const Equations *equations = &sim->trial.equations;
     for (int j = 0; j < rest->count; j++) {
         int contact = rest->contacts[j];
-        bool stop = is_stop(system, contact);
-        friction[j] = stop ? equations->stop_friction[contact] : 0.0;
-        fixed[j] = stop ? 0.0 : rub_limit(equations, contact - system->s, e);
         normal[j] = -1;
-        for (int a = 0; stop && a < rest->stop_count; a++) {
+        for (int a = 0; a < rest->stop_count; a++) {
             normal[j] = rest->stops[a] == contact ? a : normal[j];
         }
+        bool stop = normal[j] >= 0;
+        friction[j] = stop ? equations->stop_friction[contact] : 0.0;
+        fixed[j] = stop ? 0.0
+                        : friction_limit(equations, e, &sim->trial.evaluation, contact);
     }
 }
 
@@ -76,7 +77,8 @@ PRBM bool rest_forces(Simulation *sim, const double *q, const double *v,
     double *u = take(&sim->scratch, (size_t)size), *P = take(&sim->scratch, (size_t)size);
     double *friction = take(&sim->scratch, (size_t)m), *fixed = take(&sim->scratch, (size_t)m);
     int *normal = take_integers(&sim->scratch, m);
-    bool ok = evaluate_equations(&sim->trial.equations, sim->state.front_time, q, v, NULL,
+    bool ok = evaluate_equations(&sim->trial.equations, sim->state.front_time, q, v,
+                                 extra_states(sim, sim->state.front), NULL,
                                  &sim->trial.evaluation, problem);
     rest_rows(sim, rest, at.e, rows, pushes);
     ok = ok &&

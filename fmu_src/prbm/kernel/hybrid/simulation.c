@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/start.h"
+#include "hybrid/compliant.h"
 #include "hybrid/configuration.h"
 #include "hybrid/contact_modes.h"
 #include "hybrid/impacts.h"
@@ -20,7 +21,12 @@ PRBM const System *system_of(const Simulation *sim) {
 }
 
 PRBM int state_size(const Simulation *sim) {
-    return 2 * sim->configuration.mechanism->coordinate_count + 2;
+    return sim->configuration.mechanism->state_count;
+}
+
+PRBM const double *extra_states(const Simulation *sim, const double *y) {
+    const Mechanism *m = sim->configuration.mechanism;
+    return m->compliant_count > 0 ? y + 2 * m->coordinate_count + 2 : NULL;
 }
 
 PRBM int contact_count(const Simulation *sim) {
@@ -38,7 +44,8 @@ PRBM Complex *directions_at(Simulation *sim, const double *q) {
 
 /* Place the arrays of numbers of the state one after another. */
 static void place_numbers(State *state, const Mechanism *m, Memory *memory) {
-    size_t ny = 2 * (size_t)m->coordinate_count + 2, s = (size_t)m->stop_count;
+    size_t n = (size_t)m->coordinate_count, s = (size_t)m->stop_count;
+    size_t ny = (size_t)m->state_count;
     size_t np = (size_t)m->parameter_count, nu = (size_t)m->input_count;
     struct {
         double **array;
@@ -49,11 +56,14 @@ static void place_numbers(State *state, const Mechanism *m, Memory *memory) {
         {&state->received, LOADS * (size_t)m->force_count},
         {&state->front, ny},         {&state->k1, ny},
         {&state->arc.y, ny},         {&state->arc.k, STAGES * ny},
-        {&state->arc.before.y, ny - 2}, {&state->arc.before.a, (size_t)m->coordinate_count},
-        {&state->fastest, (size_t)m->coordinate_count},
+        {&state->arc.before.y, 2 * n}, {&state->arc.before.a, n},
+        {&state->first, 3 * n * (size_t)m->compliant_count},
+        {&state->dents, DENT_NUMBERS * (size_t)m->compliant_count},
+        {&state->fastest, n},
         {&state->peaks, PEAK_NUMBERS * (size_t)m->stressed_count},
-        {&state->floors, s},         {&state->accepted, (size_t)m->coordinate_count},
-        {&state->states, 2 * (size_t)m->independent_count + 2},
+        {&state->floors, s},         {&state->accepted, n},
+        {&state->states, 2 * (size_t)m->independent_count + 2 +
+                             EXCHANGED_STATES * (size_t)m->compliant_count},
     };
     state->number_count = 0;
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
@@ -72,6 +82,8 @@ static void place_state(State *state, const Mechanism *m, Memory *memory) {
     place_numbers(state, m, memory);
     state->modes = place(memory, s + (size_t)m->friction_count, sizeof *state->modes);
     state->driven = place(memory, s, sizeof(bool));
+    state->touching = place(memory, s, sizeof(Touching));
+    state->touches = place(memory, s, sizeof(Touch));
     state->latched = place(memory, s, sizeof(Latched));
     state->walls = place(memory, s, sizeof(Wall));
 }
@@ -97,7 +109,8 @@ static void place_scratch(Scratch *scratch, const Mechanism *m, Memory *memory) 
 }
 
 static void place_stepping(Stepping *stepping, const System *system, Memory *memory) {
-    size_t n = (size_t)system->n, s = (size_t)system->s, ny = 2 * n + 2, d = sizeof(double);
+    size_t n = (size_t)system->n, s = (size_t)system->s, d = sizeof(double);
+    size_t ny = (size_t)system->mechanism->state_count;
     size_t samples = GUARD_INTERVALS + 1;
     evaluation_place(&stepping->evaluation, system, memory);
     reference_place(&stepping->reference, system, memory);
@@ -106,7 +119,7 @@ static void place_stepping(Stepping *stepping, const System *system, Memory *mem
     stepping->end = place(memory, ny, d);
     stepping->error = place(memory, ny, d);
     stepping->coarse_error = place(memory, ny, d);
-    stepping->sample_y = place(memory, samples * 2 * n, d);
+    stepping->sample_y = place(memory, samples * ny, d);
     stepping->sample_e = place(memory, samples * (size_t)system->d, sizeof(Complex));
     stepping->located.y = place(memory, ny, d);
     stepping->located.e = place(memory, (size_t)system->d, sizeof(Complex));
@@ -123,7 +136,8 @@ static void place_stepping(Stepping *stepping, const System *system, Memory *mem
 }
 
 static void place_present(Simulation *sim, const System *system, Memory *memory) {
-    size_t n = (size_t)system->n, ny = 2 * n + 2, d = sizeof(double);
+    size_t d = sizeof(double);
+    size_t ny = (size_t)system->mechanism->state_count;
     Present *present = &sim->present;
     present->y = place(memory, ny, d);
     present->e = place(memory, (size_t)system->d, sizeof(Complex));
@@ -140,12 +154,14 @@ static void place_all(Simulation *sim, Memory *memory) {
     place_state(&sim->state, m, memory);
     sim->backup = place(memory, simulation_state_count(sim), sizeof(double));
     system_place(system, m, memory);
-    sim->configuration.least = place(memory, 2 * (size_t)m->coordinate_count + 2, sizeof(double));
-    sim->configuration.share = place(memory, 2 * (size_t)m->coordinate_count + 2, sizeof(double));
+    sim->configuration.least = place(memory, (size_t)state_size(sim), sizeof(double));
+    sim->configuration.share = place(memory, (size_t)state_size(sim), sizeof(double));
     equations_place(&sim->equations, system, memory);
     equations_place(&sim->trial.equations, system, memory);
     sim->trial.contacts.modes = place(memory, (size_t)contact_count(sim),
                                      sizeof(ContactMode));
+    sim->trial.contacts.touching = place(memory, (size_t)system->mechanism->stop_count,
+                                        sizeof(Touching));
     evaluation_place(&sim->trial.evaluation, system, memory);
     place_stepping(&sim->stepping, system, memory);
     place_present(sim, system, memory);
@@ -228,7 +244,7 @@ PRBM void set_inputs(Simulation *sim) {
     const double *given = sim->state.acting_given, *base = given + m->input.base;
     Inputs inputs = {sim->forces, {base[0], base[1]}, sim->state.walls,
                      given + m->input.mobilities};
-    ContactState contacts = {sim->state.modes};
+    ContactState contacts = {sim->state.modes, sim->state.touching};
     copy(LOADS * m->force_count, given, sim->forces);
     set_equations(&sim->equations, &inputs, &contacts, sim->configuration.omega);
     forget_outputs(sim);
@@ -258,6 +274,8 @@ static void clear_stops(Simulation *sim) {
     State *state = &sim->state;
     size_t s = (size_t)sim->configuration.mechanism->stop_count;
     memset(state->latched, 0, s * sizeof *state->latched);
+    memset(state->touching, 0, s * sizeof *state->touching);
+    memset(state->touches, 0, s * sizeof *state->touches);
     memset(state->walls, 0, s * sizeof *state->walls);
     memset(state->driven, 0, s * sizeof *state->driven);
     free_contacts(sim);
@@ -385,7 +403,10 @@ static bool check_walls(Simulation *sim, Problem *problem) {
     const double *front = sim->state.front, t = sim->state.front_time;
     Complex *e = directions_at(sim, front);
     for (int i = 0; i < system_of(sim)->s; i++) {
-        double distance = gap(&sim->equations, i, t, e);
+        double distance = gap(&sim->equations, i, t, e, NULL);
+        if (sim->configuration.mechanism->stops[i].compliant && distance < 0.0) {
+            continue; /* A preload. */
+        }
         if (distance < -RELEASE_PENETRATION_ATOL) {
             double wall = sim->state.walls[i].position;
             const char *name = sim->configuration.mechanism->stops[i].name;
@@ -395,20 +416,21 @@ static bool check_walls(Simulation *sim, Problem *problem) {
                         name, -distance, name, wall, wall - distance);
         }
         if (struck < 0 && distance <= RELEASE_PENETRATION_ATOL &&
-            gap_rate(&sim->equations, i, t, e, front + n) < 0.0) {
+            gap_rate(&sim->equations, i, t, e, front + n, NULL) < 0.0) {
             struck = i;
         }
     }
     sim->scratch.used = mark;
-    return struck < 0 || impact(sim, struck, problem);
+    return preload(sim, problem) && (struck < 0 || impact(sim, struck, problem));
 }
 
 /* Release the mechanism in its start shape, and choose the contact state there. */
 static bool release_mechanism(Simulation *sim, Problem *problem) {
-    int every[STOPS_MAX];
+    int rigid[STOPS_MAX], count = 0;
     State *state = &sim->state;
     for (int i = 0; i < system_of(sim)->s; i++) {
-        every[i] = i;
+        rigid[count] = i;
+        count += !sim->configuration.mechanism->stops[i].compliant;
     }
     clear_stops(sim);
     place_walls(sim);
@@ -416,7 +438,8 @@ static bool release_mechanism(Simulation *sim, Problem *problem) {
     set_inputs(sim);
     return start_state(sim, problem) &&
            project(&sim->equations, state->time, state->front, &sim->scratch, problem) &&
-           check_walls(sim, problem) && settle(sim, every, system_of(sim)->s, NULL, problem) &&
+           check_walls(sim, problem) &&
+           rephase(sim, problem) && settle(sim, rigid, count, NULL, problem) &&
            find_fastest(sim, problem);
 }
 

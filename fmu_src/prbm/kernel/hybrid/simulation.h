@@ -4,7 +4,9 @@
 
 #include "hybrid/state.h"
 
-PRBM int state_size(const Simulation *sim); /* ny = 2 n + 2 */
+PRBM int state_size(const Simulation *sim); /* ny = 2 n + 2 + 4 c */
+/* The states of compliant stops in a state y (ny,): 4 of each, see core/dynamics.c. */
+PRBM const double *extra_states(const Simulation *sim, const double *y);
 PRBM const System *system_of(const Simulation *sim);
 PRBM int contact_count(const Simulation *sim);
 PRBM Complex *directions_at(Simulation *sim, const double *q); /* in working memory */

@@ -8,12 +8,13 @@
 #include "hybrid/simulation.h"
 #include "hybrid/snapshot.h"
 
-enum { SCALARS = 25, PER_STOP_STATE = 16 }; /* numbers of a simulation and of a stop */
+/* Numbers of a simulation, of a stop, and further ones of a compliant stop. */
+enum { SCALARS = 25, PER_STOP_STATE = 16, PER_CONTACT_STATE = 13 };
 
 PRBM size_t simulation_state_count(const Simulation *simulation) {
     const Mechanism *m = simulation->configuration.mechanism;
     return SCALARS + PER_STOP_STATE * (size_t)m->stop_count + (size_t)m->friction_count +
-           simulation->state.number_count;
+           PER_CONTACT_STATE * (size_t)m->compliant_count + simulation->state.number_count;
 }
 
 /* --- to numbers ------------------------------------------------------------------------------- */
@@ -33,6 +34,21 @@ static double *put_stop(const State *state, int i, double *to) {
     return to + PER_STOP_STATE;
 }
 
+static double *put_contact(const State *state, int i, double *to) {
+    const Latched *last = &state->latched[i];
+    const Touching *touching = &state->touching[i];
+    const Touch *begun = &state->touches[i];
+    const double contact[PER_CONTACT_STATE] = {
+        last->peak_force, last->indentation,         last->contact_duration,
+        touching->phase,  touching->reference_speed, touching->depth,
+        begun->time,      begun->counted,            begun->impulse,
+        begun->loss,      begun->calm,               begun->calm_since,
+        begun->step,
+    };
+    memcpy(to, contact, sizeof contact);
+    return to + PER_CONTACT_STATE;
+}
+
 PRBM void simulation_save(const Simulation *simulation, double *to) {
     const State *state = &simulation->state;
     const Mechanism *m = simulation->configuration.mechanism;
@@ -49,6 +65,7 @@ PRBM void simulation_save(const Simulation *simulation, double *to) {
     to += SCALARS;
     for (int i = 0; i < m->stop_count; i++) {
         to = put_stop(state, i, to);
+        to = m->stops[i].compliant ? put_contact(state, i, to) : to;
     }
     for (int i = 0; i < m->friction_count; i++) {
         *to++ = state->modes[m->stop_count + i];
@@ -109,6 +126,25 @@ static void get_scalars(State *state, StateReader *reader) {
     state->arc.before.time = get_number(reader);
 }
 
+static void get_contact(State *state, int i, StateReader *reader) {
+    Latched *last = &state->latched[i];
+    Touching *touching = &state->touching[i];
+    Touch *begun = &state->touches[i];
+    last->peak_force = get_number(reader);
+    last->indentation = get_number(reader);
+    last->contact_duration = get_number(reader);
+    touching->phase = (Phase)get_integer(reader, PHASE_NONE, PHASE_SETTLED);
+    touching->reference_speed = get_number(reader);
+    touching->depth = get_number(reader);
+    begun->time = get_number(reader);
+    begun->counted = get_flag(reader);
+    begun->impulse = get_number(reader);
+    begun->loss = get_number(reader);
+    begun->calm = get_flag(reader);
+    begun->calm_since = get_number(reader);
+    begun->step = get_number(reader);
+}
+
 static void get_stop(State *state, int i, StateReader *reader) {
     Latched *last = &state->latched[i];
     Wall *wall = &state->walls[i];
@@ -139,6 +175,9 @@ static bool read_state(Simulation *sim, const double *from) {
     get_scalars(state, &reader);
     for (int i = 0; i < m->stop_count; i++) {
         get_stop(state, i, &reader);
+        if (m->stops[i].compliant) {
+            get_contact(state, i, &reader);
+        }
     }
     for (int i = 0; i < m->friction_count; i++) {
         state->modes[m->stop_count + i] =

@@ -22,6 +22,7 @@ typedef struct {
     double omega; /* of the fundamental mode; 0 without one */
     Scales scales;
     double *least, *share; /* (ny,): errors are relative to max(least, share |y|) */
+    double controlled;     /* number of the states whose error is controlled */
     bool assembled; /* whether the system has been assembled from the acting values */
 } Configuration;
 
@@ -35,14 +36,33 @@ typedef struct {
 typedef struct {
     int count;
     double time, approach_speed, rebound_speed, impulse, energy_lost, modal_restitution;
-    double impulse_sum; /* of all impulses so far, captures included */
+    double impulse_sum; /* of all impulses so far, captures included; not of compliant stops */
+    double peak_force, indentation, contact_duration; /* of compliant stops */
 } Latched;
+
+/* The begin of a contact at a compliant stop. */
+typedef struct {
+    double time;
+    bool counted;         /* whether it is an impact whose outputs are not yet latched */
+    double impulse, loss; /* states of the stop before the contact */
+    bool calm;            /* whether the contact is calm enough to settle */
+    double calm_since;
+    double step;          /* size of the steps before the contact */
+} Touch;
 
 /* A state of the motion through which an interpolation passes. */
 typedef struct {
     double time;
     double *y, *a; /* (2 n,) angles and rates, (n,) accelerations */
 } Node;
+
+/* Indentation and force of a stop, and their rates, at the end of a step of model exchange.  known:
+ * whether there has been one. */
+typedef struct {
+    double known, time, depth, depth_rate, force, force_rate;
+} Dent;
+
+enum { DENT_NUMBERS = sizeof(Dent) / sizeof(double) };
 
 /* The latest step with its dense output. */
 typedef struct {
@@ -85,6 +105,8 @@ typedef struct {
     double longest;       /* recent longest communication step, at most a tenth of the period */
     ContactMode *modes;   /* (s + f,) of the contacts */
     bool *driven;         /* (s,): whether stop.velocity has ever been non-zero */
+    Touching *touching;   /* (s,) contacts at compliant stops */
+    Touch *touches;       /* (s,) */
     Latched *latched;     /* (s,) */
     Wall *walls;          /* (s,) */
     double *numbers;      /* the arrays below, one after another */
@@ -93,6 +115,8 @@ typedef struct {
     double *acting_values, *acting_given; /* parameters and inputs of the last restart */
     double *received;                     /* (3 per force): impulses that have acted */
     double *front, *k1;                   /* (ny,): state at the end of the last step, its rates */
+    double *first;                        /* (c, 3 n): q, v and M phi at first touch */
+    double *dents;                        /* (c, DENT_NUMBERS): the latest samples, see Dent */
     double *fastest;                      /* (n,): shape of the fastest mode */
     double *peaks;                        /* (stressed flexures, PEAK_NUMBERS), see peaks.c */
     double *floors;                       /* (s,): depth below zero at which gaps close */
@@ -140,7 +164,7 @@ typedef struct {
     double *end;           /* (ny,) */
     double *error, *coarse_error; /* (ny,) */
     double weights[GUARD_INTERVALS + 1][STAGES]; /* of the dense output at the samples */
-    double *sample_y;      /* (2 n,) of each sample */
+    double *sample_y;      /* (2 n,) of each sample, or (ny,) with compliant stops */
     Complex *sample_e;     /* (d,) of each sample */
     Located located;
     Node middle;           /* of the latest step */

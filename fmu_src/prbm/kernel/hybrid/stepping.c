@@ -3,6 +3,7 @@
 
 #include "core/vectors.h"
 #include "hybrid/arc.h"
+#include "hybrid/compliant.h"
 #include "hybrid/events.h"
 #include "hybrid/peaks.h"
 #include "hybrid/simulation.h"
@@ -27,7 +28,7 @@ static double error_norm(const Simulation *sim, const double *x, const double *y
         Lanes ratio = lanes_at(x + j) / larger(lanes_at(least + j), lanes_at(share + j) * size);
         sum[SUM_OF(j)] += ratio * ratio;
     }
-    return sqrt(total(sum) / ny);
+    return sqrt(total(sum) / sim->configuration.controlled);
 }
 
 /* --- step sizes ------------------------------------------------------------------------------- */
@@ -45,7 +46,7 @@ static double first_step(const Simulation *sim) {
 }
 
 /* A step size rounded to four binary digits, so that round-off in the errors does not change it. */
-static double rounded_step(double h) {
+PRBM double rounded_step(double h) {
     double shifted = STEP_ROUNDING_FACTOR * h;
     return shifted - (shifted - h);
 }
@@ -104,6 +105,9 @@ static double step_error(Simulation *sim, double h, Problem *problem) {
     double coarse = error_norm(sim, stepping->coarse_error, arc->y, stepping->end);
     double size = sqrt(fine * fine + coarse * coarse);
     double error = size > 0.0 ? fine * fine / size : size;
+    if (sim->equations.pressed_count > 0) {
+        error = greater(error, contact_error(sim, h) / CONTACT_ERROR_FACTOR);
+    }
     return error / (STEP_ERROR_FACTOR * sim->state.tolerance);
 }
 
@@ -181,7 +185,7 @@ static bool find_step(Simulation *sim, double longest, double *h, Problem *probl
     double wanted = state->step_size > 0.0 ? state->step_size : first_step(sim);
     wanted = rounded_step(lesser(wanted, lesser(longest_step(sim), stable_step(sim))));
     StepSizeController controller = {lesser(wanted, longest), state->log_of_error, STEP_GROWTH_MAX};
-    remember_start(state, ny / 2 - 1);
+    remember_start(state, system_of(sim)->n);
     copy(ny, state->front, state->arc.y);
     copy(ny, state->k1, state->arc.k);
     do {
@@ -238,7 +242,8 @@ static bool cut_step(Simulation *sim, const Event *event, Problem *problem) {
     state->step_size = state->arc.h; /* The event does not shorten the next step. */
     state->pending = *event;
     state->has_k1 = false;
-    if (event->kind == EVENT_IMPACT && event->time > state->arc.start) {
+    bool closing = event->kind == EVENT_IMPACT || event->kind == EVENT_SEPARATION;
+    if (closing && event->time > state->arc.start) {
         Located *located = &sim->stepping.located;
         if (located->stop != event->contact) {
             located->h = event->time - state->arc.start;
@@ -262,6 +267,9 @@ PRBM bool take_step(Simulation *sim, Problem *problem) {
     Stepping *stepping = &sim->stepping;
     int ny = state_size(sim);
     double h = 0.0, longest = sim->equations.walls_move ? follow_cubics(sim) : HUGE_VAL;
+    if (sim->equations.pressed_count > 0 && !settle_calm(sim, problem)) {
+        return false;
+    }
     if (!state->has_k1) {
         if (!rate(&sim->equations, state->front_time, state->front, NULL, &stepping->evaluation,
                   state->k1, problem)) {

@@ -5,6 +5,7 @@
 #include "hybrid/state.h"
 
 PRBM double longest_step(const Simulation *sim);
+PRBM double rounded_step(double h);
 PRBM bool take_step(Simulation *sim, Problem *problem);
 /* Compute the latest step again up to a time in it, which becomes the front: with the error of a
  * step, which is below that of the dense output. */

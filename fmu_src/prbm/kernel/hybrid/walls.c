@@ -44,14 +44,14 @@ PRBM double push_wall(Simulation *sim, int i, double P) {
  * following step is longer, so that a jump is not extrapolated beyond its own size.  Before the
  * first step, the velocity of a wall is that of its reference.  A wall whose hit point moves by a
  * change of stop.offset joins its reference anew.  set: whether parameters have been set. */
-PRBM void join_walls(Simulation *sim, double time, bool set, Wall *joined) {
+PRBM void join_walls(Simulation *sim, double time, bool set, const Wall *present, Wall *joined) {
     State *state = &sim->state;
     double now = state->time, last = now - state->point, following = time - now;
     double H = pass_point(sim, time);
     double share = lesser(H / following, 1.0), least = WALL_PATH_RTOL * system_of(sim)->length;
     for (int i = 0; i < system_of(sim)->s; i++) {
         const Stop *stop = &sim->configuration.mechanism->stops[i];
-        Wall wall = state->walls[i], line = given_reference(sim, i);
+        Wall wall = present[i], line = given_reference(sim, i);
         WallMotion here = wall_motion(&wall, now);
         double off = line.position - wall.position - wall.rate * (now - wall.since);
         double moved = off - (set ? field_change(sim, stop->position) : 0.0);
@@ -118,7 +118,7 @@ PRBM double jump_allowed(const Simulation *sim, int i) {
 PRBM bool follow_walls(Simulation *sim, const double *lam, double time, Problem *problem) {
     size_t mark = sim->scratch.used;
     const Equations *q = &sim->equations;
-    int ny = state_size(sim), h = q->first_hold;
+    int ny = state_size(sim), n = system_of(sim)->n, h = q->first_hold;
     double gaps[STOPS_MAX], rates[STOPS_MAX], *y = sim->state.front, t = sim->state.front_time;
     double *P = take(&sim->scratch, (size_t)q->r), *after = take(&sim->scratch, (size_t)ny);
     copy(ny, y, after);
@@ -129,8 +129,8 @@ PRBM bool follow_walls(Simulation *sim, const double *lam, double time, Problem 
         follows = fabs(rates[q->held[k]]) <= jump_allowed(sim, q->held[k]) && P[h + k] >= -pull;
     }
     for (int k = 0; follows && k < q->held_count; k++) {
-        after[ny - 2] -= P[h + k] * rates[q->held[k]] / 2;
-        after[ny - 1] += push_wall(sim, q->held[k], P[h + k]);
+        after[2 * n] -= P[h + k] * rates[q->held[k]] / 2;
+        after[2 * n + 1] += push_wall(sim, q->held[k], P[h + k]);
     }
     copy(follows ? ny : 0, after, y);
     sim->scratch.used = mark;

@@ -6,8 +6,8 @@
 
 /* Set the position and velocity of each wall to those of its reference. */
 PRBM void place_walls(Simulation *sim);
-/* Compute the walls (s,) from the present time on. */
-PRBM void join_walls(Simulation *sim, double time, bool set, Wall *joined);
+/* Compute the walls (s,) from the present time on, from the present ones. */
+PRBM void join_walls(Simulation *sim, double time, bool set, const Wall *present, Wall *joined);
 PRBM bool keep_gaps(Simulation *sim, Wall *joined, Problem *problem);
 PRBM double jump_allowed(const Simulation *sim, int i);
 PRBM void turn_walls(Simulation *sim);

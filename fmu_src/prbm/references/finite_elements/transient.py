@@ -10,7 +10,7 @@ import numpy as np
 
 from ...base.errors import ParameterError, SimulationError
 from ...hybrid.front import Latched
-from ...hybrid.impacts import Impact
+from ...hybrid.records import Impact
 from ...mechanics.arrays import Real
 from ...mechanics.modal import simulated_restitution
 from ...mechanism.parts import value
@@ -64,6 +64,7 @@ class Transient:
 
     def __init__(self, fe: "FiniteElements", step: float, spectral_radius: float) -> None:
         self.fe, self.step, self.radius = fe, step, spectral_radius
+        fe.mechanism.check_rigid("the transient of finite elements")
         stops = fe.mechanism.stops
         self.held: set[int] = set()
         self.armed = [False] * len(stops)  # Whether the gap has opened since the last impact.

@@ -1,0 +1,69 @@
+"""``prbm contact``: contact stiffness of a compliant stop, and force and duration of a hit."""
+
+import argparse
+import math
+
+from ..analysis.contact_hit import first_hit, hertz_stiffness, plate_stiffness
+from ..files.settings import UserMistake, quantity
+
+STRONG_DAMPING = 0.3  # Restitution below which the damping makes the largest force.
+
+
+def contact(options: argparse.Namespace) -> None:
+    """Print the stiffness of a contact and, with mass and speed, its first hit."""
+    stiffness, exponent = _stiffness(options)
+    unit = "N/m" if exponent == 1.0 else f"N/m^{exponent:g}"
+    rows = [("stiffness", f"{stiffness:.6g} {unit}"), ("exponent", f"{exponent:g}")]
+    if (options.mass is None) != (options.speed is None):
+        raise UserMistake("--mass and --speed: give both for a hit")
+    if options.mass is not None:
+        rows += _hit(options, stiffness, exponent)
+    for name, text in rows:
+        print(f"{name:17} {text}")
+
+
+def _stiffness(options: argparse.Namespace) -> tuple[float, float]:
+    """Return the stiffness in SI units, and the exponent."""
+    ways = [name for name in ("radius", "thickness", "stiffness") if getattr(options, name)]
+    if len(ways) != 1:
+        raise UserMistake(
+            "give one of --radius (spheres), --thickness (a pad) and --stiffness (its value)"
+        )
+    if options.stiffness:
+        exponent = quantity(options.exponent, "", "--exponent")
+        unit = "N/m" if exponent == 1.0 else ""
+        return quantity(options.stiffness, unit, "--stiffness"), exponent
+    if not options.youngs_modulus:
+        raise UserMistake("--youngs-modulus is missing: give Young's modulus of the body")
+    modulus = quantity(options.youngs_modulus, "Pa", "--youngs-modulus")
+    if options.thickness:
+        if not options.area:
+            raise UserMistake("--area is missing: give the area of the pad")
+        area = quantity(options.area, "m2", "--area")
+        return plate_stiffness(modulus, area, quantity(options.thickness, "m", "--thickness")), 1.0
+    poisson = quantity(options.poisson, "", "--poisson")
+    other = (
+        quantity(options.wall_modulus, "Pa", "--wall-modulus") if options.wall_modulus else modulus
+    )
+    ratio = (
+        quantity(options.wall_poisson, "", "--wall-poisson") if options.wall_poisson else poisson
+    )
+    radius = quantity(options.radius, "m", "--radius")
+    wall = quantity(options.wall_radius, "m", "--wall-radius") if options.wall_radius else math.inf
+    return hertz_stiffness(radius, wall, modulus, poisson, (other, ratio)), 1.5
+
+
+def _hit(options: argparse.Namespace, stiffness: float, exponent: float) -> list[tuple[str, str]]:
+    """Return the rows of the first hit."""
+    mass = quantity(options.mass, "kg", "--mass")
+    speed = quantity(options.speed, "m/s", "--speed")
+    restitution = quantity(options.restitution, "", "--restitution")
+    hit = first_hit(stiffness, exponent, restitution, mass, speed)
+    rows = [
+        ("peak force", f"{hit.force:.5g} N, {hit.force / hit.elastic_force:.3f} of an elastic hit"),
+        ("indentation", f"{hit.indentation * 1e6:.5g} um"),
+        ("contact duration", f"{hit.duration * 1e6:.5g} us"),
+    ]
+    if restitution < STRONG_DAMPING:
+        rows.append(("note", "the damping makes the peak, at the begin of the contact"))
+    return rows

@@ -1,0 +1,434 @@
+"""Contacts at compliant stops: first touch, phases, settling, separation, and their outputs.
+
+The force is that of :mod:`prbm.mechanics.compliance`.  Its reference speed is the largest closing
+speed of the contact so far.  A contact ends when its gap opens, not when its force vanishes.  A
+contact that has become calm settles: its indentation is then constant, until the force of the
+constraint differs from the elastic force.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..base.errors import SimulationError
+from ..base.tolerances import (
+    DEPENDENT_FRICTION_RTOL,
+    GUARD_INTERVALS,
+    IMPACT_COUNT_MAX,
+    PEAK_REFINEMENT_FACTOR,
+    PEAK_REFINEMENTS,
+    SETTLED_DAMPING_RTOL,
+    SETTLED_FORCE_RTOL,
+    SETTLING_FACTOR,
+    TOUCH_STEP_CURVED_FACTOR,
+    TOUCH_STEP_FACTOR,
+)
+from ..mechanics.arrays import Real
+from ..mechanics.compliant_stops import Extra
+from ..mechanics.contact_state import Phase, Touching
+from ..mechanics.dynamics import Equations
+from ..mechanics.inputs import Wall
+from ..mechanics.kinetics import kinetic_energy
+from ..mechanics.modal import fundamental_at, modal_ratio
+from . import contact_modes
+from .arc import Arc
+from .configuration import Configuration
+from .front import Front, Latched, Touch
+from .records import Impact
+from .stepping import StepSizeController, rounded_step
+
+# --- resets -----------------------------------------------------------------------------------
+
+
+def touch(configuration: Configuration, front: Front, stop: int) -> Front:
+    """Return the front after the first touch of a compliant stop."""
+    _, rates = front.gaps_and_rates()
+    speed = float(-rates[stop])
+    counted = speed >= configuration.stop_value(stop, "rest_speed")
+    front = _touching(configuration, front, stop, speed, counted=counted)
+    if counted:
+        old = front.latched[stop]
+        latched = Latched(
+            impact_count=min(old.impact_count + 1, IMPACT_COUNT_MAX),
+            impact_time=front.time,
+            approach_speed=speed,
+        )
+        front = front.with_latched(stop, latched)
+    return contact_modes.settle(configuration, rephased(front))
+
+
+def preloaded(configuration: Configuration, front: Front, stop: int) -> Front:
+    """Return the front in which a compliant stop that is penetrated at the start is pressed.
+
+    Raises
+    ------
+    SimulationError
+        If the indentation is larger than the mechanism.
+    """
+    gaps, _ = front.gaps_and_rates()
+    check_depth(configuration, stop, float(-gaps[stop]), front.time)
+    return _touching(configuration, front, stop, 0.0, counted=False)
+
+
+def _touching(
+    configuration: Configuration, front: Front, stop: int, speed: float, *, counted: bool
+) -> Front:
+    """Return the front at the begin of a contact with a closing speed [m/s]."""
+    least = max(configuration.stop_value(stop, "rest_speed"), configuration.scales.zero_speed)
+    begun = Touching(Phase.PRESSED, max(speed, least))
+    momentum: tuple[float, ...] = ()
+    if counted:
+        phi, M = fundamental_at(configuration.system, front.q)
+        momentum = tuple((M @ phi).tolist())
+    own, extras = front.equations.compliant, front.extras
+    front = front.with_contacts(front.contacts.with_touching(stop, begun))
+    return front.with_touch(
+        stop,
+        Touch(
+            front.time,
+            counted,
+            float(extras[own.index(stop, Extra.IMPULSE)]),
+            float(extras[own.index(stop, Extra.LOSS)]),
+            tuple(front.q.tolist()),
+            tuple(front.v.tolist()),
+            momentum,
+        ),
+    )
+
+
+def switch(configuration: Configuration, front: Front, stop: int) -> Front:
+    """Return the front after the phase of the contact at a compliant stop has changed."""
+    touching = front.contacts.touching[stop]
+    assert touching is not None
+    if touching.phase is Phase.RISING:
+        _, rates = front.gaps_and_rates()
+        speed = max(touching.reference_speed, float(-rates[stop]))
+        front = front.with_contacts(
+            front.contacts.with_touching(stop, Touching(Phase.PRESSED, speed))
+        )
+    else:
+        front = rephased(front)
+    return contact_modes.settle(configuration, front)
+
+
+def separate(configuration: Configuration, front: Front, stop: int) -> tuple[Front, list[Impact]]:
+    """Return the front after the end of the contact at a compliant stop, and its record."""
+    front, impacts = _finished(configuration, front, stop)
+    front = front.with_contacts(front.contacts.with_touching(stop, None)).with_touch(stop, None)
+    return contact_modes.settle(configuration, front), impacts
+
+
+def rephased(front: Front) -> Front:
+    """Return the front with the phases of all contacts for the present rates.
+
+    The reference speed of a contact is raised to the closing speed at once if that has jumped, by
+    an impulse or by the wall.
+    """
+    _, rates = front.gaps_and_rates()
+    for i in front.contacts.pressed:
+        touching, rate = front.contacts.touching[i], float(-rates[i])
+        assert touching is not None
+        speed, phase = max(touching.reference_speed, rate), Phase.PRESSED
+        begun = Touching(phase, speed)
+        if rate >= touching.reference_speed:
+            rising = front.contacts.with_touching(i, Touching(Phase.RISING, speed))
+            if _acceleration(front.with_contacts(rising), i) > 0.0:
+                begun = Touching(Phase.RISING, speed)
+        elif front.equations.compliant.laws[i].damping_ratio(begun, rate) < 0.0:
+            begun = Touching(Phase.FREE, speed)
+        front = front.with_contacts(front.contacts.with_touching(i, begun))
+    return front
+
+
+def _acceleration(front: Front, stop: int) -> float:
+    """Return the second derivative of the indentation of a stop [m/s^2]."""
+    equations, at = front.equations, front.evaluate()
+    accelerations = equations.gap_accelerations(front.time, front.e, front.v, at.a, at.pressure)
+    return -float(accelerations[stop])
+
+
+def unsettled(front: Front) -> Front:
+    """Return the front in which settled stops are pressed, before impulses act."""
+    contacts = front.contacts
+    for i in contacts.held:
+        contacts = contacts.released(i) if contacts.touching[i] else contacts
+    return front.with_contacts(contacts)
+
+
+# --- settling ---------------------------------------------------------------------------------
+
+
+def settled(
+    configuration: Configuration, front: Front, arc: Arc | None
+) -> tuple[Front, list[Impact]]:
+    """Return the front in which contacts that have been calm for a contact time are settled.
+
+    Its outputs have the maxima up to the end of the step that leads to it.
+    """
+    impacts: list[Impact] = []
+    front = latched_until(configuration, front, arc, front.time)
+    for i in front.contacts.pressed:
+        touch, calm = front.touches[i], _calm(configuration, front, i)
+        assert touch is not None
+        since = (front.time if touch.calm_since is None else touch.calm_since) if calm else None
+        if since != touch.calm_since:
+            front = front.with_touch(i, replace(touch, calm_since=since))
+        if since is not None and front.time - since >= _contact_time(front, i):
+            front, found = _settled(configuration, front, i)
+            impacts += found
+    return front, impacts
+
+
+def _calm(configuration: Configuration, front: Front, stop: int) -> bool:
+    """Return whether the indentation is slow and the damping of a contact is small."""
+    touching = front.contacts.touching[stop]
+    gaps, rates = front.gaps_and_rates()
+    assert touching is not None
+    if touching.phase is Phase.FREE or gaps[stop] >= 0.0:
+        return False
+    rate = float(-rates[stop])
+    damping = abs(front.equations.compliant.laws[stop].damping_ratio(touching, rate) - 1.0)
+    return (
+        abs(rate) < configuration.stop_value(stop, "rest_speed") and damping < SETTLED_DAMPING_RTOL
+    )
+
+
+def _contact_time(front: Front, stop: int) -> float:
+    """Return half the period of small vibrations of a pressed contact [s]."""
+    gaps, _ = front.gaps_and_rates()
+    stiffness = front.equations.compliant.laws[stop].tangent(float(-gaps[stop]))
+    return math.pi / math.sqrt(stiffness * point_mobility(front, stop))
+
+
+def point_mobility(front: Front, stop: int) -> float:
+    """Return the inverse effective mass of a hit point, with that of its wall [1/kg]."""
+    e, M, loops = front.equations.mass_and_loops(front.q)
+    G = front.equations.system.gap_rows.jacobian(e)[[stop]]
+    return contact_modes.mobility(M, loops, G) + front.inputs.mobilities[stop]
+
+
+def _stuck(front: Front, stop: int) -> bool:
+    """Return whether other constraints, such as its own friction, hold a hit point at rest."""
+    e, M, loops = front.equations.mass_and_loops(front.q)
+    G = front.equations.system.gap_rows.jacobian(e)[[stop]]
+    left = contact_modes.mobility(M, front.equations.rows.jacobian(e), G)
+    return left <= DEPENDENT_FRICTION_RTOL * contact_modes.mobility(M, loops, G)
+
+
+def _settled(configuration: Configuration, front: Front, stop: int) -> tuple[Front, list[Impact]]:
+    """Return the front in which a calm contact is settled, if the forces are in balance.
+
+    A contact that is stuck does not move: it stays a force.
+    """
+    touching = front.contacts.touching[stop]
+    assert touching is not None
+    if _stuck(front, stop):
+        return front, []
+    gaps, _ = front.gaps_and_rates()
+    depth = float(-gaps[stop])
+    held = replace(touching, phase=Phase.SETTLED, depth=depth)
+    # The displacement of the wall by the contact becomes part of its motion.
+    folded, walls = fold_gives(front, (stop,))
+    rest = folded.with_walls(walls).with_contacts(front.contacts.with_touching(stop, held))
+    elastic = front.equations.compliant.laws[stop].elastic_force(depth)
+    force = float(rest.equations.stop_forces(rest.evaluate().lam)[stop])
+    if abs(force - elastic) > SETTLING_FACTOR * SETTLED_FORCE_RTOL * elastic:
+        return front, []
+    slow = rest.projected()
+    M = front.equations.mass_and_loops(front.q)[1]
+    loss = kinetic_energy(M, rest.v) - kinetic_energy(M, slow.v)
+    y = slow.y.copy()
+    y[2 * front.equations.n] += loss
+    y[2 * front.equations.n + 2 + front.equations.compliant.index(stop, Extra.LOSS)] += loss
+    slow, impacts = _finished(configuration, replace(slow, y=y), stop)
+    return contact_modes.settle(configuration, slow), impacts
+
+
+def present_walls(front: Front, state: Callable[[], Real]) -> tuple[Wall, ...]:
+    """Return the walls with displacements by forces of compliant stops in their motion.
+
+    Parameters
+    ----------
+    front : Front
+        The front at the present time.
+    state : callable
+        Returns the present state.
+    """
+    stops = front.equations.compliant.stops
+    if not any(front.inputs.mobilities[i] for i in stops):
+        return front.inputs.walls
+    return fold_gives(replace(front, y=state()), stops)[1]
+
+
+def fold_gives(front: Front, stops: Sequence[int]) -> tuple[Front, tuple[Wall, ...]]:
+    """Return the front without displacements of walls by contact forces, and the moved walls."""
+    own, n, y = front.equations.compliant, front.equations.n, front.y.copy()
+    walls = list(front.inputs.walls)
+    for i in stops:
+        at = 2 * n + 2 + own.index(i, Extra.GIVE)
+        rate = 2 * n + 2 + own.index(i, Extra.GIVE_RATE)
+        walls[i] = walls[i].displaced(float(y[at])).pushed(front.time, float(y[rate]))
+        y[at] = y[rate] = 0.0
+    return replace(front, y=y), tuple(walls)
+
+
+# --- outputs ----------------------------------------------------------------------------------
+
+
+def _finished(configuration: Configuration, front: Front, stop: int) -> tuple[Front, list[Impact]]:
+    """Return the front with the outputs of an impact that ends, and its record."""
+    touch, own, old = front.touches[stop], front.equations.compliant, front.latched[stop]
+    assert touch is not None
+    if not touch.counted:
+        return front, []
+    _, rates = front.gaps_and_rates()
+    extras, v = front.extras, front.v
+    latched = replace(
+        old,
+        rebound_speed=float(rates[stop]),
+        impulse=float(extras[own.index(stop, Extra.IMPULSE)]) - touch.impulse,
+        energy_lost=float(extras[own.index(stop, Extra.LOSS)]) - touch.loss,
+        contact_duration=front.time - touch.time,
+        modal_restitution=_modal_restitution(configuration, front, touch),
+    )
+    front = front.with_latched(stop, latched).with_touch(stop, replace(touch, counted=False))
+    name, q, before = configuration.mechanism.stops[stop].name, touch.q, touch.v
+    record = Impact(name, touch.time, np.array(q), np.array(before), v, latched.impulse, latched)
+    return front, [record]
+
+
+def _modal_restitution(configuration: Configuration, front: Front, touch: Touch) -> float:
+    """Return minus the ratio of the velocities of the fundamental mode after and before [-].
+
+    The mode and the mass matrix are those of the shape at first touch before the impact, and those
+    at separation after it.
+    """
+    phi, M = fundamental_at(configuration.system, front.q)
+    first, last = np.array(touch.momentum), M @ phi
+    if first @ phi < 0.0:
+        last = -last
+    return modal_ratio(first, np.array(touch.v), last, front.v)
+
+
+def latched_until(
+    configuration: Configuration, front: Front, arc: Arc | None, time: float
+) -> Front:
+    """Return the front whose outputs have the maxima up to a time of a step.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Mechanism and scales.
+    front : Front
+        The end of the step, with the maxima up to its start.
+    arc : Arc or None
+        The step that leads to the front.
+    time : float
+        A time in the step, or later [s].
+
+    Raises
+    ------
+    SimulationError
+        If an indentation is larger than the mechanism.
+    """
+    end = min(time, front.time)
+    if not front.equations.pressed or arc is None or end <= arc.start:
+        return front
+    latched, equations = list(front.latched), front.equations
+    for i in equations.pressed:
+        depth, force = (
+            _largest(value, arc.start, end)
+            for value in (_along(equations, arc, i, part) for part in (_depth, _force))
+        )
+        check_depth(configuration, i, depth, end)
+        latched[i] = replace(
+            latched[i],
+            peak_force=max(latched[i].peak_force, force),
+            indentation=max(latched[i].indentation, depth),
+        )
+    return replace(front, latched=tuple(latched))
+
+
+def check_depth(configuration: Configuration, stop: int, depth: float, time: float) -> None:
+    """Reject an indentation [m] at a time [s] that is larger than the mechanism.
+
+    Raises
+    ------
+    SimulationError
+        If it is.
+    """
+    if not depth <= configuration.scales.length:
+        raise SimulationError(
+            f"{configuration.mechanism.stops[stop].name} is indented by {depth:.3g} m at t = "
+            f"{time:.9g} s, more than the size of the mechanism: raise its stiffness, or move it"
+        )
+
+
+def _depth(equations: Equations, stop: int, gap: float, rate: float) -> float:
+    return -gap
+
+
+def _force(equations: Equations, stop: int, gap: float, rate: float) -> float:
+    return equations.compliant.force(stop, -gap, -rate)
+
+
+def _along(
+    equations: Equations, arc: Arc, stop: int, part: Callable[[Equations, int, float, float], float]
+) -> Callable[[float], float]:
+    """Return the force or the indentation of a pressed stop as a function of time in a step."""
+
+    def value(t: float) -> float:
+        y, n = arc.at(t), equations.n
+        e, v, extras = equations.system.directions(y[:n]), y[n : 2 * n], y[2 * n + 2 :]
+        gap = float(equations.gaps(t, e, extras)[stop])
+        return part(equations, stop, gap, float(equations.gap_rates(t, e, v, extras)[stop]))
+
+    return value
+
+
+def _largest(value: Callable[[float], float], start: float, end: float) -> float:
+    """Return the largest value between two times, by parabolas through its largest sample."""
+    times = np.linspace(start, end, GUARD_INTERVALS + 1).tolist()
+    samples = [value(t) for t in times]
+    k = int(np.argmax(samples))
+    t = times[min(max(k, 1), GUARD_INTERVALS - 1)]
+    distance, result = times[1] - times[0], float(samples[k])
+    for _ in range(PEAK_REFINEMENTS):
+        before, at, after = (value(min(max(t + s * distance, start), end)) for s in (-1, 0, 1))
+        bend = before - 2.0 * at + after
+        if bend < 0.0:
+            shift = 0.5 * (before - after) / bend
+            t = min(max(t + distance * min(max(shift, -1.0), 1.0), start), end)
+        result = max(result, value(t))
+        distance *= PEAK_REFINEMENT_FACTOR
+    return result
+
+
+# --- steps ------------------------------------------------------------------------------------
+
+
+def shortened(
+    controller: StepSizeController, front: Front, stop: int
+) -> tuple[StepSizeController, Front]:
+    """Return the controller of the first step of a contact, if a stop has been touched.
+
+    This step is a fraction of the depth of a free hit divided by its speed.  The front keeps the
+    step size so far.
+    """
+    touching, touch = front.contacts.touching[stop], front.touches[stop]
+    if touching is None or touch is None:
+        return controller, front
+    law = front.equations.compliant.laws[stop]
+    speed, power = touching.reference_speed, law.exponent + 1.0
+    work = 0.5 * power * speed**2 / (law.stiffness * point_mobility(front, stop))
+    factor = TOUCH_STEP_FACTOR if law.exponent == 1.0 else TOUCH_STEP_CURVED_FACTOR
+    h = rounded_step(factor * math.pow(work, 1.0 / power) / speed)
+    front = front.with_touch(stop, replace(touch, step=controller.h))
+    return replace(controller, h=min(h, controller.h)), front
+
+
+def lengthened(controller: StepSizeController, touch: Touch | None) -> StepSizeController:
+    """Return the controller of the first step after a contact: the contact does not shorten it."""
+    return replace(controller, h=max(controller.h, touch.step)) if touch else controller

@@ -1,0 +1,664 @@
+/* Contacts at compliant stops: first touch, phases, settling, separation, and their outputs: the
+ * twin of hybrid/compliant.py. */
+#include <math.h>
+#include <string.h>
+
+#include "core/matrix.h"
+#include "core/modal.h"
+#include "core/vectors.h"
+#include "hybrid/arc.h"
+#include "hybrid/compliant.h"
+#include "hybrid/configuration.h"
+#include "hybrid/contact_modes.h"
+#include "hybrid/impacts.h"
+#include "hybrid/simulation.h"
+#include "hybrid/stepping.h"
+
+/* --- access ----------------------------------------------------------------------------------- */
+
+static const Stop *stop_of(const Simulation *sim, int stop) {
+    return &sim->configuration.mechanism->stops[stop];
+}
+
+PRBM double *extra_of(const Simulation *sim, double *y, int stop) {
+    return y + 2 * system_of(sim)->n + 2 + stop_of(sim, stop)->extra;
+}
+
+/* Coordinates, rates and M phi at the first touch of a compliant stop, (3 n,). */
+static double *first_state(const Simulation *sim, int stop) {
+    return sim->state.first + 3 * system_of(sim)->n * (stop_of(sim, stop)->extra / EXTRA_STATES);
+}
+
+static double rest_speed_of(const Simulation *sim, int stop) {
+    return field_value(sim, stop_of(sim, stop)->rest_speed);
+}
+
+/* --- phases ----------------------------------------------------------------------------------- */
+
+/* Set the contact of a stop.  A contact that becomes free, or begins, has no friction. */
+static void set_phase(Simulation *sim, int stop, Phase phase, double speed, double depth) {
+    Touching touching = {phase, speed, depth};
+    ContactMode *mode = &sim->state.modes[stop];
+    sim->state.touching[stop] = touching;
+    if (phase == PHASE_NONE) {
+        *mode = CONTACT_OPEN;
+    } else if (phase == PHASE_FREE || *mode == CONTACT_OPEN) {
+        *mode = CONTACT_FRICTIONLESS;
+    }
+    sim->state.has_k1 = false;
+    set_inputs(sim);
+}
+
+/* Compute the second derivative of the indentation of a stop at the front. */
+static bool indentation_acceleration(Simulation *sim, int stop, double *result,
+                                     Problem *problem) {
+    size_t mark = sim->scratch.used;
+    const double *q = sim->state.front, *v = q + system_of(sim)->n;
+    double t = sim->state.front_time;
+    bool ok = evaluate_equations(&sim->equations, t, q, v, extra_states(sim, q), NULL,
+                                 &sim->at_front, problem);
+    *result = ok ? -gap_acceleration(&sim->equations, stop, t, directions_at(sim, q), v,
+                                     &sim->at_front)
+                 : 0.0;
+    sim->scratch.used = mark;
+    return ok;
+}
+
+static bool rephase_one(Simulation *sim, int stop, double rate, Problem *problem) {
+    Touching touching = sim->state.touching[stop];
+    double speed = greater(touching.reference_speed, rate), acceleration = 0.0;
+    set_phase(sim, stop, PHASE_PRESSED, speed, 0.0);
+    if (rate >= touching.reference_speed) {
+        set_phase(sim, stop, PHASE_RISING, speed, 0.0);
+        if (!indentation_acceleration(sim, stop, &acceleration, problem)) {
+            return false;
+        }
+        if (!(acceleration > 0.0)) {
+            set_phase(sim, stop, PHASE_PRESSED, speed, 0.0);
+        }
+    } else if (damping_ratio(&sim->equations.laws[stop], &sim->state.touching[stop], rate) < 0.0) {
+        set_phase(sim, stop, PHASE_FREE, speed, 0.0);
+    }
+    return true;
+}
+
+PRBM bool rephase(Simulation *sim, Problem *problem) {
+    double gaps[STOPS_MAX], rates[STOPS_MAX];
+    bool ok = true;
+    if (sim->equations.pressed_count == 0) {
+        return true;
+    }
+    gaps_and_rates(sim, gaps, rates);
+    for (int i = 0; ok && i < system_of(sim)->s; i++) {
+        if (is_pressed(&sim->state.touching[i])) {
+            ok = rephase_one(sim, i, -rates[i], problem);
+        }
+    }
+    return ok;
+}
+
+PRBM void unsettle(Simulation *sim) {
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        const Touching *touching = &sim->state.touching[i];
+        if (touching->phase == PHASE_SETTLED) {
+            set_phase(sim, i, PHASE_PRESSED, touching->reference_speed, 0.0);
+        }
+    }
+}
+
+PRBM bool press_released(Simulation *sim) {
+    bool any = false;
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        Touching *touching = &sim->state.touching[i];
+        if (touching->phase == PHASE_SETTLED && sim->state.modes[i] == CONTACT_OPEN) {
+            set_phase(sim, i, PHASE_PRESSED, touching->reference_speed, 0.0);
+            any = true;
+        }
+    }
+    return any;
+}
+
+/* --- resets ----------------------------------------------------------------------------------- */
+
+/* Begin a contact with a closing speed. */
+static bool begin_contact(Simulation *sim, int stop, double speed, bool counted,
+                          Problem *problem) {
+    size_t mark = sim->scratch.used;
+    const System *system = system_of(sim);
+    int n = system->n;
+    const double *front = sim->state.front, *extra = extra_of(sim, sim->state.front, stop);
+    double least = greater(rest_speed_of(sim, stop), zero_speed(&sim->configuration));
+    double *first = first_state(sim, stop);
+    Touch begun = {sim->state.front_time, counted, extra[EXTRA_IMPULSE], extra[EXTRA_LOSS], false,
+                   0.0, 0.0};
+    bool ok = true;
+    sim->state.touches[stop] = begun;
+    copy(2 * n, front, first);
+    zeros(n, first + 2 * n);
+    if (counted) {
+        double *phi = take(&sim->scratch, (size_t)n), *M = take_matrix(&sim->scratch, n, n);
+        ok = fundamental_at(system, front, phi, M, &sim->scratch, problem);
+        for (int j = 0; ok && j < n; j++) {
+            first[2 * n + j] = dot(n, M + j * n, phi);
+        }
+    }
+    sim->scratch.used = mark;
+    set_phase(sim, stop, PHASE_PRESSED, greater(speed, least), 0.0);
+    return ok;
+}
+
+static bool check_depth(const Simulation *sim, int stop, double depth, double time,
+                        Problem *problem) {
+    if (!(depth <= sim->configuration.scales.length)) {
+        return fail(problem,
+                    "%s is indented by %.3g m at t = %.9g s, more than the size of the mechanism: "
+                    "raise its stiffness, or move it",
+                    stop_of(sim, stop)->name, depth, time);
+    }
+    return true;
+}
+
+PRBM bool preload(Simulation *sim, Problem *problem) {
+    double gaps[STOPS_MAX], rates[STOPS_MAX];
+    bool ok = true;
+    gaps_and_rates(sim, gaps, rates);
+    for (int i = 0; ok && i < system_of(sim)->s; i++) {
+        if (stop_of(sim, i)->compliant && gaps[i] < 0.0) {
+            ok = check_depth(sim, i, -gaps[i], sim->state.front_time, problem) &&
+                 begin_contact(sim, i, 0.0, false, problem);
+        }
+    }
+    return ok;
+}
+
+/* Shorten the first step of a contact to a fraction of the depth of a free hit over its speed. */
+static bool shorten_step(Simulation *sim, int stop, Problem *problem);
+
+PRBM bool touch(Simulation *sim, int stop, Problem *problem) {
+    double gaps[STOPS_MAX], rates[STOPS_MAX];
+    Latched *latched = &sim->state.latched[stop];
+    gaps_and_rates(sim, gaps, rates);
+    double speed = -rates[stop];
+    bool counted = speed >= rest_speed_of(sim, stop);
+    if (!begin_contact(sim, stop, speed, counted, problem)) {
+        return false;
+    }
+    if (counted) {
+        Latched fresh = {0};
+        fresh.count = latched->count + (latched->count < IMPACT_COUNT_MAX);
+        fresh.time = sim->state.front_time;
+        fresh.approach_speed = speed;
+        *latched = fresh;
+    }
+    return rephase(sim, problem) && settle(sim, NULL, 0, NULL, problem) &&
+           shorten_step(sim, stop, problem);
+}
+
+PRBM bool switch_phase(Simulation *sim, int stop, Problem *problem) {
+    double gaps[STOPS_MAX], rates[STOPS_MAX];
+    Touching touching = sim->state.touching[stop];
+    if (touching.phase == PHASE_RISING) {
+        gaps_and_rates(sim, gaps, rates);
+        set_phase(sim, stop, PHASE_PRESSED, greater(touching.reference_speed, -rates[stop]), 0.0);
+    } else if (!rephase(sim, problem)) {
+        return false;
+    }
+    return settle(sim, NULL, 0, NULL, problem);
+}
+
+/* Compute -(last^T v+) / (first^T v-), with M phi at first touch and now; 0 if first^T v- is
+ * round-off. */
+static bool modal_ratio(Simulation *sim, int stop, double *result, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    const System *system = system_of(sim);
+    int n = system->n;
+    const double *front = sim->state.front, *after = front + n;
+    const double *before = first_state(sim, stop) + n, *first = before + n;
+    double *phi = take(&sim->scratch, (size_t)n), *M = take_matrix(&sim->scratch, n, n);
+    double arriving = dot(n, first, before), leaving = 0.0, size = 0.0;
+    bool ok = fundamental_at(system, front, phi, M, &sim->scratch, problem);
+    for (int j = 0; ok && j < n; j++) {
+        leaving += dot(n, M + j * n, phi) * after[j];
+        size += fabs(first[j]) * (fabs(before[j]) + fabs(after[j]));
+    }
+    leaving = ok && dot(n, first, phi) < 0.0 ? -leaving : leaving;
+    *result = fabs(arriving) <= ZERO_MODE_RTOL * size ? 0.0 : -leaving / arriving;
+    sim->scratch.used = mark;
+    return ok;
+}
+
+/* Latch the outputs of an impact that ends, and report it. */
+static bool end_impact(Simulation *sim, int stop, Problem *problem) {
+    double gaps[STOPS_MAX], rates[STOPS_MAX];
+    int n = system_of(sim)->n;
+    Touch *begun = &sim->state.touches[stop];
+    Latched *latched = &sim->state.latched[stop];
+    const double *extra = extra_of(sim, sim->state.front, stop);
+    const double *first = first_state(sim, stop);
+    if (!begun->counted) {
+        return true;
+    }
+    gaps_and_rates(sim, gaps, rates);
+    latched->rebound_speed = rates[stop];
+    latched->impulse = extra[EXTRA_IMPULSE] - begun->impulse;
+    latched->energy_lost = extra[EXTRA_LOSS] - begun->loss;
+    latched->contact_duration = sim->state.front_time - begun->time;
+    if (!modal_ratio(sim, stop, &latched->modal_restitution, problem)) {
+        return false;
+    }
+    begun->counted = false;
+    report_impact(sim, stop, first, first + n, sim->state.front + n);
+    return true;
+}
+
+/* Return to the step size before a contact that ends: it does not shorten the steps after it. */
+static void resume_step(Simulation *sim, int stop) {
+    sim->state.step_size = greater(sim->state.step_size, sim->state.touches[stop].step);
+}
+
+PRBM bool separate(Simulation *sim, int stop, Problem *problem) {
+    if (!end_impact(sim, stop, problem)) {
+        return false;
+    }
+    resume_step(sim, stop);
+    set_phase(sim, stop, PHASE_NONE, 0.0, 0.0);
+    return settle(sim, NULL, 0, NULL, problem);
+}
+
+/* --- settling --------------------------------------------------------------------------------- */
+
+/* Compute the inverse effective mass of a hit point at the front, with that of its wall. */
+static bool point_mobility(Simulation *sim, int stop, double *result, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    const System *system = system_of(sim);
+    double *G = take(&sim->scratch, (size_t)system->n);
+    Inertia at = inertia_at(sim, sim->state.front);
+    Rows gaps = gap_rows(system);
+    row_jacobian(&gaps, stop, at.e, G);
+    bool ok = mobility(sim, &at, system->r, at.loops, G, result, problem);
+    *result += sim->equations.inputs.mobilities[stop];
+    sim->scratch.used = mark;
+    return ok;
+}
+
+static bool shorten_step(Simulation *sim, int stop, Problem *problem) {
+    const Touching *touching = &sim->state.touching[stop];
+    const ComplianceLaw *law = &sim->equations.laws[stop];
+    double inverse_mass = 0.0, speed = touching->reference_speed, rise = law->exponent + 1.0;
+    if (!is_pressed(touching)) {
+        return true;
+    }
+    if (!point_mobility(sim, stop, &inverse_mass, problem)) {
+        return false;
+    }
+    double work = 0.5 * rise * (speed * speed) / (law->stiffness * inverse_mass);
+    double factor = law->exponent == 1.0 ? TOUCH_STEP_FACTOR : TOUCH_STEP_CURVED_FACTOR;
+    double h = rounded_step(factor * power(work, 1.0 / rise) / speed);
+    sim->state.touches[stop].step = sim->state.step_size;
+    sim->state.step_size = lesser(h, sim->state.step_size);
+    return true;
+}
+
+/* The kinetic energy at the front with the rates v. */
+static double kinetic_energy(Simulation *sim, const double *v) {
+    size_t mark = sim->scratch.used;
+    int n = system_of(sim)->n;
+    Inertia at = inertia_at(sim, sim->state.front);
+    double sum = 0.0;
+    for (int j = 0; j < n; j++) {
+        sum += 0.5 * v[j] * dot(n, at.M + j * n, v);
+    }
+    sim->scratch.used = mark;
+    return sum;
+}
+
+/* Whether the indentation is slow and the damping of a contact is small. */
+static bool is_calm(const Simulation *sim, int stop, double gap_now, double rate) {
+    const Touching *touching = &sim->state.touching[stop];
+    double damping = fabs(damping_ratio(&sim->equations.laws[stop], touching, rate) - 1.0);
+    return touching->phase != PHASE_FREE && gap_now < 0.0 &&
+           fabs(rate) < rest_speed_of(sim, stop) && damping < SETTLED_DAMPING_RTOL;
+}
+
+/* Project the front onto the constraint of a stop that settles, and book the loss. */
+static bool stop_motion(Simulation *sim, int stop, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    int n = system_of(sim)->n;
+    double *front = sim->state.front, *before = take(&sim->scratch, (size_t)n);
+    copy(n, front + n, before);
+    double loss = kinetic_energy(sim, before);
+    bool ok = project(&sim->equations, sim->state.front_time, front, &sim->scratch, problem);
+    loss -= kinetic_energy(sim, front + n);
+    front[2 * n] += loss;
+    extra_of(sim, front, stop)[EXTRA_LOSS] += loss;
+    sim->scratch.used = mark;
+    return ok;
+}
+
+/* Whether other constraints, such as its own friction, hold a hit point at rest. */
+static bool is_stuck(Simulation *sim, int stop, bool *result, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    const Equations *q = &sim->equations;
+    int n = q->system->n;
+    double left = 0.0, own = 0.0, *G = take(&sim->scratch, (size_t)n);
+    double *held = take_matrix(&sim->scratch, q->r, n);
+    Inertia at = inertia_at(sim, sim->state.front);
+    Rows gaps = gap_rows(q->system);
+    row_jacobian(&gaps, stop, at.e, G);
+    jacobian(&q->active, at.e, held);
+    bool ok = mobility(sim, &at, q->r, held, G, &left, problem) &&
+              mobility(sim, &at, q->system->r, at.loops, G, &own, problem);
+    *result = left <= DEPENDENT_FRICTION_RTOL * own;
+    sim->scratch.used = mark;
+    return ok;
+}
+
+PRBM void fold_give(Wall *wall, double t, double *extra) {
+    wall->position += extra[EXTRA_GIVE] - extra[EXTRA_GIVE_RATE] * (t - wall->since);
+    wall->rate += extra[EXTRA_GIVE_RATE];
+    extra[EXTRA_GIVE] = extra[EXTRA_GIVE_RATE] = 0.0;
+}
+
+PRBM void fold_gives(Simulation *sim) {
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        if (stop_of(sim, i)->compliant) {
+            double *extra = extra_of(sim, sim->state.front, i);
+            fold_give(&sim->state.walls[i], sim->state.front_time, extra);
+        }
+    }
+}
+
+/* A contact, its wall and its states before an attempt to settle it. */
+typedef struct {
+    Touching touching;
+    ContactMode mode;
+    Wall wall;
+    double give, give_rate;
+    bool has_k1;
+} Unsettled;
+
+/* Make a pressed stop a constraint. */
+static Unsettled hold_contact(Simulation *sim, int stop, double depth) {
+    State *state = &sim->state;
+    double *extra = extra_of(sim, state->front, stop);
+    Unsettled before = {state->touching[stop], state->modes[stop],     state->walls[stop],
+                        extra[EXTRA_GIVE],     extra[EXTRA_GIVE_RATE], state->has_k1};
+    fold_give(&state->walls[stop], state->front_time, extra);
+    set_phase(sim, stop, PHASE_SETTLED, before.touching.reference_speed, depth);
+    return before;
+}
+
+/* Undo hold_contact. */
+static void press_again(Simulation *sim, int stop, const Unsettled *before) {
+    State *state = &sim->state;
+    double *extra = extra_of(sim, state->front, stop);
+    state->walls[stop] = before->wall;
+    extra[EXTRA_GIVE] = before->give;
+    extra[EXTRA_GIVE_RATE] = before->give_rate;
+    state->modes[stop] = before->mode;
+    set_phase(sim, stop, before->touching.phase, before->touching.reference_speed, 0.0);
+    state->has_k1 = before->has_k1;
+}
+
+/* Make a calm contact a constraint if its force is then close to its elastic force; *held: whether
+ * it is.  A contact that is stuck does not move: it stays a force. */
+static bool hold_if_balanced(Simulation *sim, int stop, double depth, Unsettled *before,
+                             bool *held, Problem *problem) {
+    const double *q = sim->state.front, *v = q + system_of(sim)->n;
+    bool stuck;
+    *held = false;
+    if (!is_stuck(sim, stop, &stuck, problem)) {
+        return false;
+    }
+    if (stuck) {
+        return true;
+    }
+    *before = hold_contact(sim, stop, depth);
+    if (!evaluate_equations(&sim->equations, sim->state.front_time, q, v, extra_states(sim, q),
+                            NULL, &sim->at_front, problem)) {
+        return false;
+    }
+    double elastic = elastic_force(&sim->equations.laws[stop], depth);
+    double force = stop_force(&sim->equations, sim->at_front.lam, stop);
+    *held = fabs(force - elastic) <= SETTLING_FACTOR * SETTLED_FORCE_RTOL * elastic;
+    if (!*held) {
+        press_again(sim, stop, before);
+    }
+    return true;
+}
+
+/* Record since when a contact is calm; *due: whether it has been calm for a contact time. */
+static bool watch_contact(Simulation *sim, int stop, double gap_now, double rate, bool *due,
+                          Problem *problem) {
+    Touch *begun = &sim->state.touches[stop];
+    double inverse_mass;
+    *due = false;
+    if (!is_pressed(&sim->state.touching[stop])) {
+        return true;
+    }
+    if (!is_calm(sim, stop, gap_now, rate)) {
+        begun->calm = false;
+        begun->calm_since = 0.0;
+        return true;
+    }
+    begun->calm_since = begun->calm ? begun->calm_since : sim->state.front_time;
+    begun->calm = true;
+    if (!point_mobility(sim, stop, &inverse_mass, problem)) {
+        return false;
+    }
+    double stiffness = contact_tangent(&sim->equations.laws[stop], -gap_now);
+    double time = 0.5 * TWO_PI / sqrt(stiffness * inverse_mass);
+    *due = sim->state.front_time - begun->calm_since >= time;
+    return true;
+}
+
+PRBM bool settle_calm(Simulation *sim, Problem *problem) {
+    double gaps[STOPS_MAX], rates[STOPS_MAX];
+    if (!latch_peaks(sim, sim->state.front_time, problem)) {
+        return false;
+    }
+    gaps_and_rates(sim, gaps, rates);
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        Unsettled before;
+        bool due, held = false;
+        if (!watch_contact(sim, i, gaps[i], -rates[i], &due, problem) ||
+            (due && !hold_if_balanced(sim, i, -gaps[i], &before, &held, problem))) {
+            return false;
+        }
+        sim->state.arc.valid = sim->state.arc.valid && !held;
+        if (held && !(stop_motion(sim, i, problem) && end_impact(sim, i, problem) &&
+                      settle(sim, NULL, 0, NULL, problem))) {
+            return false;
+        }
+        if (held) {
+            resume_step(sim, i);
+        }
+    }
+    return true;
+}
+
+PRBM bool settles_here(Simulation *sim, bool *result, Problem *problem) {
+    double gaps[STOPS_MAX], rates[STOPS_MAX];
+    gaps_and_rates(sim, gaps, rates);
+    *result = false;
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        Unsettled before;
+        bool due, held = false;
+        if (!watch_contact(sim, i, gaps[i], -rates[i], &due, problem) ||
+            (due && !hold_if_balanced(sim, i, -gaps[i], &before, &held, problem))) {
+            return false;
+        }
+        if (held) {
+            press_again(sim, i, &before);
+            *result = true;
+        }
+    }
+    return true;
+}
+
+/* --- maxima ----------------------------------------------------------------------------------- */
+
+/* Compute the indentation of a stop at a time of the latest step, or its force. */
+static double contact_at(Simulation *sim, int stop, double t, bool force) {
+    Located *located = &sim->stepping.located;
+    const System *system = system_of(sim);
+    const Equations *equations = &sim->equations;
+    arc_at(sim, t, located->y);
+    directions(system, located->y, located->e);
+    const double *extra = extra_states(sim, located->y);
+    double depth = -gap(equations, stop, t, located->e, extra);
+    if (!force) {
+        return depth;
+    }
+    double rate = -gap_rate(equations, stop, t, located->e, located->y + system->n, extra);
+    return contact_force(&equations->laws[stop], &equations->contacts.touching[stop], depth, rate);
+}
+
+static double clipped(double x, double low, double high) {
+    return lesser(greater(x, low), high);
+}
+
+/* Return the largest value between two times, by parabolas through its largest sample. */
+static double largest_value(Simulation *sim, int stop, bool force, double start, double end) {
+    double distance = (end - start) / (double)GUARD_INTERVALS, result = -HUGE_VAL;
+    int top = 0;
+    for (int k = 0; k <= GUARD_INTERVALS; k++) {
+        double x = contact_at(sim, stop, start + distance * k, force);
+        top = x > result ? k : top;
+        result = greater(x, result);
+    }
+    top = top < 1 ? 1 : top < GUARD_INTERVALS ? top : GUARD_INTERVALS - 1;
+    double t = start + distance * top;
+    for (int k = 0; k < PEAK_REFINEMENTS; k++) {
+        double before = contact_at(sim, stop, clipped(t - distance, start, end), force);
+        double at = contact_at(sim, stop, clipped(t, start, end), force);
+        double after = contact_at(sim, stop, clipped(t + distance, start, end), force);
+        double bend = before - 2.0 * at + after;
+        if (bend < 0.0) {
+            double shift = clipped(0.5 * (before - after) / bend, -1.0, 1.0);
+            t = clipped(t + distance * shift, start, end);
+        }
+        result = greater(result, contact_at(sim, stop, t, force));
+        distance *= PEAK_REFINEMENT_FACTOR;
+    }
+    return result;
+}
+
+PRBM void peaks_until(Simulation *sim, int stop, double time, double *depth, double *force) {
+    const Arc *arc = &sim->state.arc;
+    const Latched *latched = &sim->state.latched[stop];
+    double end = lesser(time, sim->state.front_time);
+    *depth = latched->indentation;
+    *force = latched->peak_force;
+    if (is_pressed(&sim->state.touching[stop]) && arc->valid && end > arc->start) {
+        *depth = greater(*depth, largest_value(sim, stop, false, arc->start, end));
+        *force = greater(*force, largest_value(sim, stop, true, arc->start, end));
+    }
+}
+
+static Dent dent_now(Simulation *sim, int stop, double gap_now, double rate,
+                     const Evaluation *at) {
+    size_t mark = sim->scratch.used;
+    const Equations *q = &sim->equations;
+    const ComplianceLaw *law = &q->laws[stop];
+    const Touching *touching = &q->contacts.touching[stop];
+    const double *front = sim->state.front;
+    double t = sim->state.front_time;
+    Dent dent = {1.0, t, -gap_now, rate, at->pressure[stop], 0.0};
+    if (touching->phase != PHASE_FREE) {
+        double bend = -gap_acceleration(q, stop, t, directions_at(sim, front),
+                                        front + system_of(sim)->n, at);
+        dent.force_rate = contact_stiffness(law, dent.depth) * rate *
+                              damping_ratio(law, touching, rate) +
+                          elastic_force(law, dent.depth) * damping_slope(law, touching) * bend;
+    }
+    sim->scratch.used = mark;
+    return dent;
+}
+
+/* Return the largest value of a cubic from (0, a) to (h, b) with the rates u and w there. */
+static double largest_of_cubic(double h, double a, double u, double b, double w) {
+    double c3 = 2.0 * (a - b) / h + u + w, c2 = 3.0 * (b - a) / h - 2.0 * u - w;
+    double best = greater(a, b), root = c2 * c2 - 3.0 * c3 * u;
+    if (root > 0.0) { /* s = t/h at the maximum: 3 c3 s^2 + 2 c2 s + u = 0. */
+        double s = u / (sqrt(root) - c2);
+        double value = a + h * s * (u + s * (c2 + s * c3));
+        best = s > 0.0 && s < 1.0 ? greater(best, value) : best;
+    }
+    return best;
+}
+
+PRBM bool latch_present(Simulation *sim, const Evaluation *at, bool smooth, Problem *problem) {
+    double gaps[STOPS_MAX], rates[STOPS_MAX];
+    bool ok = true;
+    gaps_and_rates(sim, gaps, rates);
+    for (int k = 0; ok && k < sim->equations.pressed_count; k++) {
+        int i = sim->equations.pressed[k];
+        Latched *latched = &sim->state.latched[i];
+        double *stored = sim->state.dents + DENT_NUMBERS * (stop_of(sim, i)->extra / EXTRA_STATES);
+        Dent last, now = dent_now(sim, i, gaps[i], -rates[i], at);
+        memcpy(&last, stored, sizeof last);
+        double h = now.time - last.time;
+        if (smooth && last.known > 0.0 && h > 0.0) {
+            double depth = largest_of_cubic(h, last.depth, last.depth_rate, now.depth, -rates[i]);
+            double force =
+                largest_of_cubic(h, last.force, last.force_rate, now.force, now.force_rate);
+            latched->indentation = greater(latched->indentation, depth);
+            latched->peak_force = greater(latched->peak_force, force);
+        }
+        latched->indentation = greater(latched->indentation, now.depth);
+        latched->peak_force = greater(latched->peak_force, now.force);
+        memcpy(stored, &now, sizeof now);
+        ok = check_depth(sim, i, now.depth, now.time, problem);
+    }
+    return ok;
+}
+
+PRBM bool latch_peaks(Simulation *sim, double time, Problem *problem) {
+    bool ok = true;
+    for (int k = 0; ok && k < sim->equations.pressed_count; k++) {
+        int i = sim->equations.pressed[k];
+        double depth, force;
+        peaks_until(sim, i, time, &depth, &force);
+        sim->state.latched[i].indentation = depth;
+        sim->state.latched[i].peak_force = force;
+        ok = check_depth(sim, i, depth, time, problem);
+    }
+    return ok;
+}
+
+/* --- errors of steps -------------------------------------------------------------------------- */
+
+PRBM double contact_error(Simulation *sim, double h) {
+    size_t mark = sim->scratch.used;
+    const System *system = system_of(sim);
+    const Stepping *stepping = &sim->stepping;
+    const double *y = sim->state.arc.y, *y1 = stepping->end;
+    int n = system->n;
+    double worst = 0.0, *row = take(&sim->scratch, (size_t)n);
+    double *change = take(&sim->scratch, (size_t)n);
+    Complex *e = directions_at(sim, y);
+    Rows gaps = gap_rows(system);
+    for (int j = 0; j < n; j++) {
+        change[j] = y1[j] - y[j];
+    }
+    for (int k = 0; k < sim->equations.pressed_count; k++) {
+        int i = sim->equations.pressed[k];
+        double speed = sim->equations.contacts.touching[i].reference_speed;
+        row_jacobian(&gaps, i, e, row);
+        double depth = greater(greater(fabs(dot(n, row, change)), speed * h),
+                               INDENTATION_MIN_RTOL * system->length);
+        double squares[2];
+        int give = 2 * n + 2 + stop_of(sim, i)->extra + EXTRA_GIVE;
+        for (int part = 0; part < 2; part++) {
+            const double *error = part == 0 ? stepping->error : stepping->coarse_error;
+            double d = (dot(n, row, error) + error[give]) / depth;
+            double rate = (dot(n, row, error + n) + error[give + 1]) / speed;
+            squares[part] = d * d + rate * rate;
+        }
+        double size = sqrt(squares[0] + squares[1]);
+        worst = greater(worst, size > 0.0 ? squares[0] / size : size);
+    }
+    sim->scratch.used = mark;
+    return worst;
+}

@@ -1,0 +1,131 @@
+/* Directional derivatives of the contacts at compliant stops. */
+#include "core/vectors.h"
+#include "hybrid/simulation.h"
+#include "tangent_contact.h"
+
+/* The indentation of a stop, its rate, and their changes. */
+typedef struct {
+    double d, rate, dd, drate;
+} Indentation;
+
+static Indentation indentation_at(const Tangent *t, int stop) {
+    const Instant *at = t->at;
+    Indentation result = {-gap(t->q, stop, at->time, t->e, at->extra),
+                 -gap_rate(t->q, stop, at->time, t->e, t->v, at->extra), -gap_change(t, stop),
+                 -gap_rate_change(t, stop)};
+    return result;
+}
+
+static const Touching *touching_at(const Tangent *t, int stop) {
+    return &t->q->contacts.touching[stop];
+}
+
+static double pressure_change(const Tangent *t, int stop) {
+    const ComplianceLaw *law = &t->q->laws[stop];
+    const Touching *touching = touching_at(t, stop);
+    Indentation x = indentation_at(t, stop);
+    if (touching->phase == PHASE_FREE) {
+        return 0.0;
+    }
+    return contact_stiffness(law, x.d) * damping_ratio(law, touching, x.rate) * x.dd +
+           elastic_force(law, x.d) * damping_slope(law, touching) * x.drate;
+}
+
+PRBM void pressure_changes(const Tangent *t) {
+    const Equations *q = t->q;
+    Scratch *scratch = &t->sim->scratch;
+    size_t mark = scratch->used;
+    double *row = take(scratch, (size_t)q->system->n);
+    Rows gaps = gap_rows(q->system);
+    for (int k = 0; k < q->pressed_count; k++) {
+        int i = q->pressed[k];
+        t->dpressure[i] = pressure_change(t, i);
+        row_jacobian(&gaps, i, t->e, row);
+        add_scaled(q->system->n, t->dpressure[i], row, t->dx);
+        add_pull(t, &gaps, i, t->evaluation->pressure[i]);
+    }
+    scratch->used = mark;
+}
+
+PRBM double stop_force_change(const Tangent *t, int stop) {
+    if (is_pressed(touching_at(t, stop))) {
+        return t->dpressure[stop];
+    }
+    return is_held(&t->q->contacts, stop) ? stop_force(t->q, t->dlam, stop) : 0.0;
+}
+
+PRBM double contact_loss_change(const Tangent *t, int stop) {
+    const ComplianceLaw *law = &t->q->laws[stop];
+    Indentation x = indentation_at(t, stop);
+    double damping = t->evaluation->pressure[stop] - elastic_force(law, x.d);
+    return (t->dpressure[stop] - contact_stiffness(law, x.d) * x.dd) * x.rate + damping * x.drate;
+}
+
+PRBM double contact_energy_change(const Tangent *t) {
+    double sum = 0.0;
+    for (int i = 0; i < t->q->system->s; i++) {
+        if (touching_at(t, i)->phase != PHASE_NONE) {
+            Indentation x = indentation_at(t, i);
+            sum += elastic_force(&t->q->laws[i], x.d) * x.dd;
+        }
+    }
+    return sum;
+}
+
+PRBM void contact_changes(const Tangent *t, const double *dx, double *out) {
+    const Mechanism *m = t->q->system->mechanism;
+    int first = 2 * m->independent_count + 2;
+    double *rates = out + m->slots.derivatives + m->independent_count + 2;
+    for (int i = 0; i < m->stop_count; i++) {
+        if (m->stops[i].compliant) {
+            int k = EXCHANGED_STATES * (m->stops[i].extra / EXTRA_STATES);
+            bool pressed = is_pressed(touching_at(t, i));
+            out[exchange_slot(t->sim, first + k)] = dx[first + k];
+            out[exchange_slot(t->sim, first + k + 1)] = dx[first + k + 1];
+            rates[k] = stop_force_change(t, i);
+            rates[k + 1] = pressed ? contact_loss_change(t, i) : 0.0;
+        }
+    }
+    for (int k = 0; k < t->q->pressed_count; k++) {
+        int i = t->q->pressed[k];
+        out[m->slots.stops + PER_STOP * i + STOP_FORCE] = t->dpressure[i];
+    }
+}
+
+PRBM double separation_indicator_change(const Tangent *t, int stop) {
+    const Scales *scales = &t->sim->configuration.scales;
+    Indentation x = indentation_at(t, stop);
+    double ahead = x.rate > 0.0 ? INDICATOR_LEAD_RTOL * scales->time * x.drate : 0.0;
+    return (x.dd + ahead) / scales->length;
+}
+
+/* Change of the second derivative of the indentation. */
+static double bend_change_of(const Tangent *t, int stop) {
+    const System *system = t->q->system;
+    Scratch *scratch = &t->sim->scratch;
+    size_t mark = scratch->used;
+    double *row = take(scratch, (size_t)system->n);
+    Rows gaps = gap_rows(system);
+    row_jacobian(&gaps, stop, t->e, row);
+    double change = dot(system->n, row, t->dx) + second_change(t, &gaps, stop) +
+                    t->q->inputs.mobilities[stop] * t->dpressure[stop];
+    scratch->used = mark;
+    return -change;
+}
+
+PRBM double switch_indicator_change(const Tangent *t, int stop) {
+    const Scales *scales = &t->sim->configuration.scales;
+    const ComplianceLaw *law = &t->q->laws[stop];
+    const Touching *touching = touching_at(t, stop);
+    Indentation x = indentation_at(t, stop);
+    double slope = damping_slope(law, touching), ratio = damping_ratio(law, touching, x.rate);
+    switch (touching->phase) {
+    case PHASE_RISING:
+        return bend_change_of(t, stop) / (scales->length * (scales->rate * scales->rate));
+    case PHASE_FREE: return -slope * x.drate;
+    default:
+        return ratio < 1.0 - x.rate / touching->reference_speed
+                   ? slope * x.drate
+                   : -x.drate / touching->reference_speed;
+    }
+}

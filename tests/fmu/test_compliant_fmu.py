@@ -1,0 +1,128 @@
+"""FMUs of a mechanism with a compliant stop: Python FMUs equal the engine."""
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy import read_model_description, simulate_fmu
+from fmpy.validation import validate_fmu
+
+from point_mass import point_mass
+from prbm.fmu import native_fmu, python_fmu
+from prbm.hybrid.simulation import Simulation
+
+END, STEP = 2e-3, 5e-5
+OUTPUTS = (
+    "mass.x", "stop.force", "stop.contact", "stop.impact_count", "stop.peak_force",
+    "stop.indentation", "stop.contact_duration", "stop.impulse_sum", "energy.elastic",
+)  # fmt: skip
+
+
+def mass():
+    return point_mass(stiffness=1e5, restitution=0.5)
+
+
+@pytest.fixture(scope="module", params=["python", "fmi2", "fmi3"])
+def path(request, tmp_path_factory):
+    path = tmp_path_factory.mktemp("compliant") / "PointMass.fmu"
+    if request.param == "python":
+        path.write_bytes(python_fmu.build(mass(), {}))
+    else:
+        path.write_bytes(native_fmu.build(mass(), {}, int(request.param[-1])))
+    return str(path)
+
+
+@pytest.mark.fmu
+@pytest.mark.native
+@pytest.mark.parametrize("events", [False, True])
+def test_fmus_with_a_compliant_stop_simulate_like_the_engine(path, events):
+    """With event mode (FMI 3.0), steps end at first touch and at separation."""
+    description = read_model_description(path)
+    if events and description.fmiVersion != "3.0":
+        pytest.skip("FMI 3.0 only")
+    assert not validate_fmu(path)
+    python = description.coSimulation.needsExecutionTool
+    assert (description.modelExchange is None) == bool(python)
+    found = simulate_fmu(
+        path, stop_time=END, output_interval=STEP, output=list(OUTPUTS),
+        use_event_mode=events, early_return_allowed=events,
+    )  # fmt: skip
+    steps = np.asarray(found["time"]) / STEP
+    rows = {round(x): k for k, x in enumerate(steps) if abs(x - round(x)) < 1e-6}
+    sim = Simulation(mass())
+    for k in range(round(END / STEP) + 1):
+        sim.advance(k * STEP)
+        out = sim.outputs()
+        row = [float(found[name][rows[k]]) for name in OUTPUTS]
+        np.testing.assert_allclose(row, [out[name] for name in OUTPUTS], rtol=1e-6, atol=1e-9)
+    assert out["stop.impact_count"] == 1
+    assert out["stop.contact_duration"] > 0.0
+    if events:
+        first = out["stop.impact_time"]
+        for t in (first, first + out["stop.contact_duration"]):
+            assert np.abs(np.asarray(found["time"]) - t).min() < 1e-12
+
+
+@pytest.mark.fmu
+@pytest.mark.native
+def test_parameters_and_outputs_of_a_compliant_stop_have_their_units(path):
+    found = {v.name: v for v in read_model_description(path).modelVariables}
+    units = {name: found[f"stop.{name}"].unit for name in (
+        "stiffness", "restitution", "force", "peak_force", "indentation", "contact_duration"
+    )}  # fmt: skip
+    assert list(units.values()) == ["N/m", "1", "N", "N", "m", "s"]
+    assert found["stop.stiffness"].variability == "fixed"
+    assert found["stop.restitution"].min == "0.01"
+    assert found["stop.contact_duration"].variability == "discrete"
+
+
+@pytest.mark.fmu
+@pytest.mark.native
+def test_a_state_saved_in_contact_restores_in_an_fmu(path, tmp_path):
+    description = read_model_description(path)
+    if description.fmiVersion == "3.0":
+        pytest.skip("the functions of FMI 2.0")
+    folder = fmpy.extract(path, unzipdir=str(tmp_path))
+    fmu = fmpy.instantiate_fmu(folder, description)
+    fmu.setupExperiment(startTime=0.0)
+    fmu.enterInitializationMode()
+    fmu.exitInitializationMode()
+    references = [v.valueReference for v in description.modelVariables if v.name in (
+        "mass.x", "stop.force", "stop.peak_force", "stop.impulse_sum"
+    )]  # fmt: skip
+    fmu.doStep(0.0, 1.1e-3)
+    state, ends = fmu.getFMUState(), []
+    for _ in range(2):
+        fmu.doStep(1.1e-3, 1e-3)
+        ends.append(fmu.getReal(references))
+        fmu.setFMUState(state)
+    assert ends[0] == ends[1]
+    fmu.terminate()
+    fmu.freeInstance()
+
+
+@pytest.mark.fmu
+@pytest.mark.native
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("version", [2, 3])
+def test_model_exchange_with_a_compliant_stop_is_the_motion_of_the_engine(
+    version, friction, tmp_path
+):
+    own = point_mass(stiffness=1e5, restitution=0.5, friction=friction, direction=25.0)
+    path = tmp_path / "PointMass.fmu"
+    path.write_bytes(native_fmu.build(own, {}, version))
+    found = simulate_fmu(
+        str(path), fmi_type="ModelExchange", solver="CVode", stop_time=END, output_interval=STEP,
+        relative_tolerance=1e-8, output=list(OUTPUTS), record_events=False,
+    )  # fmt: skip
+    sim = Simulation(own)
+    for row in found:
+        sim.advance(float(row["time"]))
+        expected = sim.outputs()
+        for name in OUTPUTS:
+            rough = name in ("stop.peak_force", "stop.indentation")
+            size = max(abs(float(expected[name])), 1e-2 * float(abs(found[name]).max()), 1e-9)
+            assert abs(float(row[name]) - expected[name]) < (2e-2 if rough else 1e-4) * size, (
+                row,
+                name,
+            )
+    assert expected["stop.impact_count"] == 1
