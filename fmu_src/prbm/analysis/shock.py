@@ -110,12 +110,19 @@ class Pulse:
 
 @dataclass(frozen=True)
 class Hits:
-    """Impacts at a stop: their number, the largest closing speed [m/s] and impulse [N s]."""
+    """Impacts at a stop: their number, the largest closing speed [m/s] and impulse [N s].
+
+    For a compliant stop also the largest contact force [N], indentation [m] and duration of a
+    contact [s]; None for a rigid stop.
+    """
 
     stop: str
     count: int
     speed: float
     impulse: float
+    force: float | None = None
+    indentation: float | None = None
+    duration: float | None = None
 
 
 @dataclass(frozen=True)
@@ -229,9 +236,21 @@ def displacement(result: Result) -> Real:
 def _hits(result: Result, stop: str) -> Hits:
     """Return the impacts at a stop."""
     own = [impact.latched for impact in result.impacts if impact.stop == stop]
-    return Hits(
+    found = Hits(
         stop, len(own), max((x.approach_speed for x in own), default=0.0),
         max((x.impulse for x in own), default=0.0),
+    )  # fmt: skip
+    if not next(s for s in result.mechanism.stops if s.name == stop).compliant:
+        return found
+
+    def largest(output: str) -> float:
+        # The columns contain contacts that are not counted, and the one at the end of the run.
+        sampled = float(np.max(result.columns[f"{stop}.{output}"]))
+        return max(sampled, *(float(getattr(x, output)) for x in own), 0.0)
+
+    return replace(
+        found, force=largest("peak_force"), indentation=largest("indentation"),
+        duration=largest("contact_duration"),
     )  # fmt: skip
 
 

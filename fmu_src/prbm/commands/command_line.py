@@ -47,7 +47,7 @@ from .program import FAILED, INTERRUPTED, MISTAKE, OK
 from .remedies import in_options
 
 NEGATIVE = re.compile(r"-\.?\d")
-METHODS = ("algebraic", "simulated", "fitted", "elements", "closed-form")
+METHODS = ("algebraic", "simulated", "fitted", "elements", "closed-form", "compliant")
 
 
 def parser() -> argparse.ArgumentParser:
@@ -335,9 +335,16 @@ def _impact_map(commands: Commands) -> None:
         "--method", nargs="+", default=["algebraic"], metavar="METHOD", choices=METHODS,
         help="algebraic: the arriving motion is the fundamental mode alone; simulated: first "
         "impact after the release; fitted: restitution of a 1R model with the same motion (takes "
-        "minutes); elements: finite elements; closed-form: formula for a single body that moves "
+        "minutes); compliant: the fundamental mode arrives at a compliant stop; elements: finite "
+        "elements; closed-form: formula for a single body that moves "
         "along a path without turning (default: algebraic)",
     )  # fmt: skip
+    add(
+        "--stiffness", nargs="+", metavar="K",
+        help="contact stiffnesses of the method compliant [N/m]; one map each (default: that of "
+        "the stop)",
+    )  # fmt: skip
+    add("--speed", metavar="V", help="closing speed, for an exponent other than 1 [m/s]")
     add("--heights", nargs="+", dest="wall_positions", help=argparse.SUPPRESS)  # former name
     add("--way", nargs="+", dest="method", choices=METHODS, help=argparse.SUPPRESS)  # former name
     add(

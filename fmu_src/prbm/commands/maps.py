@@ -11,7 +11,7 @@ from ..analysis.impact_map import ImpactMap
 from ..analysis.touching import lever, stop_index
 from ..base.progress import Progress, reporter
 from ..files.mechanism_file import load
-from ..files.settings import UserMistake, quantities, settings
+from ..files.settings import UserMistake, quantities, quantity, settings
 from ..mechanics.assembly import assemble
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import value
@@ -34,6 +34,7 @@ METHODS: Mapping[str, Method] = {
     "algebraic": impact_map.algebraic,
     "simulated": impact_map.simulated,
     "fitted": impact_map.fitted,
+    "compliant": impact_map.compliant,
     "closed-form": impact_map.closed_form,
     "elements": impact_map.by_elements,
 }
@@ -123,16 +124,37 @@ def _jobs(
     offsets: Sequence[float],
 ) -> Iterator[Job]:
     """Yield a function for each map, which computes it."""
+    if "compliant" not in options.method and (options.stiffness or options.speed):
+        raise UserMistake("--stiffness and --speed need --method compliant")
     models = dict(_models(options, mechanism))
     for name in dict.fromkeys(options.method):
         for label, model in models.items():
             method = partial(METHODS[name], model, positions, offsets, values, stop=options.stop)
+            if name == "compliant":
+                yield from _compliant(options, mechanism, method, label)
+                continue
             if name == "elements":
                 yield partial(_compute, method, "finite elements", elements=options.elements)
                 break  # Finite elements do not depend on the flexure model.
             if name in SIMULATED_METHODS:
                 method = partial(method, engine=options.engine)
             yield partial(_compute, method, f"{label}, {name}")
+
+
+def _compliant(
+    options: argparse.Namespace, mechanism: Mechanism, method: Method, label: str
+) -> Iterator[Job]:
+    """Yield a function for the map of each contact stiffness."""
+    stop = mechanism.stops[stop_index(mechanism, options.stop)]
+    speed = quantity(options.speed, "m/s", "--speed") if options.speed else None
+    if not options.stiffness:
+        yield partial(_compute, method, f"{label}, compliant", speed=speed)
+        return
+    linear = stop.exponent in (None, 1.0)
+    unit = "N/m" if linear else ""
+    for k in quantities(options.stiffness, unit, "--stiffness"):
+        name = f"{label}, {k:.4g} N/m" + ("" if linear else f"^{stop.exponent}")
+        yield partial(_compute, method, name, stiffness=k, speed=speed)
 
 
 def _compute(method: Method, label: str, progress: Progress, **more: object) -> ImpactMap:

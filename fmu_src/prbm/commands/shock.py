@@ -98,6 +98,11 @@ def _print(found: Shock, mechanism: Mechanism, about: str) -> None:
     for hits in found.hits:
         how = f", at most {hits.speed:.4g} m/s and {hits.impulse:.4g} N s" if hits.count else ""
         print(f"impacts at {hits.stop:9} {hits.count}{how}")
+        if hits.force is not None and hits.indentation is not None and hits.duration is not None:
+            print(
+                f"force at {hits.stop:11} at most {hits.force:.4g} N, indentation "
+                f"{length(hits.indentation, size)}, contact {instant(hits.duration, end, 4)}"
+            )
     for one in found.loadings:
         safety = "" if one.safety is None else f", safety factor {one.safety:.3g} (yield)"
         damage = "" if one.damage is None else f", damage {one.damage:.3g}"

@@ -84,15 +84,23 @@ def _draw_displacement(axes: Axes, found: Shock, time: Real) -> None:
 
 
 def _draw_forces(axes: Axes, found: Shock, time: Real) -> None:
-    """Draw the forces of the stops."""
+    """Draw the forces of the stops; marks are the peaks of hits on compliant stops."""
     forces = {
         stop.name: np.asarray(found.result.columns[f"{stop.name}.force"], float)
         for stop in found.result.mechanism.stops
     }
     largest = max(float(np.abs(force).max()) for force in forces.values())
+    largest = max(largest, *(hits.force or 0.0 for hits in found.hits), 0.0)
+    seconds = float(found.result.columns["time"][-1])
     factor, shown = prefixed_unit(largest or 1.0, "N")
-    for name, force in forces.items():
-        axes.plot(time, factor * force, label=name)
+    for stop in found.result.mechanism.stops:
+        (line,) = axes.plot(time, factor * forces[stop.name], label=stop.name)
+        if stop.compliant:  # A contact can be shorter than a step of the table.
+            own = [x for x in found.result.impacts if x.stop == stop.name]
+            axes.plot(
+                [float(time[-1] / seconds) * x.time for x in own],
+                [factor * x.latched.peak_force for x in own], "v", ms=4, color=line.get_color(),
+            )  # fmt: skip
     axes.set_ylabel(f"stop force [{shown}]")
     axes.legend(fontsize=8)
 

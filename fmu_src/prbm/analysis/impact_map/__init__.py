@@ -1,6 +1,7 @@
 """Impact maps: the modal restitution over positions of the wall and offsets of the hit."""
 
 from ..flexure_models import with_flexures
+from .compliant import compliant
 from .free_body import closed_form
 from .impacts import first_impact
 from .maps import OFFSETS, WALLS, Hit, ImpactMap, grouped
@@ -15,6 +16,7 @@ __all__ = [
     "algebraic",
     "by_elements",
     "closed_form",
+    "compliant",
     "first_impact",
     "fit_response",
     "fitted",

@@ -14,7 +14,8 @@ with q the displacements of the nodes from the straight shape, f elastic forces 
 K = -df/dq, C the transposed Jacobian of the constraints Phi, and r F the holding force.
 
 Modules: ``model`` builds the elements, ``equations`` evaluates them, ``statics`` solves for shapes
-and modes, ``elements`` has the class :class:`FiniteElements`, ``transient`` integrates.
+and modes, ``elements`` has the class :class:`FiniteElements`, ``transient`` integrates,
+``hit`` simulates one hit on a compliant stop.
 
 Accuracy and limits
 -------------------
@@ -25,8 +26,8 @@ Accuracy and limits
 * An impact is the same instantaneous event as in the engine: Newton's law, with the masses of the
   elements.  Only the mass that is clamped to the body stops with it at once; waves run along the
   flexures afterwards.  The modal restitution and the motion up to the next impacts converge.  The
-  motion after many impacts is sensitive to all parameters, as in reality.  The model has no peak
-  forces and no durations of contact.
+  motion after many impacts is sensitive to all parameters, as in reality.  Only a hit on a
+  compliant stop has a peak force and a duration.
 * The steps must resolve the motion of interest: the impact times of the steel guide change by
   1e-5 s between steps of 1e-4 s and 1e-5 s.  A step that gains energy is repeated with shorter
   steps.

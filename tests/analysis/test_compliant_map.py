@@ -1,0 +1,100 @@
+"""Maps of compliant stops: limits of stiff contacts, one coordinate, energy, full simulation."""
+
+import shlex
+import sys
+from dataclasses import replace
+
+import pytest
+
+from prbm.analysis.impact_map import algebraic, compliant, with_flexures
+from prbm.base.errors import ParameterError
+from prbm.commands import command_line as cli
+from prbm.mechanism.parts import COMPLIANT
+from support import ROOT, mechanism
+
+sys.path.insert(0, str(ROOT / "benchmarks"))
+import compliant_hits as hits
+
+GUIDE = with_flexures(mechanism("PRBDM2R"), "2R", axial=True)
+FREE = {"gravity.x": 0.0, "damping.beta": 0.0}
+
+
+def test_stiff_contacts_have_the_map_of_rigid_impacts_in_proportion_to_the_duration():
+    walls, offsets = (-5e-3, 0.0), (0.0, 4e-3)
+    rigid = algebraic(GUIDE, walls, offsets, FREE).restitution
+    errors = [
+        abs(compliant(GUIDE, walls, offsets, FREE, stiffness=k).restitution - rigid).max()
+        for k in (1e10, 1e12, 1e14)
+    ]
+    assert errors[2] < 1e-5
+    assert errors[0] > 10 * errors[1] > 100 * errors[2]
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.5])
+@pytest.mark.parametrize("restitution", [0.1, 0.6, 1.0])
+def test_a_guide_of_one_coordinate_returns_with_the_restitution(exponent, restitution):
+    one = with_flexures(mechanism("PRBDM"), "1R")
+    stops = tuple(
+        replace(s, law=COMPLIANT, stiffness=1e9, exponent=exponent, restitution=restitution)
+        for s in one.stops
+    )
+    found = compliant(replace(one, stops=stops), [0.0], [0.0], FREE, speed=0.3)
+    assert found.restitution.item() == pytest.approx(restitution, abs=1e-5)
+    lost = found.hits[0][0].lost
+    assert lost == pytest.approx(1.0 - restitution**2, abs=1e-5)
+
+
+def test_the_restitution_of_a_linear_contact_does_not_depend_on_the_speed():
+    found = [
+        compliant(GUIDE, [0.0], [4e-3], FREE, stiffness=1e7, speed=speed).restitution.item()
+        for speed in (1e-3, 1.0)
+    ]
+    assert found[0] == pytest.approx(found[1], abs=1e-7)
+
+
+def test_an_elastic_contact_keeps_the_energy():
+    changes = {**FREE, "stop.restitution": 1.0}
+    ((hit,),) = compliant(GUIDE, [5e-3], [4e-3], changes, stiffness=1e7).hits
+    assert hit.lost == pytest.approx(0.0, abs=1e-7)
+    assert hit.after[1:].sum() > 1e-3
+
+
+@pytest.mark.parametrize("stiffness", [1e6, 1e7, 6e7])
+def test_linear_modes_agree_with_the_complete_simulation(stiffness):
+    for damping in (0.0, 8e-6):
+        changes = {**hits.UNDAMPED, "damping.beta": damping}
+        simulated = hits.by_beams(3, stiffness, 4e-3, changes).restitution
+        found = compliant(hits.guide(3), [0.0], [4e-3], changes, stiffness=stiffness)
+        assert found.restitution.item() == pytest.approx(simulated, abs=4e-4)
+
+
+@pytest.mark.parametrize(
+    ("changes", "options", "words"),
+    [
+        ({}, {}, "stop is rigid: give a contact stiffness"),
+        ({}, {"stiffness": 0.0}, "stiffness = 0 N/m"),
+        ({}, {"stiffness": 1e6, "speed": -1.0}, "speed = -1 m/s"),
+        ({"stop.restitution": 0.0}, {"stiffness": 1e6}, "must be at least 0.01"),
+    ],
+)
+def test_mistakes_are_rejected(changes, options, words):
+    with pytest.raises(ParameterError, match=words):
+        compliant(GUIDE, [0.0], [0.0], changes, **options)
+
+
+def test_the_speed_is_needed_for_other_exponents():
+    stops = tuple(replace(s, law=COMPLIANT, stiffness=1e9, exponent=1.5) for s in GUIDE.stops)
+    with pytest.raises(ParameterError, match="depends on the closing speed"):
+        compliant(replace(GUIDE, stops=stops), [0.0], [0.0])
+
+
+def test_the_command_prints_a_map_for_each_stiffness(tmp_path, capsys):
+    line = "impact-map PRBDM2R --wall-positions 0 --offsets 0 4 mm "
+    assert cli.main(shlex.split(line + "--stiffness 1e6 N/m")) == cli.MISTAKE
+    assert "need --method compliant" in capsys.readouterr().err
+    line += f"--way compliant --stiffness 1e6 1e7 N/m --out {tmp_path}"
+    assert cli.main(shlex.split(line)) == cli.OK
+    printed = capsys.readouterr().out
+    assert "2R, 1e+06 N/m" in printed
+    assert "2R, 1e+07 N/m" in printed
+    assert len((tmp_path / "PRBDM2R-impact-map.csv").read_text().splitlines()) == 5

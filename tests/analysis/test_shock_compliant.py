@@ -1,0 +1,60 @@
+"""Forces, indentations and durations of hits on the compliant bump stops of an accelerometer."""
+
+import math
+import shlex
+from dataclasses import replace
+
+import pytest
+
+import prbm
+from prbm.analysis.contact_hit import first_hit
+from prbm.analysis.shock import GRAVITY, Pulse, shock
+from prbm.commands import command_line as cli
+from prbm.mechanism.parts import COMPLIANT
+from support import ROOT
+
+ACCELEROMETER = ROOT / "examples" / "shock" / "accelerometer.toml"
+PULSE = Pulse("half-sine", 500 * GRAVITY, 0.5e-3)
+STIFFNESS = 1e4  # N/m
+MASS = 2330.0 * 25e-6 * (500e-6 * 200e-6 - 180e-6 * 20e-6)  # Of the proof mass [kg].
+
+
+def found_shock():
+    """Return the shock of the accelerometer with compliant bump stops."""
+    one = prbm.load(str(ACCELEROMETER))
+    stops = tuple(replace(s, law=COMPLIANT, stiffness=STIFFNESS) for s in one.stops)
+    one = replace(one, stops=stops)
+    return shock(one, {PULSE.input: PULSE.signal}, duration=PULSE.duration, stop_time=1e-3)
+
+
+def test_hits_have_force_indentation_and_duration():
+    """Truss, springs and pulse change those of the proof mass alone by less than 15 %."""
+    found = found_shock()
+    right, left = found.hits
+    assert (right.count, right.force, right.indentation) == (0, 0.0, 0.0)
+    point = first_hit(STIFFNESS, 1.0, 0.5, mass=MASS, speed=left.speed)
+    assert left.count > 0
+    assert left.force == pytest.approx(point.force, rel=0.15)
+    assert left.indentation == pytest.approx(point.indentation, rel=0.15)
+    assert left.duration >= 0.5 * math.pi * math.sqrt(MASS / STIFFNESS)
+    largest = max(x.latched.peak_force for x in found.result.impacts)
+    assert left.force >= largest > 0.0
+    assert left.force >= max(found.result["bump_left.force"])
+
+
+def test_rigid_stops_have_no_force():
+    one = prbm.load(str(ACCELEROMETER))
+    found = shock(one, {PULSE.input: PULSE.signal}, duration=PULSE.duration, stop_time=1e-3)
+    assert all(hits.force is None for hits in found.hits)
+
+
+def test_the_command_prints_and_draws_the_forces(tmp_path, capsys):
+    text = ACCELEROMETER.read_text("utf-8")
+    changed = 'restitution = 0.5\nlaw = "compliant"\nstiffness = "1e4 N/m"'
+    file = tmp_path / "compliant.toml"
+    file.write_text(text.replace("restitution = 0.5", changed), "utf-8")
+    line = f'shock {file} --peak "500 g" --duration 0.5ms --stop-time 1ms --out {tmp_path / "out"}'
+    assert cli.main(shlex.split(line)) == cli.OK
+    printed = capsys.readouterr().out
+    assert "force at bump_left" in printed
+    assert (tmp_path / "out" / "Accelerometer-shock.png").stat().st_size > 10_000
