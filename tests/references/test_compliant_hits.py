@@ -8,6 +8,7 @@ import pytest
 
 from prbm.references.finite_elements import FiniteElementError, FiniteElements
 from prbm.references.finite_elements.hit import compliant_hit
+from prbm.runs.engine import simulation
 from support import ROOT
 
 sys.path.insert(0, str(ROOT / "benchmarks"))
@@ -78,3 +79,12 @@ def test_a_rigid_stop_is_rejected():
     fe = FiniteElements(hits.guide(3), hits.UNDAMPED, elements=2)
     with pytest.raises(FiniteElementError, match="must be a compliant stop on the ground"):
         compliant_hit(fe, 0.3, 1e-4, 10)
+
+
+def test_the_output_of_a_stop_is_the_restitution_of_the_mode_at_first_touch():
+    """At separation the leaves vibrate along their length, and their own modes are unstable."""
+    start = {"release.displacement": -1e-7, "release.velocity": 0.3, "stop.offset": OFF}
+    for engine in ("kernel", "python"):
+        motion = simulation(hits.guide(3, 6e7), {**hits.UNDAMPED, **start}, engine=engine)
+        motion.advance(2e-4)
+        assert motion.outputs()["stop.modal_restitution"] == pytest.approx(0.56, abs=0.01)

@@ -291,7 +291,7 @@ def _finished(configuration: Configuration, front: Front, stop: int) -> tuple[Fr
         impulse=float(extras[own.index(stop, Extra.IMPULSE)]) - touch.impulse,
         energy_lost=float(extras[own.index(stop, Extra.LOSS)]) - touch.loss,
         contact_duration=front.time - touch.time,
-        modal_restitution=_modal_restitution(configuration, front, touch),
+        modal_restitution=_modal_restitution(front, touch),
     )
     front = front.with_latched(stop, latched).with_touch(stop, replace(touch, counted=False))
     name, q, before = configuration.mechanism.stops[stop].name, touch.q, touch.v
@@ -299,17 +299,14 @@ def _finished(configuration: Configuration, front: Front, stop: int) -> tuple[Fr
     return front, [record]
 
 
-def _modal_restitution(configuration: Configuration, front: Front, touch: Touch) -> float:
+def _modal_restitution(front: Front, touch: Touch) -> float:
     """Return minus the ratio of the velocities of the fundamental mode after and before [-].
 
-    The mode and the mass matrix are those of the shape at first touch before the impact, and those
-    at separation after it.
+    The mode and the mass matrix are those of the shape at first touch.  At separation, flexures
+    that stretch can vibrate along their length, and the modes about that shape differ.
     """
-    phi, M = fundamental_at(configuration.system, front.q)
-    first, last = np.array(touch.momentum), M @ phi
-    if first @ phi < 0.0:
-        last = -last
-    return modal_ratio(first, np.array(touch.v), last, front.v)
+    momentum = np.array(touch.momentum)
+    return modal_ratio(momentum, np.array(touch.v), momentum, front.v)
 
 
 def latched_until(

@@ -206,29 +206,20 @@ PRBM bool switch_phase(Simulation *sim, int stop, Problem *problem) {
     return settle(sim, NULL, 0, NULL, problem);
 }
 
-/* Compute -(last^T v+) / (first^T v-), with M phi at first touch and now; 0 if first^T v- is
- * round-off. */
-static bool modal_ratio(Simulation *sim, int stop, double *result, Problem *problem) {
-    size_t mark = sim->scratch.used;
-    const System *system = system_of(sim);
-    int n = system->n;
-    const double *front = sim->state.front, *after = front + n;
-    const double *before = first_state(sim, stop) + n, *first = before + n;
-    double *phi = take(&sim->scratch, (size_t)n), *M = take_matrix(&sim->scratch, n, n);
-    double arriving = dot(n, first, before), leaving = 0.0, size = 0.0;
-    bool ok = fundamental_at(system, front, phi, M, &sim->scratch, problem);
-    for (int j = 0; ok && j < n; j++) {
-        leaving += dot(n, M + j * n, phi) * after[j];
-        size += fabs(first[j]) * (fabs(before[j]) + fabs(after[j]));
+/* Return -(m^T v+) / (m^T v-) with m = M phi at first touch; 0 if m^T v- is round-off. */
+static double modal_ratio(Simulation *sim, int stop) {
+    int n = system_of(sim)->n;
+    const double *after = sim->state.front + n;
+    const double *before = first_state(sim, stop) + n, *momentum = before + n;
+    double arriving = dot(n, momentum, before), size = 0.0;
+    for (int j = 0; j < n; j++) {
+        size += fabs(momentum[j]) * (fabs(before[j]) + fabs(after[j]));
     }
-    leaving = ok && dot(n, first, phi) < 0.0 ? -leaving : leaving;
-    *result = fabs(arriving) <= ZERO_MODE_RTOL * size ? 0.0 : -leaving / arriving;
-    sim->scratch.used = mark;
-    return ok;
+    return fabs(arriving) <= ZERO_MODE_RTOL * size ? 0.0 : -dot(n, momentum, after) / arriving;
 }
 
 /* Latch the outputs of an impact that ends, and report it. */
-static bool end_impact(Simulation *sim, int stop, Problem *problem) {
+static void end_impact(Simulation *sim, int stop) {
     double gaps[STOPS_MAX], rates[STOPS_MAX];
     int n = system_of(sim)->n;
     Touch *begun = &sim->state.touches[stop];
@@ -236,19 +227,16 @@ static bool end_impact(Simulation *sim, int stop, Problem *problem) {
     const double *extra = extra_of(sim, sim->state.front, stop);
     const double *first = first_state(sim, stop);
     if (!begun->counted) {
-        return true;
+        return;
     }
     gaps_and_rates(sim, gaps, rates);
     latched->rebound_speed = rates[stop];
     latched->impulse = extra[EXTRA_IMPULSE] - begun->impulse;
     latched->energy_lost = extra[EXTRA_LOSS] - begun->loss;
     latched->contact_duration = sim->state.front_time - begun->time;
-    if (!modal_ratio(sim, stop, &latched->modal_restitution, problem)) {
-        return false;
-    }
+    latched->modal_restitution = modal_ratio(sim, stop);
     begun->counted = false;
     report_impact(sim, stop, first, first + n, sim->state.front + n);
-    return true;
 }
 
 /* Return to the step size before a contact that ends: it does not shorten the steps after it. */
@@ -257,9 +245,7 @@ static void resume_step(Simulation *sim, int stop) {
 }
 
 PRBM bool separate(Simulation *sim, int stop, Problem *problem) {
-    if (!end_impact(sim, stop, problem)) {
-        return false;
-    }
+    end_impact(sim, stop);
     resume_step(sim, stop);
     set_phase(sim, stop, PHASE_NONE, 0.0, 0.0);
     return settle(sim, NULL, 0, NULL, problem);
@@ -466,11 +452,14 @@ PRBM bool settle_calm(Simulation *sim, Problem *problem) {
             return false;
         }
         sim->state.arc.valid = sim->state.arc.valid && !held;
-        if (held && !(stop_motion(sim, i, problem) && end_impact(sim, i, problem) &&
-                      settle(sim, NULL, 0, NULL, problem))) {
-            return false;
-        }
         if (held) {
+            if (!stop_motion(sim, i, problem)) {
+                return false;
+            }
+            end_impact(sim, i);
+            if (!settle(sim, NULL, 0, NULL, problem)) {
+                return false;
+            }
             resume_step(sim, i);
         }
     }
