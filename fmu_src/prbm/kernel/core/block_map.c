@@ -85,14 +85,20 @@ static int mass_index(const BlockMap *block, int a, int b) {
     return block->mass_first + block->coordinate[a] * block->mass_size + block->coordinate[b];
 }
 
-/* Whether the coupling of a direction of a beam with those before it is real.  Only the last
- * direction may belong to a body. */
-static inline bool real_row(int size, int i) {
-    return i < size - 1;
+/* Whether the last direction of a block is its last coordinate, the rotation of a body. */
+static bool has_body(const BlockMap *block) {
+    for (int c = 0; c < block->count; c++) {
+        double wanted = c == block->count - 1 ? 1.0 : 0.0;
+        if (block->change[c * block->even + block->size - 1] != wanted) {
+            return false;
+        }
+    }
+    return true;
 }
 
 /* Whether a block is that of a beam of the order 3 with 5 or 6 nodes between two clamps, with or
- * without a body.  Its code is compiled separately for each size. */
+ * without a body.  Its code is compiled separately for each size.  The coupling of the nodes is
+ * real. */
 static bool is_beam(const System *system, const BlockMap *block) {
     for (int k = 0; k < system->stretch_count; k++) {
         int j = system->stretches[k] - block->start;
@@ -100,13 +106,13 @@ static bool is_beam(const System *system, const BlockMap *block) {
             return false;
         }
     }
-    for (int k = 0; k < block->size * block->even; k++) {
-        if (real_row(block->size, k / block->even) && block->H.im[k] != 0.0) {
+    const int nodes = block->size - block->body;
+    for (int k = 0; k < nodes * block->even; k++) {
+        if (block->H.im[k] != 0.0) {
             return false;
         }
     }
-    return block->count == BEAM_COORDINATES && block->size >= BEAM_DIRECTIONS_MIN &&
-           block->size <= BEAM_DIRECTIONS_MAX;
+    return block->count == BEAM_COORDINATES && nodes >= BEAM_NODES_MIN && nodes <= BEAM_NODES_MAX;
 }
 
 /* Rows and columns of the entries of a symmetric matrix of the coordinates.  The first entries are
@@ -124,18 +130,18 @@ static bool consecutive(const BlockMap *block) {
     return true;
 }
 
-/* Set the mass matrices of the coordinates for each pair of directions, and that of the
- * diagonal. */
+/* Set the mass matrices of the coordinates for each pair of nodes, and that of the diagonal. */
 static void set_products(const System *system, BlockMap *block) {
     double *next = block->products;
+    const int nodes = block->size - block->body;
     block->together = consecutive(block);
     zeros(BEAM_ENTRIES, block->constant);
     for (int i = 0; i < block->size; i++) {
         for (int a = 0; a < BEAM_COORDINATES; a++) {
             block->rows[i * BEAM_COORDINATES + a] = block->change[a * block->even + i];
         }
-        for (int j = 0; j <= i; j++) {
-            double mass = real_row(block->size, i) ? block->H.re[i * block->even + j] : 1.0;
+        for (int j = i < nodes ? 0 : i; j <= i; j++) {
+            double mass = block->H.re[i * block->even + j];
             for (int k = 0; k < BEAM_ENTRIES; k++) {
                 const double *x = block->change + BEAM_ENTRY[k][0] * block->even;
                 const double *y = block->change + BEAM_ENTRY[k][1] * block->even;
@@ -163,6 +169,7 @@ PRBM void set_block_maps(System *system, Scratch *scratch) {
         set_changes(system, map);
         set_coupling(system, map);
         find_mass_block(system, map);
+        map->body = has_body(map);
         map->beam = is_beam(system, map);
         if (map->beam) {
             set_products(system, map);
@@ -260,21 +267,26 @@ RARE void pull_block(const BlockMap *map, const double *x, double *out) {
     }
 }
 
-SIZED void pull_beam(int size, const BlockMap *map, const double *ALONE x, double *ALONE out) {
-    Lanes sum[BEAM_COORDINATES / LANES];
-    double entries[BEAM_COORDINATES];
+/* Compute the derivatives by the coordinates out of those by the first directions of a beam. */
+SIZED void pull_first(int size, const BlockMap *map, const double *ALONE x, Lanes *ALONE sum) {
     UNROLLED
     for (int c = 0; c < BEAM_COORDINATES; c += LANES) {
-        sum[c / LANES] = x[map->start] * lanes_at(map->rows + c);
+        sum[c / LANES] = x[0] * lanes_at(map->rows + c);
     }
     UNROLLED
     for (int i = 1; i < size; i++) {
-        Lanes each = all_lanes(x[map->start + i]);
+        Lanes each = all_lanes(x[i]);
         UNROLLED
         for (int c = 0; c < BEAM_COORDINATES; c += LANES) {
             sum[c / LANES] += each * lanes_at(map->rows + i * BEAM_COORDINATES + c);
         }
     }
+}
+
+SIZED void pull_beam(int size, const BlockMap *map, const double *ALONE x, double *ALONE out) {
+    Lanes sum[BEAM_COORDINATES / LANES];
+    double entries[BEAM_COORDINATES];
+    pull_first(size, map, x + map->start, sum);
     if (map->together) {
         out += map->coordinate[0];
         UNROLLED
@@ -293,42 +305,33 @@ SIZED void pull_beam(int size, const BlockMap *map, const double *ALONE x, doubl
     }
 }
 
-SIZED void pull_beam_rows(int size, const System *system, const BlockMap *map, int r,
-                          const double *x, double *out) {
+static void pull_rows(const System *system, const BlockMap *map, int r, const double *x,
+                      double *out) {
     for (int row = 0; row < r; row++) {
-        pull_beam(size, map, x + row * system->wide, out + row * system->even);
+        pull_block(map, x + row * system->wide, out + row * system->even);
     }
 }
 
 PRBM void pull_directions(const System *system, int r, const double *x, double *out) {
     for (int k = 0; k < system->block_count; k++) {
-        const BlockMap *map = &system->maps[k];
-        switch (map->beam ? map->size : 0) {
-        case 5: pull_beam_rows(5, system, map, r, x, out); break;
-        case 6: pull_beam_rows(6, system, map, r, x, out); break;
-        case 7: pull_beam_rows(7, system, map, r, x, out); break;
-        default:
-            for (int row = 0; row < r; row++) {
-                pull_block(map, x + row * system->wide, out + row * system->even);
-            }
-        }
+        pull_rows(system, &system->maps[k], r, x, out);
     }
 }
 
 /* --- mass ------------------------------------------------------------------------------------- */
 
 /* Compute the mass matrix M (size, even) of the directions of a block below its diagonal, and
- * add the quadratic velocity terms to the loads x.  The real rows of a beam are not multiplied
- * by H, which its products contain. */
-SIZED void couple_block(int size, bool beam, Parts H, Parts e, const double *ALONE squares,
+ * add the quadratic velocity terms to the loads x.  The rows of the nodes of a beam are not
+ * multiplied by H, which its products contain. */
+SIZED void couple_block(int size, int nodes, Parts H, Parts e, const double *ALONE squares,
                         double *ALONE M, double *ALONE x) {
     const int even = even_length(size);
     UNROLLED
     for (int i = 1; i < size; i++) {
         Lanes own_re = all_lanes(e.re[i]), own_im = all_lanes(e.im[i]);
         Lanes square = all_lanes(squares[i]), sum[SUMS] = {NO_LANES};
-        const int columns = beam ? even : even_length(i);
-        const bool real = beam && real_row(size, i);
+        const int columns = nodes > 0 ? even : even_length(i);
+        const bool real = i < nodes;
         UNROLLED
         for (int j = 0; j < columns; j += LANES) {
             if (j < even_length(i)) {
@@ -349,10 +352,12 @@ SIZED void couple_block(int size, bool beam, Parts H, Parts e, const double *ALO
     }
 }
 
-/* Add the mass matrix of a beam, M below its diagonal, to that of the coordinates. */
-SIZED void pull_beam_mass(int size, const BlockMap *map, const double *ALONE M,
+/* Add the mass matrix of a beam, M below its diagonal, to that of the coordinates.  The row of the
+ * body is pulled back as a vector, because the direction of the body is a coordinate. */
+SIZED void pull_beam_mass(int nodes, bool body, const BlockMap *map, const double *ALONE M,
                           double *ALONE mass) {
-    const int even = even_length(size);
+    static const double TIMES[BEAM_COORDINATES] = {1.0, 1.0, 1.0, 2.0};
+    const int even = even_length(nodes + body);
     const double *product = map->products;
     Lanes sum[BEAM_ENTRIES / LANES];
     double entries[BEAM_ENTRIES];
@@ -361,9 +366,9 @@ SIZED void pull_beam_mass(int size, const BlockMap *map, const double *ALONE M,
         sum[k / LANES] = lanes_at(map->constant + k);
     }
     UNROLLED
-    for (int i = 1; i < size; i++) {
+    for (int i = 1; i < nodes; i++) {
         UNROLLED
-        for (int j = 0; j < size; j++) {
+        for (int j = 0; j < nodes; j++) {
             if (j < i) {
                 Lanes each = all_lanes(M[i * even + j]);
                 UNROLLED
@@ -372,6 +377,14 @@ SIZED void pull_beam_mass(int size, const BlockMap *map, const double *ALONE M,
                 }
                 product += BEAM_ENTRIES;
             }
+        }
+    }
+    if (body) {
+        Lanes row[BEAM_COORDINATES / LANES];
+        pull_first(nodes, map, M + nodes * even, row);
+        UNROLLED
+        for (int c = 0; c < BEAM_COORDINATES; c += LANES) {
+            sum[(BEAM_BODY + c) / LANES] += row[c / LANES] * lanes_at(TIMES + c);
         }
     }
     const int paired = map->together ? BEAM_PAIRED : 0;
@@ -389,10 +402,18 @@ SIZED void pull_beam_mass(int size, const BlockMap *map, const double *ALONE M,
     }
 }
 
-SIZED void beam_mass(int size, const BlockMap *map, Parts e, const double *squares, double *M,
-                     double *x, double *mass) {
-    couple_block(size, true, map->H, e, squares, M, x);
-    pull_beam_mass(size, map, M, mass);
+SIZED void add_beam_terms(int nodes, bool body, const System *system, const BlockMap *map, int r,
+                          Evaluation *result) {
+    const Kinematics *at = &result->at;
+    const int start = map->start, size = nodes + body;
+    couple_block(size, nodes, map->H, parts_from(at->e_parts, start), at->squares + start,
+                 result->block, result->load + start);
+    pull_beam_mass(nodes, body, map, result->block, result->mass);
+    pull_beam(size, map, result->load, result->a);
+    for (int row = 0; row < r; row++) {
+        pull_beam(size, map, result->rows + row * system->wide,
+                  result->factors.Z + row * system->even);
+    }
 }
 
 /* Complete the mass matrix M (size, even) of the directions of a block. */
@@ -429,32 +450,34 @@ static void pull_any_mass(const BlockMap *map, const double *M, double *turned, 
     }
 }
 
-/* Add the mass of a block that is not a beam; own (d,) and shift (wide,) are those of all
+/* Add the terms of a block that is not a beam; own (d,) and shift (wide,) are those of all
  * blocks. */
-RARE void add_any_mass(const System *system, const BlockMap *map, const double *own,
-                       Evaluation *result) {
+RARE void add_any_terms(const System *system, const BlockMap *map, const double *own, int r,
+                        Evaluation *result) {
     const Kinematics *at = &result->at;
     const int start = map->start;
     double *M = result->block, *x = result->load + start;
-    couple_block(map->size, false, map->H, parts_from(at->e_parts, start), at->squares + start, M,
-                 x);
+    couple_block(map->size, 0, map->H, parts_from(at->e_parts, start), at->squares + start, M, x);
     complete_mass(map, own + start, M);
     if (system->stretch_count > 0) {
         pull_shift(map, M, result->shift + start, x);
     }
     pull_any_mass(map, M, result->turned, result->mass);
+    pull_block(map, result->load, result->a);
+    pull_rows(system, map, r, result->rows, result->factors.Z);
 }
 
-PRBM void add_block_mass(const System *system, const BlockMap *map, const double *own,
-                         Evaluation *result) {
-    const Kinematics *at = &result->at;
-    const double *squares = at->squares + map->start;
-    double *M = result->block, *x = result->load + map->start, *mass = result->mass;
-    Parts e = parts_from(at->e_parts, map->start);
-    switch (map->beam ? map->size : 0) {
-    case 5: beam_mass(5, map, e, squares, M, x, mass); break;
-    case 6: beam_mass(6, map, e, squares, M, x, mass); break;
-    case 7: beam_mass(7, map, e, squares, M, x, mass); break;
-    default: add_any_mass(system, map, own, result);
+PRBM void add_block_terms(const System *system, const BlockMap *map, const double *own, int r,
+                          Evaluation *result) {
+    if (!map->beam) {
+        add_any_terms(system, map, own, r, result);
+    } else if (map->size == 7) {
+        add_beam_terms(6, true, system, map, r, result);
+    } else if (map->size == 5) {
+        add_beam_terms(5, false, system, map, r, result);
+    } else if (map->body) {
+        add_beam_terms(5, true, system, map, r, result);
+    } else {
+        add_beam_terms(6, false, system, map, r, result);
     }
 }

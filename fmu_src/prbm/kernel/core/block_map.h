@@ -16,10 +16,10 @@ PRBM void map_motion(const System *system, Kinematics *at);
 /* Add the derivatives by directions x (r, wide), pulled back to the coordinates, to out
  * (r, even). */
 PRBM void pull_directions(const System *system, int r, const double *x, double *out);
-/* Add the mass matrix of a block of directions to that of the coordinates, below its diagonal,
- * and the quadratic velocity terms of the block to the loads of the directions.  own (d,) is the
- * diagonal of the mass matrix of the directions. */
-PRBM void add_block_mass(const System *system, const BlockMap *map, const double *own,
-                         Evaluation *result);
+/* Add the mass matrix of a block of directions to that of the coordinates, below its diagonal, and
+ * its quadratic velocity terms to the loads of the directions.  Pull its loads and r rows back to
+ * the coordinates.  own (d,) is the diagonal of the mass matrix of the directions. */
+PRBM void add_block_terms(const System *system, const BlockMap *map, const double *own, int r,
+                          Evaluation *result);
 
 #endif

@@ -424,8 +424,9 @@ static void find_shift(const System *system, const Kinematics *at, double *shift
     }
 }
 
-/* Compute M, and add the quadratic velocity terms to the loads of the directions. */
-static void mapped_mass(const Equations *q, Evaluation *result) {
+/* Compute M, add the quadratic velocity terms to the loads of the directions, and pull loads and
+ * rows back to the coordinates. */
+static void pull_blocks(const Equations *q, Evaluation *result) {
     const System *system = q->system;
     const double *own = own_inertia(system, &result->at);
     if (system->stretch_count > 0) {
@@ -433,7 +434,7 @@ static void mapped_mass(const Equations *q, Evaluation *result) {
     }
     zeros(system->n * system->n, result->mass);
     for (int k = 0; k < system->block_count; k++) {
-        add_block_mass(system, &system->maps[k], own, result);
+        add_block_terms(system, &system->maps[k], own, q->r, result);
     }
 }
 
@@ -457,13 +458,11 @@ RARE void mapped_terms(const Equations *q, const Reference *near, Evaluation *re
     case 14: direction_terms(14, q, near, result); break;
     default: direction_terms(wide, q, near, result);
     }
-    mapped_mass(q, result);
     for (int j = 0; j < even; j += LANES) {
         set_lanes(result->a + j, all_lanes(0.0));
     }
     zeros(q->r * even, Z);
-    pull_directions(system, 1, result->load, result->a);
-    pull_directions(system, q->r, result->rows, Z);
+    pull_blocks(q, result);
     for (int k = 0; system->stretch_count > 0 && k < q->r; k++) {
         result->lam[k] += even_dot(wide, result->rows + k * wide, result->shift);
     }

@@ -63,7 +63,9 @@ enum {
     BEAM_COORDINATES = 4,
     BEAM_ENTRIES = 10, /* of a symmetric matrix of the coordinates */
     BEAM_PAIRED = 8,   /* the first of them, which are pairs in the rows of the matrix */
-    BEAM_DIRECTIONS_MIN = 5,
+    BEAM_BODY = 4,    /* the first of the entries in the row of a body */
+    BEAM_NODES_MIN = 5,
+    BEAM_NODES_MAX = 6,
     BEAM_DIRECTIONS_MAX = 7,
     BEAM_CHANGES = BEAM_DIRECTIONS_MAX * BEAM_COORDINATES
 };
@@ -77,13 +79,14 @@ typedef struct {
     Parts H;               /* (size, even) below the diagonal, and zero elsewhere */
     int mass_first, mass_size; /* The mass of the coordinates i and j <= i is at the index
                                 * mass_first + i mass_size + j of the mass blocks. */
+    bool body;             /* Whether the last direction is the last coordinate, of a body. */
     bool beam;             /* Whether the members below are used. */
     bool together;         /* Whether the coordinates are consecutive. */
     int place[BEAM_ENTRIES];       /* The indices of the masses of the coordinates. */
     double constant[BEAM_ENTRIES]; /* The part of these masses that is constant. */
     double rows[BEAM_CHANGES];     /* (size, BEAM_COORDINATES) change, row by row. */
     double *products;      /* (pairs, BEAM_ENTRIES) their changes with the mass of each pair of
-                            * directions */
+                            * nodes */
 } BlockMap;
 
 /* The constant arrays of a mechanism, as in the twin.  There are n coordinates, d directions, r
