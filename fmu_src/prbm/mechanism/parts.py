@@ -11,6 +11,7 @@ from .flexure import CLAMP, LEAF, NOTCH, TAPER
 Point = tuple[Quantity, Quantity]
 
 GROUND = "ground"
+KNEE_SHARE = 0.9  # Of the tensile strength: the amplitude that is survived for 1,000 cycles.
 
 
 @dataclass(frozen=True)
@@ -121,6 +122,11 @@ class FlexureType:
     waist_length: Quantity | None = None
     curvature: Quantity | None = None
     rise: Quantity | None = None
+    stress: bool = False
+    yield_strength: float | None = None
+    tensile_strength: float | None = None
+    fatigue_strength: float | None = None
+    fatigue_cycles: float | None = None
 
     @property
     def hinge(self) -> bool:
@@ -143,12 +149,6 @@ class FlexureType:
         if quantity is None:
             quantity = self.default(name)
         return quantity if isinstance(quantity, str) else f"{self.name}.{name}"
-
-    stress: bool = False
-    yield_strength: float | None = None
-    tensile_strength: float | None = None
-    fatigue_strength: float | None = None
-    fatigue_cycles: float | None = None
 
 
 @dataclass(frozen=True)
