@@ -27,11 +27,10 @@ import numpy as np
 from ..mechanics.arrays import Real
 from ..mechanics.stress import stressed
 from ..mechanism.description import Mechanism
-from ..mechanism.parts import FlexureType
+from ..mechanism.parts import KNEE_SHARE, FlexureType
 from ..runs.result import Columns, column
 from .stress_field import StressField
 
-KNEE_SHARE = 0.9  # Of the tensile strength: the amplitude that is survived for KNEE_CYCLES.
 KNEE_CYCLES = 1e3
 LOG_MAX = math.log(sys.float_info.max)
 

@@ -467,10 +467,8 @@ def _type(table: Section, materials: Mapping[str, dict[str, Any]]) -> parts.Flex
             raise MechanismError(
                 f"{table.name}.{key} is missing: add the key, or the type of the flexure"
             )
-    keys = (
-        "name", "model", "order", "nodes", *SECTION, "axial", "stress", "coefficients", *PROFILE,
-    )  # fmt: skip
-    given: dict[str, Any] = {key: getattr(table, key) for key in keys}
+    keys = (key for key in _OWN if key not in ("n", "material", *MATERIAL))
+    given: dict[str, Any] = {key: getattr(table, key) for key in ("name", *keys)}
     return parts.FlexureType(**given | _material(table, materials), n=table.n or 0)
 
 

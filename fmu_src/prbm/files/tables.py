@@ -13,7 +13,6 @@ from .values import Angle, InUnit, Name, Point, Strength, measured
 REPEAT_MAX = 1000  # Largest number of equal parts in a row or on a circle.
 STRENGTHS = ("yield_strength", "tensile_strength", "fatigue_strength", "fatigue_cycles")
 CYCLES: Any = {"minimum": 1e4, "maximum": 1e12}  # Range of the cycles of a fatigue strength.
-KNEE_SHARE = 0.9  # Of the tensile strength; the fatigue strength is less.
 
 
 class Table(BaseModel):
@@ -96,8 +95,8 @@ class MaterialTable(Named):
             raise ValueError("fatigue_cycles must be between 10000 and 1e12")
         if self.tensile_strength is None:
             raise ValueError("fatigue_strength needs tensile_strength: add it")
-        if self.fatigue_strength >= KNEE_SHARE * self.tensile_strength:
+        if self.fatigue_strength >= parts.KNEE_SHARE * self.tensile_strength:
             raise ValueError(
-                f"fatigue_strength must be less than {KNEE_SHARE:g} of tensile_strength"
+                f"fatigue_strength must be less than {parts.KNEE_SHARE:g} of tensile_strength"
             )
         return self

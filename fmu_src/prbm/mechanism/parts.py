@@ -12,6 +12,7 @@ Point = tuple[Quantity, Quantity]
 
 GROUND = "ground"
 LAWS = RIGID, COMPLIANT = ("rigid", "compliant")
+KNEE_SHARE = 0.9  # Of the tensile strength: the amplitude that is survived for 1,000 cycles.
 
 
 @dataclass(frozen=True)
@@ -122,6 +123,11 @@ class FlexureType:
     waist_length: Quantity | None = None
     curvature: Quantity | None = None
     rise: Quantity | None = None
+    stress: bool = False
+    yield_strength: float | None = None
+    tensile_strength: float | None = None
+    fatigue_strength: float | None = None
+    fatigue_cycles: float | None = None
 
     @property
     def hinge(self) -> bool:
@@ -144,12 +150,6 @@ class FlexureType:
         if quantity is None:
             quantity = self.default(name)
         return quantity if isinstance(quantity, str) else f"{self.name}.{name}"
-
-    stress: bool = False
-    yield_strength: float | None = None
-    tensile_strength: float | None = None
-    fatigue_strength: float | None = None
-    fatigue_cycles: float | None = None
 
 
 @dataclass(frozen=True)

@@ -154,36 +154,22 @@ PRBM SectionState section_state(const Equations *q, const Complex *e, const doub
 
 /* --- sections --------------------------------------------------------------------------------- */
 
-/* Work of the loads in the virtual rotation of an end: side 0 is the near end. */
-static double end_work(const FreeBody *body, int side, const Complex *e, const Complex *loads,
-                       Complex far) {
+/* Work of the loads in the virtual rotation of an end: side 0 is the near end.  ground: the arm of
+ * the ground, 1, or its change, 0. */
+static double end_work(const FreeBody *body, int side, const Complex *e, Complex ground,
+                       const Complex *loads, Complex far) {
     int k = body->arm_count;
     double sum = 0.0;
     for (int j = 0; j < k; j++) {
         double turn = body->turning[side * k + j];
-        if (turn != 0.0 && body->arms[j] != FIXED) {
+        if (turn != 0.0) {
+            Complex arm = body->arms[j] == FIXED ? ground : e[body->arms[j]];
             Complex pulled = product(conjugate(far), body->levers[body->count * k + j]);
             for (int i = 0; i < body->count; i++) {
                 Complex load = conjugate(loads[body->first + i]);
                 pulled = plus(pulled, product(load, body->levers[i * k + j]));
             }
-            sum -= turn * product(pulled, e[body->arms[j]]).im;
-        }
-    }
-    return sum;
-}
-
-/* Work at a stub that is fixed to the ground; it does not change. */
-static double ground_work(const FreeBody *body, int side, const Complex *loads, Complex far) {
-    int k = body->arm_count;
-    double sum = 0.0;
-    for (int j = 0; j < k; j++) {
-        if (body->arms[j] == FIXED && body->turning[side * k + j] != 0.0) {
-            sum -= product(conjugate(far), body->levers[body->count * k + j]).im;
-            for (int i = 0; i < body->count; i++) {
-                Complex load = conjugate(loads[body->first + i]);
-                sum -= product(load, body->levers[i * k + j]).im;
-            }
+            sum -= turn * product(pulled, arm).im;
         }
     }
     return sum;
@@ -282,8 +268,7 @@ PRBM void face_stresses(const System *system, const FreeBody *body, const Sectio
     for (int k = 0; k <= last; k++) {
         double bending;
         if (k == 0 || k == last) {
-            double work = end_work(body, k != 0, at->e, at->loads, far) +
-                          ground_work(body, k != 0, at->loads, far);
+            double work = end_work(body, k != 0, at->e, complex_of(1.0, 0.0), at->loads, far);
             bending = end_bending(body, beam, k != 0, at->strained, work);
         } else {
             bending = bending_between(body, beam, order, k, at->strained);
@@ -365,9 +350,9 @@ PRBM void face_changes(const System *system, const FreeBody *body, const Section
     for (int k = 0; k <= last; k++) {
         double bending;
         if (k == 0 || k == last) {
-            double work = end_work(body, k != 0, change->e, at->loads, far) +
-                          end_work(body, k != 0, at->e, change->loads, dfar) +
-                          ground_work(body, k != 0, change->loads, dfar);
+            Complex none = {0.0, 0.0}, one = {1.0, 0.0};
+            double work = end_work(body, k != 0, change->e, none, at->loads, far) +
+                          end_work(body, k != 0, at->e, one, change->loads, dfar);
             bending = end_bending(body, beam, k != 0, change->strained, work);
         } else {
             bending = bending_between(body, beam, order, k, change->strained);
