@@ -14,7 +14,12 @@ from hypothesis import strategies as st
 from kernel_library import Kernel, KernelError, compiled, kernel, structures
 
 mpmath.mp.prec = 200
-RNG = np.random.default_rng(1)
+
+
+@pytest.fixture
+def rng():
+    """Return random numbers that do not depend on the order of the tests."""
+    return np.random.default_rng(1)
 
 
 def directions(q, library=None):
@@ -36,21 +41,21 @@ def largest_ulp_error(function, exact, arguments):
 # --- exp(i q) -----------------------------------------------------------------------------------
 
 
-def hard_angles():
+def hard_angles(rng):
     """Return angles of all magnitudes up to 1e5, and the doubles next to multiples of pi/4."""
-    k = np.concatenate([np.arange(-40, 41), RNG.integers(-127_000, 127_000, 500)])
+    k = np.concatenate([np.arange(-40, 41), rng.integers(-127_000, 127_000, 500)])
     near = k * (np.pi / 4)
     return np.concatenate(
         [
-            RNG.uniform(-1.6, 1.6, 2000), RNG.uniform(-1e5, 1e5, 1000),
-            10.0 ** RNG.uniform(-300, 4.9, 500), near, np.nextafter(near, 9e9),
+            rng.uniform(-1.6, 1.6, 2000), rng.uniform(-1e5, 1e5, 1000),
+            10.0 ** rng.uniform(-300, 4.9, 500), near, np.nextafter(near, 9e9),
             np.nextafter(near, -9e9), [99999.99999999999, -99999.99999999999],
         ]
     )  # fmt: skip
 
 
-def test_directions_are_within_one_unit_in_the_last_place():
-    q = hard_angles()
+def test_directions_are_within_one_unit_in_the_last_place(rng):
+    q = hard_angles(rng)
     for x, z in zip(q, directions(q), strict=True):
         assert ulp_error(z.real, mpmath.cos(mpmath.mpf(float(x)))) < 1.0
         assert ulp_error(z.imag, mpmath.sin(mpmath.mpf(float(x)))) < 1.0
@@ -71,8 +76,8 @@ def test_a_direction_does_not_depend_on_its_neighbours(q):
     assert directions(q).tolist() == alone
 
 
-def test_the_direction_of_a_negative_angle_is_the_conjugate():
-    q = hard_angles()
+def test_the_direction_of_a_negative_angle_is_the_conjugate(rng):
+    q = hard_angles(rng)
     np.testing.assert_array_equal(directions(-q), directions(q).conj())
 
 
@@ -120,14 +125,14 @@ def test_every_compiler_gives_the_same_bits(how):
 # --- logarithm, exponential, power, phase --------------------------------------------------------
 
 
-def test_natural_log_is_within_one_unit():
-    x = [10.0 ** RNG.uniform(-300, 300, 2000), RNG.uniform(0.5, 2.0, 4000)]
-    x += [1.0 + RNG.normal(size=500) * 1e-6, [5e-324, 2.3e-308, 1.7e308, 0.5, 2.0]]
+def test_natural_log_is_within_one_unit(rng):
+    x = [10.0 ** rng.uniform(-300, 300, 2000), rng.uniform(0.5, 2.0, 4000)]
+    x += [1.0 + rng.normal(size=500) * 1e-6, [5e-324, 2.3e-308, 1.7e308, 0.5, 2.0]]
     assert largest_ulp_error(kernel().natural_log, mpmath.log, np.concatenate(x)) < 1.0
 
 
-def test_exponential_is_within_one_unit():
-    x = np.concatenate([RNG.uniform(-700, 709, 2000), RNG.normal(size=4000)])
+def test_exponential_is_within_one_unit(rng):
+    x = np.concatenate([rng.uniform(-700, 709, 2000), rng.normal(size=4000)])
     assert largest_ulp_error(kernel().exponential, mpmath.exp, x) < 1.0
 
 
@@ -145,9 +150,9 @@ def test_limits_of_logarithm_and_exponential_are_exact():
     assert math.isnan(k.exponential(math.nan))
 
 
-def test_power_error_is_bounded_by_the_rounding_of_its_exponent():
+def test_power_error_is_bounded_by_the_rounding_of_its_exponent(rng):
     """Relative error <= (1 + |y ln x|) 3e-16, which is 4e-16 for the step size control."""
-    for x, y in zip(10.0 ** RNG.uniform(-12, 12, 3000), RNG.uniform(-2, 2, 3000), strict=True):
+    for x, y in zip(10.0 ** rng.uniform(-12, 12, 3000), rng.uniform(-2, 2, 3000), strict=True):
         exact = mpmath.mpf(x) ** mpmath.mpf(y)
         error = abs(mpmath.mpf(kernel().power(x, y)) - exact) / exact
         assert error <= (1.0 + abs(y * math.log(x))) * 3e-16
@@ -155,10 +160,10 @@ def test_power_error_is_bounded_by_the_rounding_of_its_exponent():
     assert kernel().power(3.0, 0.0) == 1.0
 
 
-def test_phase_is_within_two_units_for_vectors_of_any_length():
-    angles = np.concatenate([RNG.uniform(-np.pi, np.pi, 4000), 10.0 ** RNG.uniform(-12, 0, 500)])
+def test_phase_is_within_two_units_for_vectors_of_any_length(rng):
+    angles = np.concatenate([rng.uniform(-np.pi, np.pi, 4000), 10.0 ** rng.uniform(-12, 0, 500)])
     for angle in angles:
-        z = cmath.rect(10.0 ** RNG.uniform(-3, 3), angle)
+        z = cmath.rect(10.0 ** rng.uniform(-3, 3), angle)
         exact = mpmath.atan2(mpmath.mpf(z.imag), mpmath.mpf(z.real))
         assert ulp_error(kernel().phase(z), exact) < 2.0
 
@@ -211,10 +216,10 @@ def factored(a):
 
 
 @pytest.mark.parametrize("n", range(1, 13))
-def test_residual_of_lu_is_a_rounding_error(n):
+def test_residual_of_lu_is_a_rounding_error(n, rng):
     """Some matrices have zeros on the diagonal, like those of a saddle point."""
     for _ in range(40):
-        a, b = RNG.normal(size=(n, n)) * 10.0 ** RNG.uniform(-6, 6), RNG.normal(size=n)
+        a, b = rng.normal(size=(n, n)) * 10.0 ** rng.uniform(-6, 6), rng.normal(size=n)
         a[np.arange(n) >= (n + 1) // 2 + 1, -1] = 0.0
         regular, lu, pivot = factored(a)
         x = b.copy()
@@ -233,18 +238,18 @@ def test_lu_rejects_singular_matrices_and_nan():
 
 
 @pytest.mark.parametrize("n", range(1, 9))
-def test_cholesky_factors_and_solves(n):
+def test_cholesky_factors_and_solves(n, rng):
     """L L^T = M; the upper triangle is not read."""
     for _ in range(40):
-        L = np.tril(RNG.normal(size=(n, n)))
-        np.fill_diagonal(L, RNG.uniform(0.5, 2.0, n))
+        L = np.tril(rng.normal(size=(n, n)))
+        np.fill_diagonal(L, rng.uniform(0.5, 2.0, n))
         M = L @ L.T
         a = np.where(np.triu(np.ones((n, n)), 1) > 0, np.nan, M)
         assert kernel().cholesky(n, a)
         found = np.tril(a)
         np.fill_diagonal(found, 1.0 / np.diag(a))
         assert np.abs(found @ found.T - M).max() <= rounding(n, L, L)
-        b = RNG.normal(size=n)
+        b = rng.normal(size=n)
         x, y = b.copy(), b.copy()
         kernel().forward(n, a, x)
         kernel().backward(n, a, y)
@@ -258,11 +263,11 @@ def test_cholesky_rejects_matrices_that_are_not_positive_definite():
     assert not kernel().cholesky(2, np.array([[0.0, 0.0], [0.0, 1.0]]))
 
 
-def of_rank(m, n, r):
+def of_rank(rng, m, n, r):
     """Return a random matrix with r singular values between 0.1 and 10."""
-    u, v = (np.linalg.qr(RNG.normal(size=(k, k)))[0] for k in (m, n))
+    u, v = (np.linalg.qr(rng.normal(size=(k, k)))[0] for k in (m, n))
     s = np.zeros((m, n))
-    s[range(r), range(r)] = 10.0 ** RNG.uniform(-1, 1, r)
+    s[range(r), range(r)] = 10.0 ** rng.uniform(-1, 1, r)
     return u @ s @ v
 
 
@@ -270,18 +275,18 @@ SHAPES = [(1, 1), (2, 2), (3, 5), (5, 3), (7, 2), (2, 7), (6, 6), (9, 8)]
 
 
 @pytest.mark.parametrize(("m", "n"), SHAPES)
-def test_least_squares_solution_of_least_norm_equals_that_of_numpy(m, n):
+def test_least_squares_solution_of_least_norm_equals_that_of_numpy(m, n, rng):
     """The matrices have every rank; right sides are in their range or not."""
     for r in range(min(m, n) + 1):
         for _ in range(8):
-            a, b, x = of_rank(m, n, r), RNG.normal(size=m), np.full(n, np.nan)
+            a, b, x = of_rank(rng, m, n, r), rng.normal(size=m), np.full(n, np.nan)
             kernel().least_squares(m, n, a, b, 1e-12, x)
             np.testing.assert_allclose(x, np.linalg.lstsq(a, b, rcond=1e-12)[0], atol=1e-12)
 
 
-def test_singular_values_below_rcond_are_taken_as_zero():
-    u, v = (np.linalg.qr(RNG.normal(size=(3, 3)))[0] for _ in range(2))
-    a, b = u @ np.diag([1.0, 1e-3, 1e-7]) @ v, RNG.normal(size=3)
+def test_singular_values_below_rcond_are_taken_as_zero(rng):
+    u, v = (np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(2))
+    a, b = u @ np.diag([1.0, 1e-3, 1e-7]) @ v, rng.normal(size=3)
     for rcond in (1e-9, 1e-5, 1e-2):
         x = np.zeros(3)
         kernel().least_squares(3, 3, a, b, rcond, x)
@@ -290,15 +295,15 @@ def test_singular_values_below_rcond_are_taken_as_zero():
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 5, 8, 13])
-def test_eigenvalues_and_vectors_of_symmetric_matrices_equal_those_of_numpy(n):
+def test_eigenvalues_and_vectors_of_symmetric_matrices_equal_those_of_numpy(n, rng):
     """A z = w z with orthonormal z and ascending w, also for multiple and graded eigenvalues w."""
     for kind in range(20):
-        a = RNG.normal(size=(n, n))
+        a = rng.normal(size=(n, n))
         a = a + a.T
         if kind % 4 == 1:
             a = np.outer(a[0], a[0])  # Zero is a multiple eigenvalue.
         if kind % 4 == 2:
-            scale = 10.0 ** RNG.uniform(-6, 0, n)
+            scale = 10.0 ** rng.uniform(-6, 0, n)
             a = scale[:, None] * a * scale
         if kind % 4 == 3:
             a = np.diag(np.diag(a))
@@ -313,16 +318,16 @@ def test_eigenvalues_and_vectors_of_symmetric_matrices_equal_those_of_numpy(n):
 
 
 @pytest.mark.parametrize(("r", "n"), [(0, 1), (0, 4), (1, 2), (2, 3), (2, 7), (6, 7), (3, 9)])
-def test_null_space_is_an_orthonormal_basis(r, n):
+def test_null_space_is_an_orthonormal_basis(r, n, rng):
     for _ in range(20):
-        rows, z = of_rank(r, n, r) if r else np.zeros((0, n)), np.zeros((n, n - r))
+        rows, z = of_rank(rng, r, n, r) if r else np.zeros((0, n)), np.zeros((n, n - r))
         kernel().null_space(r, n, rows, z)
         assert np.abs(z.T @ z - np.eye(n - r)).max() <= rounding(n)
         assert np.abs(rows @ z).max(initial=0.0) <= rounding(n, rows)
 
 
-def test_sums_and_products_of_vectors_equal_those_of_numpy():
-    a, b = RNG.normal(size=5), np.full(5, np.nan)
+def test_sums_and_products_of_vectors_equal_those_of_numpy(rng):
+    a, b = rng.normal(size=5), np.full(5, np.nan)
     kernel().copy(4, a, b)
     np.testing.assert_array_equal(b[:4], a[:4])
     assert math.isnan(b[4])

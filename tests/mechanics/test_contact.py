@@ -7,7 +7,11 @@ from hypothesis import strategies as st
 
 from prbm.mechanics import contact
 
-RNG = np.random.default_rng(0)
+
+@pytest.fixture
+def rng():
+    """Return random numbers that do not depend on the order of the tests."""
+    return np.random.default_rng(0)
 
 
 def energy_change(W, u, P):
@@ -32,17 +36,17 @@ def test_gap_rate_after_a_single_impact_is_restitution_times_closing_rate(restit
     )
 
 
-def test_simultaneous_impacts_satisfy_complementarity_and_do_not_gain_energy():
+def test_simultaneous_impacts_satisfy_complementarity_and_do_not_gain_energy(rng):
     """Each stop has P >= 0, s = u+ + eps u- >= 0 and P s = 0: impulse P, gap rates u- and u+."""
     for _ in range(2000):
-        k = int(RNG.integers(2, 5))
-        W = random_mobility(RNG, k, int(RNG.integers(1, k + 1)))
-        u = W @ RNG.normal(size=k)  # In the range of W, as for every motion.
+        k = int(rng.integers(2, 5))
+        W = random_mobility(rng, k, int(rng.integers(1, k + 1)))
+        u = W @ rng.normal(size=k)  # In the range of W, as for every motion.
         closing = np.minimum(u, 0.0) < 0
         u, W = u[closing], W[np.ix_(closing, closing)]
         if not len(u):
             continue
-        eps = RNG.uniform(0, 1, len(u))
+        eps = rng.uniform(0, 1, len(u))
         P = contact.newton(W, u, eps)
         slack = u + W @ P + eps * u
         size = np.abs(u).max()
@@ -52,11 +56,11 @@ def test_simultaneous_impacts_satisfy_complementarity_and_do_not_gain_energy():
         assert energy_change(W, u, P) <= 1e-9 * size * max(1.0, P.max())
 
 
-def test_simultaneous_impacts_do_not_depend_on_the_order_of_the_stops():
+def test_simultaneous_impacts_do_not_depend_on_the_order_of_the_stops(rng):
     """Exchanging the stops exchanges the impulses."""
     for _ in range(300):
-        W = random_mobility(RNG, 2, 2)
-        u, eps = -RNG.uniform(0.1, 1, 2), RNG.uniform(0, 1, 2)
+        W = random_mobility(rng, 2, 2)
+        u, eps = -rng.uniform(0.1, 1, 2), rng.uniform(0, 1, 2)
         swap = np.array([1, 0])
         P = contact.newton(W, u, eps)
         Q = contact.newton(W[np.ix_(swap, swap)], u[swap], eps[swap])
@@ -82,13 +86,13 @@ def newton_with_coulomb(W, u, mu, eps):
     return np.linalg.solve(W, np.array([-(1 + eps) * u[0], -u[1]]))  # Sticking.
 
 
-def test_stronge_impact_does_not_gain_energy_where_newton_with_coulomb_does():
+def test_stronge_impact_does_not_gain_energy_where_newton_with_coulomb_does(rng):
     """Random search over mobilities and directions; some of them are cases of Kane's paradox."""
     worst_ours, worst_newton, coulomb = 0.0, 0.0, 0
     for _ in range(20000):
-        W = random_mobility(RNG, 2, 2)
-        u = np.array([-RNG.uniform(0, 1), RNG.normal()]) * np.sqrt(np.diag(W))
-        mu, eps = RNG.uniform(0, 2), RNG.uniform(0, 1)
+        W = random_mobility(rng, 2, 2)
+        u = np.array([-rng.uniform(0, 1), rng.normal()]) * np.sqrt(np.diag(W))
+        mu, eps = rng.uniform(0, 2), rng.uniform(0, 1)
         before = u @ np.linalg.solve(W, u) / 2
         P = np.array(contact.stronge(W, u, mu, eps))
         after = u + W @ P
@@ -104,12 +108,12 @@ def test_stronge_impact_does_not_gain_energy_where_newton_with_coulomb_does():
 
 
 @pytest.mark.slow
-def test_work_of_restitution_is_restitution_squared_times_work_of_compression():
+def test_work_of_restitution_is_restitution_squared_times_work_of_compression(rng):
     """The works are integrated over small increments of the normal impulse (Stronge's law)."""
     for _ in range(8):
-        W = random_mobility(RNG, 2, 5)
-        u = np.array([-1.0, RNG.normal()]) * np.sqrt(np.diag(W))
-        mu, eps = RNG.uniform(0, 1), RNG.uniform(0.2, 1)
+        W = random_mobility(rng, 2, 5)
+        u = np.array([-1.0, rng.normal()]) * np.sqrt(np.diag(W))
+        mu, eps = rng.uniform(0, 1), rng.uniform(0.2, 1)
         P = contact.stronge(W, u, mu, eps)
         N = 20_000
         dp, v, compress, restore = P[0] / N, u.copy(), 0.0, 0.0
@@ -156,18 +160,18 @@ def test_newton_and_stronge_agree_if_sliding_does_not_reverse():
 
 
 @pytest.mark.slow
-def test_simultaneous_impacts_with_friction_are_symmetric_and_do_not_gain_energy():
+def test_simultaneous_impacts_with_friction_are_symmetric_and_do_not_gain_energy(rng):
     """Impulses are in the friction cone, gaps do not close; swapped stops swap their impulses."""
     for _ in range(150):
-        W = random_mobility(RNG, 4, 6)
-        u = np.concatenate([-RNG.uniform(0.1, 1, 2), RNG.normal(size=2)])
+        W = random_mobility(rng, 4, 6)
+        u = np.concatenate([-rng.uniform(0.1, 1, 2), rng.normal(size=2)])
         u *= np.sqrt(np.diag(W))
-        mu, eps = RNG.uniform(0.05, 0.6, 2), RNG.uniform(0, 1, 2)
+        mu, eps = rng.uniform(0.05, 0.6, 2), rng.uniform(0, 1, 2)
         P = contact.several(W, u, mu, eps)
         after = u + W @ P
         assert energy_change(W, u, P) <= 1e-10 * np.abs(P @ u)
         assert (after[:2] >= -1e-7 * np.abs(u).max()).all()
-        assert (np.abs(P[2:]) <= mu * P[:2] * (1 + 1e-9) + 1e-14).all()
+        assert (np.abs(P[2:]) <= mu * P[:2] + 1e-9 * np.abs(P).max()).all()
         swap = np.array([1, 0, 3, 2])
         Q = contact.several(W[np.ix_(swap, swap)], u[swap], mu[::-1], eps[::-1])
         np.testing.assert_allclose(P, Q[swap], rtol=1e-5, atol=1e-7 * np.abs(P).max())

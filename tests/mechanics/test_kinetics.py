@@ -10,10 +10,14 @@ from prbm.mechanics.assembly import assemble
 from prbm.mechanics.kinetics import inertia
 from support import mechanism
 
-RNG = np.random.default_rng(3)
+
+@pytest.fixture
+def rng():
+    """Return random numbers that do not depend on the order of the tests."""
+    return np.random.default_rng(3)
 
 
-def test_accelerations_equal_those_of_lagrange_equations():
+def test_accelerations_equal_those_of_lagrange_equations(rng):
     """The mechanism is a 2R cantilever with a body on a pin at its tip: three angles, no loop."""
     sim = Simulation(cantilever(damping_beta=0.0))
     system = sim.system
@@ -51,7 +55,7 @@ def test_accelerations_equal_those_of_lagrange_equations():
     matrix, right = sp.linear_eq_to_matrix(equations, A)
     evaluate = sp.lambdify([*Q, *W], (matrix, right))
     for _ in range(20):
-        angles, rates = RNG.normal(size=3), 20 * RNG.normal(size=3)
+        angles, rates = rng.normal(size=3), 20 * rng.normal(size=3)
         M, f = evaluate(*angles, *rates)
         expected = np.linalg.solve(np.array(M, float), np.array(f, float).ravel())
         found, _, mass, *_ = sim.equations.evaluate(sim.time, angles, rates)
@@ -59,12 +63,12 @@ def test_accelerations_equal_those_of_lagrange_equations():
         np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-8)
 
 
-def test_power_of_centrifugal_terms_is_the_change_of_kinetic_energy_at_constant_rates():
+def test_power_of_centrifugal_terms_is_the_change_of_kinetic_energy_at_constant_rates(rng):
     """With the mass matrix M, its rate M' and rates v, v.(M' v)/2 = v.C v^2."""
     system = assemble(mechanism("PRBDM2R"), mechanism("PRBDM2R").values())
     J, h = np.diag(system.J), 1e-6
     for _ in range(20):
-        q, v = RNG.normal(size=system.n), RNG.normal(size=system.n)
+        q, v = rng.normal(size=system.n), rng.normal(size=system.n)
         M1, M2 = (inertia(system.H, J, np.exp(1j * (q + s * h * v)))[0] for s in (-1, 1))
         _, C = inertia(system.H, J, np.exp(1j * q))
         power = v @ (M2 - M1) @ v / (4 * h)
@@ -72,7 +76,7 @@ def test_power_of_centrifugal_terms_is_the_change_of_kinetic_energy_at_constant_
         np.testing.assert_allclose(C, -C.T, atol=1e-18)
 
 
-def test_combined_equations_equal_the_separate_functions():
+def test_combined_equations_equal_the_separate_functions(rng):
     """The engine evaluates inertia, jacobian and convective in one product with e."""
     from prbm.mechanics import constraints, forces
     from prbm.mechanics.system import convective, jacobian
@@ -80,8 +84,8 @@ def test_combined_equations_equal_the_separate_functions():
     sim = Simulation(mechanism("PRBDM2R"), {"damping.zeta": 0.02})
     system, equations = sim.system, sim.equations
     for _ in range(10):
-        q = system.q0 + 0.2 * RNG.normal(size=system.n)
-        v = RNG.normal(size=system.n)
+        q = system.q0 + 0.2 * rng.normal(size=system.n)
+        v = rng.normal(size=system.n)
         e = np.exp(1j * q)
         M, C = inertia(system.H, np.diag(system.J), e)
         rows = jacobian(system.loops, e)
@@ -95,13 +99,13 @@ def test_combined_equations_equal_the_separate_functions():
         np.testing.assert_allclose(lam, -x[system.n :], rtol=1e-9, atol=1e-12)
 
 
-def test_constraint_rows_equal_central_differences_of_the_constraints():
+def test_constraint_rows_equal_central_differences_of_the_constraints(rng):
     """The convective term equals a central difference of these rows."""
     from prbm.mechanics.system import convective, jacobian, values
 
     system = assemble(mechanism("PRBDM2R"), mechanism("PRBDM2R").values())
     B, h = np.vstack([system.loops, system.gaps, system.slides, system.rubs]), 6e-6
-    q, v = RNG.normal(size=system.n), RNG.normal(size=system.n)
+    q, v = rng.normal(size=system.n), rng.normal(size=system.n)
     zero = np.zeros(len(B))
 
     def value(angles):
