@@ -20,8 +20,7 @@ from PIL import Image
 
 from prbm.base.errors import ParameterError
 from prbm.commands.command_line import main
-from prbm.drawing.shapes import curve
-from prbm.drawing.style import CURVED_PIVOTS_MAX
+from prbm.drawing.shapes import CURVED_PIVOTS_MAX, curve
 from prbm.mechanism.description import Mechanism
 from prbm.plots import animation
 from prbm.plots.animation import AnimationError, animate, show

@@ -17,8 +17,8 @@ from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import value
 from .motion import angles, closed, stretched
-from .shapes import Shapes, corners, curve
-from .style import CURVED_PIVOTS_MAX, area, own_style, png
+from .shapes import Shapes
+from .style import area, own_style, png
 
 STEEL, BODY, WALL, GHOST = "#1f4e79", "#9dc3e6", "#595959", "#d0d0d0"
 PIXELS = 256
@@ -169,10 +169,8 @@ def _flexures(shapes: Shapes, E: Complex, *, faint: bool = False) -> Iterator[Ic
             fill, edge = (None, GHOST) if faint else (BODY, STEEL)
             yield Area([line.edge(E)], fill, edge, 0.0 if faint else 1.0)
             continue
-        z = corners(line.outline, E)
-        z = z if len(z) - 2 > CURVED_PIVOTS_MAX else curve(z, line.guided)
         width = 1.0 if faint else 1.5 if thin else 2.2
-        yield Line(z, GHOST if faint else STEEL, width, 0.0 if faint else 3.0)
+        yield Line(line.centre_line(E), GHOST if faint else STEEL, width, 0.0 if faint else 3.0)
 
 
 # --- PNG ----------------------------------------------------------------------------------------

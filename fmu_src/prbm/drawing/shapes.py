@@ -16,7 +16,8 @@ from ..mechanism.expressions import affine
 from ..mechanism.flexure import BEAM, LEAF, PIN
 from ..mechanism.parts import GROUND, Flexure, Point, Stop, body_of, value
 
-CURVE_POINTS = 40  # Points of the drawn curve of a flexure.
+CURVE_POINTS = 40  # Points of the drawn curve of a flexure with pivots.
+CURVED_PIVOTS_MAX = 9  # More pivots are joined by straight lines, not by a curve.
 # Shares of the size of the mechanism:
 BODY_THICKNESS_MIN = 0.04  # Drawn thickness of a body without height.
 WALL_LENGTH, GROUND_LENGTH = 0.36, 0.16
@@ -186,6 +187,16 @@ class FlexureLine:
         start, end = self.flexure.ends
         return start != PIN, end != PIN
 
+    @property
+    def curved(self) -> bool:
+        """Whether the flexure is drawn as a smooth curve: it is a beam or has few pivots."""
+        return not self.jointed or len(self.outline.c) - 2 <= CURVED_PIVOTS_MAX
+
+    def centre_line(self, E: Complex) -> Complex:
+        """Return the drawn centre line in a shape [m]."""
+        z = corners(self.outline, E)
+        return curve(z, self.guided) if self.jointed and self.curved else z
+
     def pins(self, E: Complex) -> Complex:
         """Return the positions of the pinned ends in a shape [m]."""
         z = corners(self.outline, E)
@@ -200,9 +211,9 @@ class FlexureLine:
         return np.concatenate([z - left, (z + left)[::-1]])
 
     def drawn(self, E: Complex) -> Complex:
-        """Return the line in a shape or, of a shaped flexure, its closed edge [m]."""
+        """Return the centre line in a shape or, of a shaped flexure, its closed edge [m]."""
         if not self.shaped:
-            return corners(self.outline, E)
+            return self.centre_line(E)
         edge = self.edge(E)
         return np.append(edge, edge[0])
 

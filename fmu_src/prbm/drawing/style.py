@@ -18,7 +18,6 @@ from ..mechanics.arrays import Complex
 LINK, FLEXURE, BODY, WALL = "#1f4e79", "#8fb4d8", "#9dc3e6", "#595959"
 STRAIGHT, GRID, PROBE = "#b4bcc6", "#eeeeee", "#cc79a7"
 PAST, FUTURE, IMPACT, REST = "#1f4e79", "#c8ced6", "#d55e00", "#009e73"
-CURVED_PIVOTS_MAX = 9  # More pivots are joined by straight lines, not by a curve.
 
 own_style = partial(matplotlib.style.context, "default")  # Independent of the user's matplotlibrc.
 

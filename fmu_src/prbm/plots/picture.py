@@ -15,10 +15,9 @@ from matplotlib.patheffects import withStroke
 from ..base.errors import ParameterError, PrbmError
 from ..base.tolerances import RELEASE_PENETRATION_ATOL
 from ..base.unit_text import frequency_unit, length_unit
-from ..drawing.shapes import Shapes, corners, curve
+from ..drawing.shapes import Shapes, corners
 from ..drawing.style import (
     BODY,
-    CURVED_PIVOTS_MAX,
     FLEXURE,
     IMPACT,
     LINK,
@@ -274,15 +273,14 @@ class Drawing:
     def shape(self, E: Complex, pivots: bool = False) -> None:
         """Draw flexures, bodies and pins."""
         for line in self.shapes.flexures:
-            z = corners(line.outline, E)
-            many = len(z) - 2 > CURVED_PIVOTS_MAX
             if line.shaped:
                 self.patch([line.edge(E)], FLEXURE, 2.0)
                 continue
-            self.line(z if many else curve(z, line.guided), FLEXURE, 3.6, 2.0)
+            z = corners(line.outline, E)
+            self.line(line.centre_line(E), FLEXURE, 3.6, 2.0)
             self.line(z, LINK, 0.9, 2.5)
             if pivots and line.jointed:
-                self.pivots(z[1:-1], 1.5 if many else 3.4, 4.0)
+                self.pivots(z[1:-1], 3.4 if line.curved else 1.5, 4.0)
         for name in self.shapes.bodies:
             self.patch(self.shapes.areas(name, E), BODY, 3.0)
         self.pivots(self.shapes.pins(E), 6.0, 5.0, 1.5)
@@ -318,11 +316,8 @@ class Drawing:
         """Draw the released shape in dashed lines, and the gaps of its hit points to the walls."""
         shapes, system = self.shapes, self.shapes.system
         for line in shapes.flexures:
-            z = corners(line.outline, E)
-            many = len(z) - 2 > CURVED_PIVOTS_MAX
-            if self.apart(z, corners(line.outline, shapes.straight)):
-                smooth = line.drawn(E) if many else curve(z, line.guided)
-                self.line(smooth, START, 1.0, 3.6, "--")
+            if self.apart(corners(line.outline, E), corners(line.outline, shapes.straight)):
+                self.line(line.drawn(E), START, 1.0, 3.6, "--")
         for name in shapes.bodies:
             z = shapes.body(name, E)
             if self.apart(z, shapes.body(name, shapes.straight)):

@@ -19,10 +19,9 @@ from numpy.typing import NDArray
 
 from ..analysis.stress_field import StressField
 from ..base.unit_text import length_unit, time_unit
-from ..drawing.shapes import Shapes, corners, curve
+from ..drawing.shapes import Shapes, corners
 from ..drawing.style import (
     BODY,
-    CURVED_PIVOTS_MAX,
     FLEXURE,
     FUTURE,
     GRID,
@@ -165,17 +164,16 @@ class Scene:
         self.coloured: dict[str, LineCollection] = {}
         self._set_stress()
         for line in self.shapes.flexures:
-            pivots, name = len(line.outline.c) - 2, line.flexure.name
+            name = line.flexure.name
             if line.shaped:
                 self.edges[name] = self._moving_area(line.edge(self.shapes.straight), FLEXURE, 2.0)
                 continue
-            curved = pivots <= CURVED_PIVOTS_MAX or not line.jointed
-            if curved and name not in self.coloured:
+            if line.curved and name not in self.coloured:
                 self.curves[name] = self._moving_line(FLEXURE, 5.0, zorder=2.0)
             self.links[name] = self._moving_line(
                 LINK, 1.3, zorder=4.0, marker="o" if line.jointed else "", markerfacecolor="white",
                 markevery=slice(1, -1),
-                markersize=4.2 if pivots <= CURVED_PIVOTS_MAX else 2.0,
+                markersize=4.2 if line.curved else 2.0,
             )  # fmt: skip
 
     def _set_stress(self) -> None:
@@ -352,7 +350,7 @@ class Scene:
                 continue
             self._move(self.links[name], z)
             if name in self.curves:
-                self._move(self.curves[name], curve(z, line.guided) if line.jointed else z)
+                self._move(self.curves[name], line.centre_line(E))
         self._colour(t, E)
         for name, patch in self.bodies.items():
             patch.set_path(area(self.shapes.areas(name, E), self.factor))

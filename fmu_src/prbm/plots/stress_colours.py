@@ -7,8 +7,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from ..drawing.shapes import FlexureLine, Shapes, corners, curve
-from ..drawing.style import CURVED_PIVOTS_MAX
+from ..drawing.shapes import FlexureLine, Shapes
 from ..mechanics.arrays import Complex, Real
 
 COLOURS_OF_STRESS = "YlOrRd"
@@ -74,9 +73,7 @@ def drawn_line(line: FlexureLine, E: Complex, forwards: bool) -> Complex:
     forwards : bool
         Whether the near end is the start.
     """
-    z = corners(line.outline, E)
-    if line.jointed and len(z) - 2 <= CURVED_PIVOTS_MAX:
-        z = curve(z, line.guided)
+    z = line.centre_line(E)
     return z if forwards or not line.jointed else z[::-1]
 
 
