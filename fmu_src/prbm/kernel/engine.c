@@ -16,7 +16,7 @@ enum { CALL_STEPS = 50, CALL_COORDINATES = 30 }; /* steps of a call, up to so ma
 struct Engine {
     Simulation *simulation;
     int n;            /* number of coordinates */
-    double *record;   /* (room, ENGINE_IMPACT + 3 n) */
+    double *record;   /* (room, prbm_impact_size) */
     int count, room;  /* numbers of impacts */
     bool incomplete;  /* an impact could not be recorded */
     int effort;       /* integration steps of an advance that is unfinished, 0: none is */
@@ -65,8 +65,14 @@ EXPORTED void prbm_close(Engine *engine) {
 
 /* --- the record of impacts -------------------------------------------------------------------- */
 
+enum { IMPACT_NUMBERS = 12 }; /* before the coordinates and rates */
+
+EXPORTED int prbm_impact_size(const Engine *engine) {
+    return IMPACT_NUMBERS + 3 * engine->n;
+}
+
 static size_t impact_size(const Engine *engine) {
-    return ENGINE_IMPACT + 3 * (size_t)engine->n;
+    return (size_t)prbm_impact_size(engine);
 }
 
 /* Provide memory for one more impact. */
@@ -97,16 +103,16 @@ static void record_impact(void *listener, const Impact *impact) {
     }
     int n = engine->n;
     double *to = engine->record + impact_size(engine) * (size_t)engine->count;
-    const double numbers[ENGINE_IMPACT] = {
+    const double numbers[IMPACT_NUMBERS] = {
         impact->index,         impact->count,   impact->time,
         impact->approach_speed, impact->rebound_speed, impact->impulse,
         impact->energy_lost,   impact->modal_restitution, impact->impulse_sum,
         impact->peak_force,    impact->indentation, impact->contact_duration,
     };
     memcpy(to, numbers, sizeof numbers);
-    copy(n, impact->q, to + ENGINE_IMPACT);
-    copy(n, impact->before, to + ENGINE_IMPACT + n);
-    copy(n, impact->after, to + ENGINE_IMPACT + 2 * n);
+    copy(n, impact->q, to + IMPACT_NUMBERS);
+    copy(n, impact->before, to + IMPACT_NUMBERS + n);
+    copy(n, impact->after, to + IMPACT_NUMBERS + 2 * n);
     engine->count++;
 }
 

@@ -71,11 +71,13 @@ EXPORTED int prbm_modes(Engine *engine, double *q, double *frequencies, double *
 
 /* Record the impacts from now on, or no longer. */
 EXPORTED void prbm_record(Engine *engine, bool record);
-/* Move the recorded impacts out, ENGINE_IMPACT + 3 n numbers each: index of the stop, count, time,
- * approach speed, rebound speed, impulse, energy lost, modal restitution, sum of impulses, angles,
- * rates before, rates after. */
+/* The count of numbers of a recorded impact; the last 3 n are its coordinates, the rates before and
+ * the rates after it. */
+EXPORTED int prbm_impact_size(const Engine *engine);
+/* Move the recorded impacts out, prbm_impact_size numbers each: index of the stop, count, time,
+ * approach speed, rebound speed, impulse, energy lost, modal restitution, sum of impulses, peak
+ * force, indentation, contact duration, coordinates, rates before, rates after. */
 EXPORTED void prbm_impacts(Engine *engine, double *numbers);
-enum { ENGINE_IMPACT = 12 };
 
 /* The complete state as numbers, as simulation_save writes it. */
 EXPORTED size_t prbm_saved_count(const Engine *engine);

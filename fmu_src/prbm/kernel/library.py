@@ -45,6 +45,7 @@ FUNCTIONS = {
     "prbm_mode_count": (_int, _address),
     "prbm_modes": (_int, _address, _address, _address, _address, _bytes),
     "prbm_record": (None, _address, _bool),
+    "prbm_impact_size": (_int, _address),
     "prbm_impacts": (None, _address, _address),
     "prbm_saved_count": (_size, _address),
     "prbm_save": (None, _address, _address),

@@ -35,7 +35,6 @@ from .library import MESSAGE_LENGTH, library
 
 Slots = NDArray[np.intc]
 UNFINISHED = -2  # Result of a call that is to be repeated, ENGINE_UNFINISHED in C.
-IMPACT = 12  # Numbers of a recorded impact before its states, ENGINE_IMPACT in C.
 MOTION_GROUPS = ("bodies", "probes")
 OUTPUT_GROUPS = (
     *MOTION_GROUPS, "stops", "base", "energies", "latched", "compliant", "links", "stretches",
@@ -262,11 +261,11 @@ class KernelSimulation:
         if count == 0 or self._record is None:
             return
         n = self._size
-        numbers = np.empty((count, IMPACT + 3 * n))
+        numbers = np.empty((count, self._library.prbm_impact_size(self._address)))
         self._library.prbm_impacts(self._address, numbers.ctypes.data)
         for row in numbers:
-            q, before, after = row[IMPACT:].reshape(3, n)
-            stop, hits, *numbers = row[:IMPACT].tolist()
+            q, before, after = row[-3 * n :].reshape(3, n)
+            stop, hits, *numbers = row[: -3 * n].tolist()
             latched, time = Latched(int(hits), *numbers), numbers[0]
             name = self.mechanism.stops[int(stop)].name
             self._record.append(Impact(name, time, q, before, after, latched.impulse, latched))

@@ -4,7 +4,6 @@
 // function that fails throws a KernelError with the message of the kernel.
 
 const MESSAGE_LENGTH = 640; // Bytes of an error message.
-const IMPACT_NUMBERS = 9; // Numbers of a recorded impact before its coordinates and rates.
 const NUMBER = 8; // Bytes of a double.
 const SLOT = 4; // Bytes of an int.
 const UNFINISHED = -2; // ENGINE_UNFINISHED: prbm_advance is to be called again.
@@ -119,15 +118,28 @@ class Simulation {
 
   takeImpacts(count) {
     const n = this.size;
-    const length = IMPACT_NUMBERS + 3 * n;
+    const length = this.call.prbm_impact_size(this.address);
     const address = this.kernel.allocate(NUMBER * count * length);
     this.call.prbm_impacts(this.address, address);
     const impacts = [];
     for (let i = 0; i < count; i++) {
       const row = this.kernel.numbers(address + NUMBER * i * length, length);
-      const [stop, number, time, approach, rebound, impulse, lost, modal] = row;
-      const q = row.slice(IMPACT_NUMBERS, IMPACT_NUMBERS + n);
-      impacts.push({ stop, number, time, approach, rebound, impulse, lost, modal, q });
+      const [stop, number, time, approach, rebound, impulse, lost, modal, , ...contact] = row;
+      const [peakForce, indentation, duration] = contact;
+      impacts.push({
+        stop,
+        number,
+        time,
+        approach,
+        rebound,
+        impulse,
+        lost,
+        modal,
+        peakForce,
+        indentation,
+        duration,
+        q: row.slice(length - 3 * n, length - 2 * n),
+      });
     }
     this.call.free(address);
     return impacts;

@@ -54,7 +54,9 @@ function plotList(description, column) {
       note:
         "Largest stress of each flexure at each time." +
         (stresses.length > CURVES_MAX ? ` First ${CURVES_MAX} of ${stresses.length}.` : "") +
-        (stops.length > 0 ? " After a rigid impact it depends on the flexure model: compare several." : ""),
+        (stops.length > 0
+          ? " After a rigid impact it depends on the flexure model: compare several."
+          : ""),
     });
   }
   return plots;

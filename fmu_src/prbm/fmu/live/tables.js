@@ -10,6 +10,11 @@ const COLUMNS = [
   ["Energy lost", "J", (impact) => impact.lost],
   ["Modal restitution", "1", (impact) => impact.modal],
 ];
+const COMPLIANT_COLUMNS = [
+  ["Peak force", "N", (impact) => impact.peakForce],
+  ["Indentation", "m", (impact) => impact.indentation],
+  ["Duration", "s", (impact) => impact.duration],
+];
 const ROWS_MAX = 200; // Rows of the table; the CSV file has all outputs.
 
 // Return what the headline says about a run, as pairs of a term and a text.
@@ -86,7 +91,11 @@ function showHeadline(parent, pairs) {
 // Fill the table of impacts.  seek(time) is called for the time of a row.
 function showImpacts(table, description, run, seek) {
   const several = description.stops.length > 1;
-  const columns = COLUMNS.filter(([title]) => several || title !== "Stop");
+  const compliant = run.impacts.some((impact) => impact.peakForce > 0);
+  const columns = [
+    ...COLUMNS.filter(([title]) => several || title !== "Stop"),
+    ...(compliant ? COMPLIANT_COLUMNS : []),
+  ];
   const rows = run.impacts.slice(0, ROWS_MAX).map((impact) => ({
     ...impact,
     name: words(description.stops[impact.stop].name),
