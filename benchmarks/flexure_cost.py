@@ -30,11 +30,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fmu_src"))
 
 from flexure_models import guide, guide_figures, limit_of_elements
-
 from prbm.kernel.simulation import KernelSimulation
 from prbm.references.finite_elements import FiniteElements
 

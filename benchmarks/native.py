@@ -38,10 +38,9 @@ from scipy.integrate import solve_ivp
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fmu_src"))
 
-from speed import octave_cost
-
 from c_importer import Job, Result, compile_c, execute, kernel_library, native, run
 from prbm.mechanics.assembly import assemble
+from speed import octave_cost
 from support import ScalarGuide, mechanism
 
 Real = NDArray[np.float64]

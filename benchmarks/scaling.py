@@ -28,9 +28,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fmu_src"))
 
-from native import POINTS, RIGHT_HAND_SIDE, cost, inclusive
-
 from c_importer import Job, execute, kernel_library, unpack, write
+from native import POINTS, RIGHT_HAND_SIDE, cost, inclusive
 from prbm.fmu import native_fmu
 from prbm.fmu.reference_results import steps
 from prbm.kernel.compiler import FLAGS

@@ -1,19 +1,16 @@
 """Maps of compliant stops: limits of stiff contacts, one coordinate, energy, full simulation."""
 
 import shlex
-import sys
 from dataclasses import replace
 
 import pytest
 
+import compliant_hits as hits
 from prbm.analysis.impact_map import algebraic, compliant, with_flexures
 from prbm.base.errors import ParameterError
 from prbm.commands import command_line as cli
 from prbm.mechanism.parts import COMPLIANT
-from support import ROOT, mechanism
-
-sys.path.insert(0, str(ROOT / "benchmarks"))
-import compliant_hits as hits
+from support import mechanism
 
 GUIDE = with_flexures(mechanism("PRBDM2R"), "2R", axial=True)
 FREE = {"gravity.x": 0.0, "damping.beta": 0.0}

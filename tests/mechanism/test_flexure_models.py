@@ -1,11 +1,8 @@
 """Flexure models, compared with beam theory and finite elements, and the page of the results."""
 
-import importlib.util
 import math
 import re
-import sys
 from dataclasses import replace
-from functools import cache
 from itertools import chain
 
 import numpy as np
@@ -13,6 +10,7 @@ import pytest
 from scipy.integrate import solve_bvp
 
 import finite_elements
+import flexure_models as models
 from prbm.base.errors import EquilibriumError, ParameterError
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.forces import elastic_energy
@@ -24,17 +22,6 @@ from prbm.references.finite_elements import FiniteElements
 from support import ROOT, mechanism
 
 PAGE = (ROOT / "docs" / "flexure-models.md").read_text(encoding="utf-8")
-
-
-@cache
-def script():
-    """Return ``benchmarks/flexure_models.py`` as a module."""
-    path = ROOT / "benchmarks" / "flexure_models.py"
-    spec = importlib.util.spec_from_file_location("flexure_models", path)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["flexure_models"] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 # --- beam theory --------------------------------------------------------------------------------
@@ -78,7 +65,6 @@ FORCE_ERRORS = {  # % of the displacement
 @pytest.mark.parametrize("model", FORCE_ERRORS)
 def test_tip_displacements_under_an_end_force_are_those_of_the_elastica(model):
     """The limit is the error of the model; the opposite force gives the mirrored shape."""
-    models = script()
     system = models.cantilever(model)
     for load in (1e-3, 0.1, 0.5, 1.0, 2.0, 4.0, 6.0, 8.0):
         tips = [models.tip_of(system, force=sign * load) for sign in (1, -1)]
@@ -94,7 +80,6 @@ SLOPES |= {"beam": 1.0, "10R": 1.0, "40R": 1.0}
 @pytest.mark.parametrize("model", SLOPES)
 def test_the_tip_slope_under_an_end_moment_is_the_sum_of_the_compliances(model):
     """Every spring carries the whole moment.  The slope of chains is exact."""
-    models = script()
     system = models.cantilever(model)
     for load in (0.1, -1.0, math.pi):
         slope = models.tip_of(system, moment=load).slope
@@ -108,7 +93,6 @@ def test_the_tip_slope_under_an_end_moment_is_the_sum_of_the_compliances(model):
 
 def test_a_chain_converges_to_the_elastica_at_second_order():
     """The observed order is 2.00 +- 0.05 under a force and under a moment."""
-    models = script()
     for kind, load, exact in (("force", 8.0, end_force), ("moment", math.pi, end_moment)):
         errors = [
             models.displacement_error(models.tip_of(models.cantilever(f"{n}R"), **{kind: load}),
@@ -127,7 +111,6 @@ FREQUENCY_ERRORS = {  # Largest errors of f1 and f2 [%] with tip masses (no iner
 @pytest.mark.parametrize("model", FREQUENCY_ERRORS)
 def test_frequencies_with_a_body_at_the_tip_are_those_of_the_beam(model):
     """The limit of the difference is the error of the model."""
-    models = script()
     for tip in ((0.0, 0.0), (0.3, 0.0), (1.0, 0.0), (10.0, 0.0)):
         system = models.cantilever(model, tip)
         for mode, bound in enumerate(FREQUENCY_ERRORS[model], start=1):
@@ -140,7 +123,6 @@ def test_frequencies_with_a_body_at_the_tip_are_those_of_the_beam(model):
 @pytest.mark.parametrize("tip", [(0.0, 0.0), (1.0, 0.0), (1.0, 0.1), (0.2, 0.03)])
 @pytest.mark.parametrize("mode", [1, 2, 3])
 def test_frequencies_of_a_chain_converge_to_those_of_the_beam_at_second_order(tip, mode):
-    models = script()
     errors = [abs(models.frequency_error(models.cantilever(f"{n}R", tip), tip, mode))
               for n in (10, 20, 40, 80)]  # fmt: skip
     assert models.order((10, 20, 40, 80), errors) == pytest.approx(2.0, abs=0.1)
@@ -148,7 +130,6 @@ def test_frequencies_of_a_chain_converge_to_those_of_the_beam_at_second_order(ti
 
 def test_an_axial_force_stretches_a_flexure_by_the_elongation_of_a_bar():
     """The elongation is P L/EA: of one link of the 2R and 3R, all links of a chain, or a beam."""
-    models = script()
     EA = models.MODULUS * models.WIDTH * models.THICKNESS
     pull = 1e-4 * EA  # The logarithmic strain is linear in the force: the error is of second order.
     for model in ("2R", "3R", "10R", "beam"):
@@ -164,7 +145,6 @@ def test_an_axial_force_stretches_a_flexure_by_the_elongation_of_a_bar():
 
 def test_the_work_of_loads_is_the_change_of_elastic_energy():
     """A small increase of force and moment at a large deflection does the work P dz = dV."""
-    models = script()
     system = models.cantilever("3R")
     forces = np.array([3.0, -2.0, 0.7]) * models.EI / models.L**2 * np.array([1, 1, models.L])
 
@@ -181,9 +161,9 @@ def test_the_work_of_loads_is_the_change_of_elastic_energy():
 
 def test_gravity_and_an_equal_force_at_the_centre_of_mass_give_one_shape():
     """The frequencies about the two shapes agree, too."""
-    heavy = script().cantilever("3R", (1e4, 1e3))
+    heavy = models.cantilever("3R", (1e4, 1e3))
     m = heavy.values["tip.mass"]
-    g = 8.0 * script().EI / script().L ** 2 / m
+    g = 8.0 * models.EI / models.L**2 / m
     weighed = replace(heavy, values={**heavy.values, "gravity.y": g})
     shapes = equilibrium(weighed), equilibrium(heavy, loads={"force.y": m * g})
     np.testing.assert_allclose(
@@ -195,8 +175,8 @@ def test_gravity_and_an_equal_force_at_the_centre_of_mass_give_one_shape():
 
 def test_the_holding_force_applied_as_a_load_gives_the_held_shape():
     """The frequencies about both shapes agree."""
-    system = script().cantilever("2R")
-    held = equilibrium(system, 0.6 * script().L)
+    system = models.cantilever("2R")
+    held = equilibrium(system, 0.6 * models.L)
     loaded = equilibrium(system, loads={"force.y": held.force})
     np.testing.assert_allclose(loaded.q, held.q, atol=1e-9)
     f = modes(system, held).frequency, modes(system, loaded).frequency
@@ -204,7 +184,7 @@ def test_the_holding_force_applied_as_a_load_gives_the_held_shape():
 
 
 def test_invalid_loads_are_rejected():
-    system = script().cantilever("2R")
+    system = models.cantilever("2R")
     with pytest.raises(ParameterError, match=r"'force.z'; did you mean force"):
         equilibrium(system, loads={"force.z": 1.0})
     with pytest.raises(ParameterError, match=r"force.x = nan"):
@@ -228,7 +208,7 @@ HALF_DIGITS = (5e-3, 5e-4, 0.05, 0.05, 5e-4)
 @pytest.mark.parametrize("model", GUIDES)
 def test_rest_position_and_frequencies_of_the_steel_guide_are_those_of_other_programs(model):
     """The values agree in all digits given."""
-    found = script().guide_figures(model)[[0, 1, 2, 3, 6]]
+    found = models.guide_figures(model)[[0, 1, 2, 3, 6]]
     for x, expected, half in zip(found, GUIDES[model], HALF_DIGITS, strict=True):
         assert math.isnan(x) if expected is None else abs(x - expected) <= 1.01 * half
 
@@ -240,7 +220,6 @@ def test_a_chain_guide_converges_at_second_order(axial, ns):
 
     Bounce and pitch need more links to reach this order: their slope is 1.2 from 5 to 10 links.
     """
-    models = script()
     figures = np.array([models.guide_figures(f"{n}R", axial=axial) for n in ns])
     errors = np.abs(figures / models.richardson(list(figures)) - 1)
     for i in (0, 1, 4, 5, 6):  # rest position, f1, modes of the flexures, f1 straight
@@ -255,7 +234,6 @@ def test_the_limit_of_axially_compliant_chains_is_that_of_finite_elements():
 
     The extrapolation from 80 links has an error of 5e-5 in bounce and pitch.
     """
-    models = script()
     figures = [models.guide_figures(f"{n}R", axial=True) for n in (20, 40, 80)]
     limit, exact = models.richardson(figures)[:6], np.array(models.FE_GUIDE)
     last_digit = np.array([1e-4, 1e-4, np.nan, np.nan, 0.01, 0.01])
@@ -271,7 +249,6 @@ def test_the_limit_of_axially_compliant_chains_is_that_of_finite_elements():
 
 def test_the_finite_element_figures_of_the_page_are_reproduced():
     """The tolerance is 1e-4, because the Jacobians of the finite elements are differences."""
-    models = script()
     values = mechanism("PRBDM2R").values()
     found = finite_elements.guide(values, 64)
     exact = np.array([1e3 * found.rest.real, *found.frequency[:5]])
@@ -286,7 +263,6 @@ def test_the_finite_element_figures_of_the_page_are_reproduced():
 def test_finite_elements_of_the_figure_are_reproduced(elements):
     """The figure has their number of coordinates without constraints."""
     pytest.importorskip("exudyn", reason="finite elements need exudyn: pip install exudyn")
-    models = script()
     fe = FiniteElements(mechanism("PRBDM2R"), elements=elements)
     shape = fe.equilibrium()
     frequency = fe.modes(shape).frequency
@@ -304,18 +280,18 @@ def test_finite_elements_of_the_figure_are_reproduced(elements):
 ])  # fmt: skip
 def test_modal_restitution_is_that_of_finite_elements(model, axial, error):
     """The limit at nine hit points is the error of the model, without tuning."""
-    assert script().restitution_error(model, axial=axial) < error
+    assert models.restitution_error(model, axial=axial) < error
 
 
 def test_an_off_centre_hit_lowers_modal_restitution_only_with_axial_compliance():
     """At an offset of 4 mm and eps = 0.6 it falls from 0.596 to 0.548 with axial compliance."""
-    rigid, axial = (script().guide("2R", axial=axial) for axial in (False, True))
+    rigid, axial = (models.guide("2R", axial=axial) for axial in (False, True))
     found = []
     for guide in (rigid, axial):
         system = assemble(guide, guide.values({"gravity.x": 0.0, "stop.offset": 4e-3}))
         found.append(modal_restitution(system, equilibrium(system, 0.0), 0, 0.6))
     assert found[0] == pytest.approx(0.6, abs=5e-3)
-    assert found[1] == pytest.approx(script().FE_RESTITUTION[4][1], abs=0.004)
+    assert found[1] == pytest.approx(models.FE_RESTITUTION[4][1], abs=0.004)
 
 
 def test_axial_compliance_hardly_changes_bounce_and_pitch():
@@ -323,7 +299,6 @@ def test_axial_compliance_hardly_changes_bounce_and_pitch():
 
     Without axial compliance they are 11.3 and 12.8 % below.
     """
-    models = script()
     for axial, errors in ((True, (-0.1144, -0.1299)), (False, (-0.1127, -0.1285))):
         found = models.guide_figures("2R", axial=axial)
         ratios = found[2:4] / np.array(models.FE_GUIDE[2:4]) - 1
@@ -368,7 +343,6 @@ TABLES = (
 @pytest.mark.parametrize("name", TABLES)
 def test_the_tables_of_the_page_are_reproduced(name):
     """Numbers agree to one unit of their last digit."""
-    models = script()
     now, page = (cells(t) for t in (models.TABLES[name](), models.shown(PAGE, name)))
     assert [len(row) for row in now] == [len(row) for row in page]
     for new, old in zip(chain(*now), chain(*page), strict=True):
@@ -381,7 +355,6 @@ def test_the_tables_of_the_page_are_reproduced(name):
 
 
 def test_the_page_has_all_tables_and_figures():
-    models = script()
     assert set(models.TABLES) == set(TABLES)
     assert PAGE.count("<!-- table:") == len(models.TABLES)
     for figure in (models.FIGURE, models.COORDINATES):
@@ -397,7 +370,6 @@ def test_the_block_of_the_page_runs(capsys):
 
 @pytest.mark.slow
 def test_the_figures_are_drawn(tmp_path, monkeypatch):
-    models = script()
     monkeypatch.setattr(models, "FIGURE", tmp_path / "figures" / "models.png")
     monkeypatch.setattr(models, "CHAINS", (5, 10, 20))
     monkeypatch.setattr(models, "COORDINATES", tmp_path / "figures" / "coordinates.png")

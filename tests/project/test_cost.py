@@ -1,12 +1,11 @@
 """Computing time of a mechanism: growth with links and loops, and real time."""
 
-import importlib
-import sys
 import time
 
 import pytest
 from fmpy import simulate_fmu
 
+import scaling
 from c_importer import needs
 from prbm.mechanics.assembly import assemble
 from support import ROOT
@@ -14,14 +13,7 @@ from support import ROOT
 BENCHMARKS = ROOT / "benchmarks"
 
 
-@pytest.fixture
-def scaling(monkeypatch):
-    """Return the benchmark ``scaling`` as a module."""
-    monkeypatch.setattr(sys, "path", [str(BENCHMARKS), *sys.path])
-    return importlib.import_module("scaling")
-
-
-def test_the_mechanisms_of_the_benchmark_have_the_stated_links_and_loops(scaling):
+def test_the_mechanisms_of_the_benchmark_have_the_stated_links_and_loops():
     assert max(scaling.LINKS) == 50  # Two chains: a hundred links.
     for n in scaling.LINKS[:3]:
         for axial in (False, True):
@@ -53,7 +45,7 @@ def test_the_exponents_of_the_page_are_below_three(exponents):
 
 @pytest.mark.slow
 @pytest.mark.native
-def test_the_cost_grows_with_the_exponents_of_the_page(scaling, exponents):
+def test_the_cost_grows_with_the_exponents_of_the_page(exponents):
     """The tolerance is wide: the page is for larger sizes, where the highest power dominates."""
     needs("cc", "valgrind")
     links, _, loops = exponents

@@ -1,18 +1,14 @@
 """Hits of the steel guide on compliant stops: beams in the kernel beside finite elements."""
 
 import math
-import sys
 
 import numpy as np
 import pytest
 
+import compliant_hits as hits
 from prbm.references.finite_elements import FiniteElementError, FiniteElements
 from prbm.references.finite_elements.hit import compliant_hit
 from prbm.runs.engine import simulation
-from support import ROOT
-
-sys.path.insert(0, str(ROOT / "benchmarks"))
-import compliant_hits as hits
 
 pytest.importorskip("exudyn", reason="finite elements need exudyn: python -m pip install exudyn")
 
