@@ -171,11 +171,10 @@ def loadings(
         The stress in all sections.  With it, the cycles are also those of the section with the
         largest stress, for example of the waist of a notch; None: those of the ends only.
     """
-    kinds = {kind.name: kind for kind in mechanism.flexure_types}
     result = []
     for i in stressed(mechanism):
         flexure = mechanism.flexures[i]
-        name, kind = flexure.name, kinds[flexure.type]
+        name, kind = flexure.name, mechanism.type_of(flexure)
         peak, time, position = (
             float(column(columns, f"{name}.{output}")[-1])
             for output in ("peak_stress", "peak_stress_time", "peak_stress_position")

@@ -31,12 +31,6 @@ def print_stress(options: argparse.Namespace) -> None:
         _moving(options, mechanism)
 
 
-def _kind(mechanism: Mechanism, flexure: str) -> FlexureType:
-    """Return the type of a flexure."""
-    kind = next(f.type for f in mechanism.flexures if f.name == flexure)
-    return next(k for k in mechanism.flexure_types if k.name == kind)
-
-
 def _held(options: argparse.Namespace, mechanism: Mechanism) -> None:
     """Print the stress in shapes in which the released body is held."""
     values = settings(mechanism, options.set)
@@ -55,8 +49,10 @@ def _held(options: argparse.Namespace, mechanism: Mechanism) -> None:
     for text in quantities(options.held, unit.si, "--held"):
         x = check_held(text, system, "--held")
         held.append(x)
-        for name, one in static_stresses(system, equilibrium(system, x)).items():
-            safety = _safety(one, _kind(mechanism, name))
+        found = static_stresses(system, equilibrium(system, x))
+        for flexure in mechanism.flexures:
+            name, one = flexure.name, found[flexure.name]
+            safety = _safety(one, mechanism.type_of(flexure))
             numbers = [1e-6 * y for y in (one.start, one.end, one.largest)]
             rows.append([f"{unit.factor * x:.5g}", name, *(f"{y:.5g}" for y in numbers), safety])
             table.append([x, name, one.start, one.end, one.largest, one.position])
@@ -124,7 +120,7 @@ def _row(one: Loading, stop_time: float, size: float) -> list[str]:
 
 def _missing(mechanism: Mechanism) -> list[str]:
     """Return remedies for strengths that are not given."""
-    kinds = [_kind(mechanism, flexure.name) for flexure in mechanism.flexures]
+    kinds = [mechanism.type_of(flexure) for flexure in mechanism.flexures]
     lines = []
     if any(kind.yield_strength is None for kind in kinds):
         lines.append("no safety factor without yield_strength: add it to the material")

@@ -256,7 +256,7 @@ class Shapes:
         """Return a flexure, described from the first corner of its outline."""
         mechanism = self.system.mechanism
         flexure = next(f for f in mechanism.flexures if f.name == outline.name)
-        kind = next(k for k in mechanism.flexure_types if k.name == flexure.type)
+        kind = mechanism.type_of(flexure)
         first, last = corners(outline, self.straight)[[0, -1]]
         start = self._point(flexure.start, flexure.name)
         if abs(last - start) < abs(first - start):

@@ -233,10 +233,6 @@ EXPORTED bool prbm_state(Engine *engine, double *y, char *message) {
     return succeed(ok, &problem, message);
 }
 
-static bool has_stress(const Mechanism *m, int flexure) {
-    return m->types[m->flexures[flexure].type].stress;
-}
-
 EXPORTED int prbm_section_count(const Engine *engine) {
     const System *system = system_of(engine->simulation);
     int count = 0;

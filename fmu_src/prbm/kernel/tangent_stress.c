@@ -126,7 +126,7 @@ PRBM void stress_changes(const Tangent *t, double *out) {
     SectionState at = section_state(t->q, t->e, t->y, t->v, t->evaluation, scratch);
     SectionState change = state_change(t);
     for (int i = 0, k = 0; i < m->flexure_count; i++) {
-        if (m->types[m->flexures[i].type].stress) {
+        if (has_stress(m, i)) {
             flexure_changes(t, &system->free_bodies[i], &at, &change, out + PER_STRESS * k++);
         }
     }

@@ -31,7 +31,7 @@ def add_flexure(parts: Collection, flexure: Flexure) -> None:
         If the flexure has no length, its links or its notch are longer than the flexure, its notch
         vanishes, or its ends are impossible for its curvature or rise.
     """
-    kind = _type_of(parts, flexure)
+    kind = parts.mechanism.type_of(flexure)
     if parts.length(flexure) < LENGTH_MIN:
         raise ParameterError(
             f"flexure {flexure.name} from {flexure.start} to {flexure.end} has the length "
@@ -41,11 +41,6 @@ def add_flexure(parts: Collection, flexure: Flexure) -> None:
         _add_beam(parts, flexure, _beam(parts, flexure, kind), kind)
     else:
         _add_links(parts, flexure, _segments(parts, flexure, kind))
-
-
-def _type_of(parts: Collection, flexure: Flexure) -> FlexureType:
-    """Return the type of a flexure."""
-    return next(k for k in parts.mechanism.flexure_types if k.name == flexure.type)
 
 
 def _segments(parts: Collection, flexure: Flexure, kind: FlexureType) -> Segments:
@@ -107,7 +102,7 @@ def _add_links(parts: Collection, flexure: Flexure, pieces: Segments) -> None:
         parts.reach(far, place, z_end - last, owners[-1])
     parts.rod(pieces.rods[-1], place, owners[-1], last)
     points.rod(len(links) + 1, len(parts.masses) - first)
-    angles, kind = [parts.angle(j) for j in owners], _type_of(parts, flexure)
+    angles, kind = [parts.angle(j) for j in owners], parts.mechanism.type_of(flexure)
     masses, forwards = slice(first, len(parts.masses)), start == flexure.start
     free = of_links(
         flexure.name, forwards, pieces, direction, _strength(parts, kind), owners, angles, masses,

@@ -56,8 +56,7 @@ def stressed(mechanism: Mechanism) -> tuple[int, ...]:
 
     They are those of the types with ``stress``.
     """
-    asked = {kind.name for kind in mechanism.flexure_types if kind.stress}
-    return tuple(i for i, flexure in enumerate(mechanism.flexures) if flexure.type in asked)
+    return tuple(i for i, f in enumerate(mechanism.flexures) if mechanism.type_of(f).stress)
 
 
 def with_stress(mechanism: Mechanism) -> Mechanism:

@@ -199,6 +199,10 @@ class Mechanism:
         for part in tuned:
             yield from _fields(part)
 
+    def type_of(self, flexure: Flexure) -> FlexureType:
+        """Return the type of a flexure of the mechanism."""
+        return next(kind for kind in self.flexure_types if kind.name == flexure.type)
+
     def model(self, kind: FlexureType) -> FlexureModel:
         """Return the flexure model of a type."""
         if kind.model != BEAM:

@@ -108,7 +108,6 @@ def headline(columns: Columns, mechanism: Mechanism, values: Mapping[str, float]
 
 def _stress(columns: Columns, mechanism: Mechanism, size: float) -> list[str]:
     """Return a line about the largest stress of each flexure whose stress is an output."""
-    kinds = {kind.name: kind for kind in mechanism.flexure_types}
     time = column(columns, "time")
     span = float(time[-1] - time[0])
     lines = []
@@ -117,7 +116,7 @@ def _stress(columns: Columns, mechanism: Mechanism, size: float) -> list[str]:
             float(column(columns, f"{flexure.name}.peak_stress{output}")[-1])
             for output in ("", "_time", "_position")
         )
-        strength = kinds[flexure.type].yield_strength
+        strength = mechanism.type_of(flexure).yield_strength
         factor = f", safety factor {strength / peak:.3g} (yield)" if strength and peak else ""
         lines.append(
             f"stress in {flexure.name:10} {1e-6 * peak:.4g} MPa at t = {instant(when, span, 5)}, "

@@ -215,13 +215,12 @@ def _ends(mechanism: Mechanism, part: Flexure | Joint) -> list[dict[str, Json]]:
 def _flexures(mechanism: Mechanism, system: System) -> list[dict[str, Json]]:
     """Return the flexures in the order of the assembly, their corners from the start on."""
     named = {flexure.name: flexure for flexure in mechanism.flexures}
-    types = {kind.name: kind for kind in mechanism.flexure_types}
     result = []
     for outline in system.outlines:
         if outline.kind != "flexure":
             continue
         flexure = named[outline.name]
-        kind = types[flexure.type]
+        kind = mechanism.type_of(flexure)
         model = mechanism.model(kind)
         beam, ends = bool(model.order), _ends(mechanism, flexure)
         guided = [end != PIN for end in flexure.ends]

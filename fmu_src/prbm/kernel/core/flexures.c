@@ -46,7 +46,7 @@ static void take_segments(Segments *pieces, int longest, Scratch *scratch) {
 
 static bool cut_flexure(const System *system, const Flexure *flexure, Segments *pieces,
                         Scratch *scratch, Problem *problem) {
-    const FlexureType *kind = &system->mechanism->types[flexure->type];
+    const FlexureType *kind = kind_of(system->mechanism, flexure);
     double L = length_of(system, flexure);
     size_t pivots = (size_t)kind->pivots;
     double *gamma = take(scratch, pivots), *K_theta = take(scratch, pivots);
@@ -135,7 +135,7 @@ typedef struct {
 
 static BeamCoordinates beam_coordinates(const System *system, const Step *step) {
     const Flexure *flexure = step->flexure;
-    const FlexureType *kind = &system->mechanism->types[flexure->type];
+    const FlexureType *kind = kind_of(system->mechanism, flexure);
     BeamCoordinates at = {FIXED, FIXED, step->first, FIXED};
     at.start = flexure->type_at_start == PIN ? at.first++ : FIXED;
     at.end = flexure->type_at_end == PIN ? at.first++ : FIXED;
@@ -282,7 +282,7 @@ static bool set_panels(const System *system, const Flexure *flexure, const Flexu
 
 static bool walk_beam(System *system, const Step *step, Scratch *scratch, Problem *problem) {
     const Flexure *flexure = step->flexure;
-    const FlexureType *kind = &system->mechanism->types[flexure->type];
+    const FlexureType *kind = kind_of(system->mechanism, flexure);
     bool notched = kind->profile == PROFILE_NOTCH, waisted = !is_hinge(kind);
     Panel panels[PANELS_MAX];
     Beam beam = {.order = kind->order,
@@ -318,7 +318,7 @@ PRBM bool walk_flexure(System *system, const Step *step, Scratch *scratch, Probl
         return fail(problem, "flexure %s has the length %g m: move its ends apart", flexure->name,
                     L);
     }
-    if (system->mechanism->types[flexure->type].order == 0) {
+    if (kind_of(system->mechanism, flexure)->order == 0) {
         return walk_links(system, step, scratch, problem);
     }
     return walk_beam(system, step, scratch, problem);

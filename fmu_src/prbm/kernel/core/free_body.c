@@ -6,10 +6,6 @@
 #include "core/free_body.h"
 #include "core/matrix.h"
 
-static const FlexureType *section_type(const System *system, const Step *step) {
-    return &system->mechanism->types[step->flexure->type];
-}
-
 static FreeBody *body_of(const System *system, const Step *step) {
     return &system->free_bodies[step->flexure - system->mechanism->flexures];
 }
@@ -43,7 +39,7 @@ PRBM void place_free_bodies(System *system, Memory *memory) {
     system->body_masses = place(memory, any ? (size_t)m->body_count : 0, sizeof(int));
     for (size_t i = 0; i < count; i++) {
         const Flexure *flexure = &m->flexures[i];
-        const FlexureType *kind = &m->types[flexure->type];
+        const FlexureType *kind = kind_of(m, flexure);
         FreeBody none, *body = memory->base ? &system->free_bodies[i] : &none;
         if (kind->order > 0) {
             bool notched = kind->profile == PROFILE_NOTCH;
@@ -157,7 +153,7 @@ PRBM void keep_links(System *system, const Step *step, const Segments *pieces, C
     }
     set_stubs(body, pieces, direction);
     set_pivots(body, pieces, direction, owners);
-    set_section(system, section_type(system, step), body);
+    set_section(system, kind_of(system->mechanism, step->flexure), body);
 }
 
 /* --- beams ------------------------------------------------------------------------------------ */
@@ -226,7 +222,7 @@ PRBM void keep_beam(System *system, const Step *step, const Beam *beam, Complex 
         return;
     }
     FreeBody *body = body_of(system, step);
-    const FlexureType *kind = section_type(system, step);
+    const FlexureType *kind = kind_of(system->mechanism, step->flexure);
     int N = beam->nodes, terms = beam->order + 1, stride = kind->axial ? 2 : 1;
     body->sections = beam->cut_count;
     body->arm_count = N;

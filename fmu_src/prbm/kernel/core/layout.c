@@ -7,10 +7,6 @@
 #include "core/system.h"
 #include "core/tables.h"
 
-static const FlexureType *kind_of(const Mechanism *m, const Flexure *flexure) {
-    return &m->types[flexure->type];
-}
-
 static int link_count(const Mechanism *m, const Flexure *flexure) {
     return links_of(kind_of(m, flexure), flexure->type_at_start, flexure->type_at_end);
 }

@@ -9,6 +9,14 @@ PRBM bool is_hinge(const FlexureType *kind) {
     return kind->profile == PROFILE_NOTCH && !has_dimension(kind, DIMENSION_WAIST_LENGTH);
 }
 
+PRBM const FlexureType *kind_of(const Mechanism *mechanism, const Flexure *flexure) {
+    return &mechanism->types[flexure->type];
+}
+
+PRBM bool has_stress(const Mechanism *mechanism, int i) {
+    return kind_of(mechanism, &mechanism->flexures[i])->stress;
+}
+
 PRBM double evaluate(Expression quantity, const double *values) {
     double result = 0.0;
     for (int i = 0; i < quantity.count; i++) {

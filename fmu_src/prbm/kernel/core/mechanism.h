@@ -196,6 +196,10 @@ typedef struct {
 PRBM bool has_dimension(const FlexureType *kind, int dimension);
 /* Whether a flexure has a notch without a waist, which bends like a hinge. */
 PRBM bool is_hinge(const FlexureType *kind);
+/* The type of a flexure. */
+PRBM const FlexureType *kind_of(const Mechanism *mechanism, const Flexure *flexure);
+/* Whether the stress of the i-th flexure is an output. */
+PRBM bool has_stress(const Mechanism *mechanism, int i);
 PRBM double evaluate(Expression quantity, const double *values); /* Twin: Affine in mechanism/. */
 PRBM bool check_parameter(const Parameter *parameter, double x, Problem *problem);
 /* Check all values and the fields that are expressions (Mechanism.values of the twin). */

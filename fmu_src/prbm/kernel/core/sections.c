@@ -248,7 +248,7 @@ static int flexure_of(const System *system, const FreeBody *body) {
 
 static const FlexureType *kind_of_body(const System *system, const FreeBody *body) {
     const Mechanism *m = system->mechanism;
-    return &m->types[m->flexures[flexure_of(system, body)].type];
+    return kind_of(m, &m->flexures[flexure_of(system, body)]);
 }
 
 /* Store the stress of both faces at section k from normal force and bending moment. */
@@ -307,7 +307,7 @@ PRBM void stresses(const Equations *q, const Complex *e, const double *angle, co
     size_t mark = scratch->used;
     SectionState at = section_state(q, e, angle, v, evaluation, scratch);
     for (int i = 0, k = 0; i < m->flexure_count; i++) {
-        if (m->types[m->flexures[i].type].stress) {
+        if (has_stress(m, i)) {
             const FreeBody *body = &system->free_bodies[i];
             size_t inner = scratch->used, count = (size_t)body->sections;
             double *left = take(scratch, count), *right = take(scratch, count);

@@ -138,9 +138,8 @@ class ElementModel:
         self.energy = self.force = 0.0
         for body in self.mechanism.bodies:
             self._body(body)
-        kinds = {kind.name: kind for kind in self.mechanism.flexure_types}
         for flexure in self.mechanism.flexures:
-            self._flexure(flexure, kinds[flexure.type])
+            self._flexure(flexure, self.mechanism.type_of(flexure))
         for joint in self.mechanism.joints:
             self._joint(joint)
         for force in self.mechanism.forces:
