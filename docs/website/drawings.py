@@ -5,8 +5,7 @@ from xml.sax.saxutils import escape, quoteattr
 import numpy as np
 
 from prbm.drawing.icon import shape
-from prbm.drawing.shapes import Shapes, corners, curve
-from prbm.drawing.style import CURVED_PIVOTS_MAX
+from prbm.drawing.shapes import Shapes
 from prbm.mechanics.arrays import Complex
 from prbm.mechanics.assembly import assemble
 from prbm.mechanism.description import Mechanism
@@ -85,5 +84,7 @@ def drawing(mechanism: Mechanism) -> str:
 
 def _flexures(drawn: Drawing, kind: str, shapes: Shapes, arms: Complex) -> None:
     for line in shapes.flexures:
-        z = corners(line.outline, arms)
-        drawn.line(kind, z if len(z) - 2 > CURVED_PIVOTS_MAX else curve(z, line.guided))
+        if line.shaped:
+            drawn.area(kind, [line.edge(arms)])
+        else:
+            drawn.line(kind, line.centre_line(arms))

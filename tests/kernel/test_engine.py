@@ -21,7 +21,7 @@ from prbm.base.errors import MechanismError, ParameterError, PrbmError, Simulati
 from prbm.hybrid.simulation import Simulation
 from prbm.kernel import library as library_module
 from prbm.kernel.library import FUNCTIONS, MESSAGE_LENGTH, LibraryError, library
-from prbm.kernel.simulation import IMPACT, UNFINISHED, KernelSimulation, tables_of
+from prbm.kernel.simulation import UNFINISHED, KernelSimulation, tables_of
 from support import case, each_shipped, mechanism
 
 pytestmark = pytest.mark.native
@@ -64,7 +64,6 @@ def test_the_functions_are_declared_as_in_the_header():
     assert prototypes() == FUNCTIONS
     header = (KERNEL / "engine.h").read_text() + (KERNEL / "core" / "memory.h").read_text()
     numbers = dict(re.findall(r"enum \{ (\w+) = (-?\d+) \};", header))
-    assert int(numbers["ENGINE_IMPACT"]) == IMPACT
     assert int(numbers["ENGINE_UNFINISHED"]) == UNFINISHED
     assert int(numbers["PROBLEM_LENGTH"]) == MESSAGE_LENGTH
 
