@@ -1,6 +1,6 @@
-"""The icon of a mechanism, as PNG and as SVG from the same parts."""
+"""The parts of a small drawing of a mechanism, and its icon as PNG and as SVG."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import singledispatch
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
@@ -31,36 +31,58 @@ SVG = "http://www.w3.org/2000/svg"
 
 
 @dataclass(frozen=True)
-class Line:
-    """A line through points z [m], in pieces that NaN separates, with a width [pt]."""
+class Style:
+    """Colours, width of lines [pt], diameter of dots [pt] and order of a part of the icon.
 
-    z: Complex
-    color: str
-    width: float
+    Parts of higher order are drawn over the others.  Without ``fill`` the part is not filled.
+    """
+
     order: float
+    stroke: str
+    width: float = 1.0
+    fill: str | None = None
+    diameter: float = 0.0
+
+
+STYLES = {
+    "straight": Style(0.0, GHOST),
+    "leaf": Style(3.0, STEEL, 2.2),
+    "leaf thin": Style(3.0, STEEL, 1.5),
+    "profile": Style(1.0, STEEL, fill=BODY),
+    "body": Style(2.0, STEEL, fill=BODY),
+    "centre": Style(4.0, STEEL, fill=STEEL, diameter=3.5),
+    "pin": Style(5.0, STEEL, fill="#ffffff", diameter=4.5),
+    "ground": Style(3.2, WALL),
+    "wall": Style(3.5, WALL, 1.5),
+}
+"""The style of each kind of part."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line through points z [m], in pieces that NaN separates."""
+
+    kind: str
+    z: Complex
 
 
 @dataclass(frozen=True)
 class Area:
-    """An area: the corners of its outline and of its holes [m], without a fill if it is None."""
+    """An area: the corners of its outline and of its holes [m]."""
 
+    kind: str
     rings: Sequence[Complex]
-    fill: str | None
-    edge: str
-    order: float
 
 
 @dataclass(frozen=True)
 class Dots:
-    """Dots at points z [m], with a diameter [pt]."""
+    """Dots at points z [m]."""
 
+    kind: str
     z: Complex
-    fill: str
-    diameter: float
-    order: float
 
 
-IconPart = Line | Area | Dots  # Parts of higher order are drawn over the others.
+Part = Line | Area | Dots
 
 
 @own_style()
@@ -79,7 +101,7 @@ def icon(mechanism: Mechanism, sample: Mapping[str, float]) -> bytes:
     axes.set_aspect("equal")
     axes.axis("off")
     for part in parts(mechanism, sample):
-        paint(part, axes)
+        paint(part, STYLES[part.kind], axes)
     axes.margins(MARGIN)
     return png(figure)
 
@@ -89,25 +111,14 @@ def vector_icon(mechanism: Mechanism, sample: Mapping[str, float]) -> bytes:
 
     The arguments are those of :func:`icon`.
     """
-    drawn = sorted(parts(mechanism, sample), key=lambda part: part.order)
-    every = np.concatenate([z for part in drawn for z in points(part)])
-    low = complex(np.nanmin(every.real), np.nanmin(every.imag))
-    high = complex(np.nanmax(every.real), np.nanmax(every.imag))
-    size = high - low
-    scale = POINTS * (1.0 - 2.0 * FRAME) / ((1.0 + 2.0 * MARGIN) * max(size.real, size.imag))
-    middle = (low + high) / 2.0
-
-    def place(z: Complex) -> Complex:
-        """Return positions in the picture [pt], from its upper left corner."""
-        turned: Complex = np.conj(scale * (z - middle)) + POINTS / 2.0 * (1.0 + 1.0j)
-        return turned
-
+    drawn = parts(mechanism, sample)
+    place = placement(drawn, POINTS, POINTS, (1.0 - 2.0 * FRAME) / (1.0 + 2.0 * MARGIN))
     box = {"viewBox": f"0 0 {POINTS:g} {POINTS:g}", "width": str(PIXELS), "height": str(PIXELS)}
     root = Element("svg", {"xmlns": SVG, **box, "role": "img", "fill": "none"})
     SubElement(root, "title").text = printable(mechanism.title)
     for part in drawn:
-        for tag, attributes in elements(part, [place(z) for z in points(part)]):
-            SubElement(root, tag, attributes)
+        for tag, attributes in elements(part, place):
+            SubElement(root, tag, attributes | _presentation(part))
     indent(root)
     text: bytes = tostring(root, encoding="UTF-8", xml_declaration=True)
     return text + b"\n"
@@ -128,109 +139,142 @@ def shape(system: System, sample: Mapping[str, float]) -> Real:
 # --- parts --------------------------------------------------------------------------------------
 
 
-def parts(mechanism: Mechanism, sample: Mapping[str, float]) -> list[IconPart]:
-    """Return the parts of an icon; the arguments are those of :func:`icon`."""
+def parts(mechanism: Mechanism, sample: Mapping[str, float]) -> list[Part]:
+    """Return the parts of a drawing, the lowest first; the arguments are those of :func:`icon`."""
     system = assemble(mechanism, mechanism.values())
     shapes = Shapes(system)
     released = shapes.arms(shape(system, sample))
-    return [*_faint_parts(shapes), *_parts(shapes, released), *_fixed_parts(shapes, released)]
+    found = [*_faint_parts(shapes), *_parts(shapes, released), *_fixed_parts(shapes, released)]
+    return sorted(found, key=lambda part: STYLES[part.kind].order)
 
 
-def _faint_parts(shapes: Shapes) -> Iterator[IconPart]:
+def _faint_parts(shapes: Shapes) -> Iterator[Part]:
     """Yield flexures and bodies in the straight shape."""
-    yield from _flexures(shapes, shapes.straight, faint=True)
+    for line in shapes.flexures:
+        yield Line("straight", line.drawn(shapes.straight))
     for name in shapes.bodies:
-        yield Area(shapes.areas(name, shapes.straight), None, GHOST, 0.0)
+        yield Area("straight", shapes.areas(name, shapes.straight))
 
 
-def _parts(shapes: Shapes, E: Complex) -> Iterator[IconPart]:
+def _parts(shapes: Shapes, E: Complex) -> Iterator[Part]:
     """Yield flexures, bodies and pins in a shape."""
-    yield from _flexures(shapes, E)
-    for name in shapes.bodies:
-        yield Area(shapes.areas(name, E), BODY, STEEL, 2.0)
-        yield Dots(np.array([shapes.centre(name, E)]), STEEL, 3.5, 4.0)
-    yield Dots(shapes.pins(E), "#ffffff", 4.5, 5.0)
-
-
-def _fixed_parts(shapes: Shapes, E: Complex) -> Iterator[IconPart]:
-    """Yield the ground and the walls."""
-    for ground in shapes.ground():
-        yield Line(ground, WALL, 1.0, 3.2)
-    for i, stop in enumerate(shapes.system.mechanism.stops):
-        wall = shapes.wall(i, value(stop, "position", shapes.system.values), E)
-        yield Line(wall, WALL, 1.5, 3.5)
-
-
-def _flexures(shapes: Shapes, E: Complex, *, faint: bool = False) -> Iterator[IconPart]:
-    """Yield the flexures in a shape."""
-    thin = len(shapes.flexures) >= THIN_LINES_MIN
+    leaf = "leaf thin" if len(shapes.flexures) >= THIN_LINES_MIN else "leaf"
     for line in shapes.flexures:
         if line.shaped:
-            fill, edge = (None, GHOST) if faint else (BODY, STEEL)
-            yield Area([line.edge(E)], fill, edge, 0.0 if faint else 1.0)
-            continue
-        width = 1.0 if faint else 1.5 if thin else 2.2
-        yield Line(line.centre_line(E), GHOST if faint else STEEL, width, 0.0 if faint else 3.0)
+            yield Area("profile", [line.edge(E)])
+        else:
+            yield Line(leaf, line.centre_line(E))
+    for name in shapes.bodies:
+        yield Area("body", shapes.areas(name, E))
+        yield Dots("centre", np.array([shapes.centre(name, E)]))
+    yield Dots("pin", shapes.pins(E))
+
+
+def _fixed_parts(shapes: Shapes, E: Complex) -> Iterator[Part]:
+    """Yield the ground and the walls."""
+    for ground in shapes.ground():
+        yield Line("ground", ground)
+    for i, stop in enumerate(shapes.system.mechanism.stops):
+        yield Line("wall", shapes.wall(i, value(stop, "position", shapes.system.values), E))
 
 
 # --- PNG ----------------------------------------------------------------------------------------
 
 
 @singledispatch
-def paint(part: IconPart, axes: Axes) -> None:
+def paint(part: Part, style: Style, axes: Axes) -> None:
     """Draw a part of the icon with Matplotlib."""
     raise TypeError(f"{part!r} is not a part of an icon")
 
 
 @paint.register
-def _(part: Line, axes: Axes) -> None:
+def _(part: Line, style: Style, axes: Axes) -> None:
     axes.plot(
-        part.z.real, part.z.imag, color=part.color, linewidth=part.width,
-        solid_capstyle="butt", zorder=part.order,
+        part.z.real, part.z.imag, color=style.stroke, linewidth=style.width,
+        solid_capstyle="butt", zorder=style.order,
     )  # fmt: skip
 
 
 @paint.register
-def _(part: Area, axes: Axes) -> None:
+def _(part: Area, style: Style, axes: Axes) -> None:
     axes.add_patch(
         PathPatch(
-            area(part.rings), facecolor=part.fill or "none", edgecolor=part.edge, linewidth=1.0,
-            joinstyle="round", zorder=part.order,
+            area(part.rings), facecolor=style.fill or "none", edgecolor=style.stroke,
+            linewidth=style.width, joinstyle="round", zorder=style.order,
         )
     )  # fmt: skip
 
 
 @paint.register
-def _(part: Dots, axes: Axes) -> None:
+def _(part: Dots, style: Style, axes: Axes) -> None:
     axes.plot(
-        part.z.real, part.z.imag, "o", color=STEEL, markersize=part.diameter,
-        markerfacecolor=part.fill, zorder=part.order,
+        part.z.real, part.z.imag, "o", color=style.stroke, markersize=style.diameter,
+        markerfacecolor=style.fill, zorder=style.order,
     )  # fmt: skip
 
 
 # --- SVG ----------------------------------------------------------------------------------------
 
 
-def points(part: IconPart) -> Sequence[Complex]:
+Placement = Callable[[Complex], Complex]
+
+
+def placement(drawn: Sequence[Part], width: float, height: float, share: float) -> Placement:
+    """Return the function from positions [m] to those in a picture, from its upper left corner.
+
+    Parameters
+    ----------
+    drawn : sequence of parts
+        The parts, which fill the picture in one direction.
+    width, height : float
+        Size of the picture.
+    share : float
+        Share of the picture for the parts, the rest is its margin.
+    """
+    low, high = extent(drawn)
+    size = high - low
+    scale = share / max(size.real / width, size.imag / height)
+
+    def place(z: Complex) -> Complex:
+        """Return positions in the picture."""
+        placed: Complex = np.conj(scale * (z - (low + high) / 2.0)) + complex(width, height) / 2.0
+        return placed
+
+    return place
+
+
+def extent(drawn: Sequence[Part]) -> tuple[complex, complex]:
+    """Return the lower left and the upper right corner of parts [m]."""
+    every = np.concatenate([z for part in drawn for z in _lines(part)])
+    return (
+        complex(np.nanmin(every.real), np.nanmin(every.imag)),
+        complex(np.nanmax(every.real), np.nanmax(every.imag)),
+    )
+
+
+def elements(part: Part, place: Placement) -> Iterator[tuple[str, dict[str, str]]]:
+    """Yield the SVG elements of a part at their places in the picture, without colours."""
+    if isinstance(part, Dots):
+        radius = f"{STYLES[part.kind].diameter / 2.0:g}"
+        for z in place(part.z):
+            yield "circle", {"cx": f"{z.real:.2f}", "cy": f"{z.imag:.2f}", "r": radius}
+    else:
+        close = "Z" if isinstance(part, Area) else ""
+        yield "path", {"d": " ".join(f"{_path(place(z))}{close}" for z in _lines(part))}
+
+
+def _presentation(part: Part) -> dict[str, str]:
+    """Return the colours and the width of the lines of a part as attributes in SVG."""
+    style = STYLES[part.kind]
+    fill = {} if style.fill is None else {"fill": style.fill}
+    return fill | {
+        "stroke": style.stroke, "stroke-width": f"{style.width:g}", "stroke-linejoin": "round"
+    }  # fmt: skip
+
+
+def _lines(part: Part) -> Sequence[Complex]:
     """Return the lines of points of a part [m]."""
     return part.rings if isinstance(part, Area) else [part.z]
-
-
-def elements(part: IconPart, placed: Sequence[Complex]) -> Iterator[tuple[str, dict[str, str]]]:
-    """Yield the SVG elements of a part, with its points in the picture [pt]."""
-    if isinstance(part, Dots):
-        for z in placed[0]:
-            place = {"cx": f"{z.real:.2f}", "cy": f"{z.imag:.2f}"}
-            yield "circle", place | {
-                "r": f"{part.diameter / 2.0:g}", "fill": part.fill, "stroke": STEEL
-            }  # fmt: skip
-    elif isinstance(part, Area):
-        attributes = {"d": " ".join(f"{_path(z)}Z" for z in placed), "stroke": part.edge}
-        fill = {"fill": part.fill} if part.fill else {}
-        yield "path", attributes | fill | {"stroke-linejoin": "round"}
-    else:
-        attributes = {"d": _path(placed[0]), "stroke": part.color}
-        yield "path", attributes | {"stroke-width": f"{part.width:g}"}
 
 
 def _path(z: Complex) -> str:
