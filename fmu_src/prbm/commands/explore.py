@@ -16,7 +16,6 @@ def write_page(options: argparse.Namespace) -> None:
     path = options.out or Path(f"{mechanism.name}.html")
     check_file(path)
     page = explorer(mechanism, given_values(mechanism, options))
-    path.parent.mkdir(parents=True, exist_ok=True)
     write(path, page.encode())
     print(path)
     if options.open:

@@ -21,6 +21,5 @@ def write_wrapper(options: argparse.Namespace) -> None:
         raise UserMistake(f"--fmu {block}: write the name of a class of Modelica, PRBDM_fmu")
     variables = interface(mechanism, given_values(mechanism, options))
     text = wrapper(mechanism, variables, options.names, block)
-    path.parent.mkdir(parents=True, exist_ok=True)
     write(path, text.encode())
     print(path)

@@ -1,7 +1,6 @@
 """``prbm parameters``: the parameters of a mechanism, and parameter sets for other tools."""
 
 import argparse
-from pathlib import Path
 
 from ..base.atomic import check_file, write
 from ..files.mechanism_file import load
@@ -32,10 +31,5 @@ def print_parameters(options: argparse.Namespace) -> None:
         value = f"{float(v.start or 0.0):.10g}{'' if v.unit == '1' else f' {v.unit}'}"
         print(f"{v.name:{width}}  {value:18}  {v.description}")
     if options.out is not None:
-        _write_set(options.out, parameter_set(mechanism, variables, mechanism.name, changes))
-
-
-def _write_set(path: Path, content: bytes) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write(path, content)
-    print(path)
+        write(options.out, parameter_set(mechanism, variables, mechanism.name, changes))
+        print(options.out)
