@@ -8,7 +8,8 @@ import pytest
 
 import prbm
 from prbm.analysis.contact_hit import first_hit
-from prbm.analysis.shock import GRAVITY, Pulse, shock
+from prbm.analysis.shock import Pulse, shock
+from prbm.base.unit_text import GRAVITY
 from prbm.commands import command_line as cli
 from prbm.mechanism.parts import COMPLIANT
 from support import ROOT

@@ -11,7 +11,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import prbm
-from prbm.analysis.shock import GRAVITY, Pulse, shock
+from prbm.analysis.shock import Pulse, shock
+from prbm.base.unit_text import GRAVITY
 from prbm.references.scalar_guide import ScalarGuide
 from support import ROOT
 

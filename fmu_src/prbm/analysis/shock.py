@@ -12,6 +12,7 @@ import numpy as np
 
 from ..base.errors import ParameterError
 from ..base.progress import Progress
+from ..base.unit_text import GRAVITY
 from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble
 from ..mechanics.statics import free_displacement
@@ -29,7 +30,6 @@ from .strength import Loading, loadings
 HALF_SINE, SAWTOOTH, TRAPEZOID = "half-sine", "sawtooth", "trapezoid"
 PULSES = (HALF_SINE, SAWTOOTH, TRAPEZOID)
 PULSE_STEPS = 50  # Communication steps of a pulse, at least.
-GRAVITY = 9.80665  # Standard acceleration of gravity [m/s^2].
 LEVEL_RTOL = 1e-3  # Error of the level at which a flexure yields.
 PEAKS_MAX = 16  # Largest number of peaks in a search for this level.
 

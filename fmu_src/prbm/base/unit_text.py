@@ -1,5 +1,7 @@
 """Display units, chosen so that a value has few digits before the decimal point."""
 
+GRAVITY = 9.80665  # Standard gravity, the unit g of an acceleration [m/s^2].
+
 
 def length_unit(size: float) -> tuple[float, str]:
     """Return factor and name of the display unit of a length [m].

@@ -3,9 +3,9 @@
 import argparse
 import math
 
-from ..analysis.shock import GRAVITY, Pulse, Shock, fragility, shock
+from ..analysis.shock import Pulse, Shock, fragility, shock
 from ..base.progress import reporter
-from ..base.unit_text import length_unit
+from ..base.unit_text import GRAVITY, length_unit
 from ..files.mechanism_file import load
 from ..files.settings import UserMistake, quantities, quantity, settings
 from ..mechanics.assembly import assemble

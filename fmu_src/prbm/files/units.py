@@ -15,6 +15,7 @@ from itertools import chain
 from typing import Any
 
 from ..base.errors import MechanismError
+from ..base.unit_text import GRAVITY
 from ..mechanism.expressions import Quantity, affine
 
 EXPRESSION_LENGTH_MAX = 1000  # characters
@@ -62,7 +63,6 @@ hertz = 1 / second = Hz
 DEFINITIONS = f"""{MECHANICAL}tera- = 1e12 = T-
 """  # Pint's own list is not used: some of its units are likely misprints of these.
 KNOWN = "m, g, s, N, Nm, Pa, J, W, Hz, rad, deg, with SI prefixes, joined as in kg/m3 or N.m"
-STANDARD_GRAVITY = "9.80665"  # m/s2; the unit g of an acceleration, otherwise g is the gram.
 
 _NUMBER = r"(?>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"  # Atomic: 1e3 is not 1 with the unit e3.
 _POWER = r"[A-Za-zµμ°]+(?:\^?-?[0-9]+)?"
@@ -148,7 +148,7 @@ def converted(value: str, unit: str, wanted: str) -> float:
     if common is not None:
         return _scaled(value, common)
     if unit == "g" and same_dimension(wanted or "1", "m/s2"):
-        value, unit = str(Decimal(value) * Decimal(STANDARD_GRAVITY)), "m/s2"
+        value, unit = str(Decimal(value) * Decimal(repr(GRAVITY))), "m/s2"
     written = _unit(unit)
     if written.dimensionality != _unit(wanted).dimensionality:
         raise MechanismError(f"the unit {unit!r} has another dimension; {_advice(wanted)}")

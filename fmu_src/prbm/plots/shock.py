@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..analysis.shock import GRAVITY, Shock, displacement
-from ..base.unit_text import length_unit, prefixed_unit, time_unit
+from ..analysis.shock import Shock, displacement
+from ..base.unit_text import GRAVITY, length_unit, prefixed_unit, time_unit
 from ..drawing.style import IMPACT, PAST, REST, WALL, own_style
 from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble
