@@ -261,7 +261,8 @@ SWEEPS = ("generated.h", "enum { ROTATION_SWEEPS_MAX = 60 };", "enum { ROTATION_
 EVENTS = ("generated.h", "enum { EVENTS_AT_ONCE_MAX = 16 };", "enum { EVENTS_AT_ONCE_MAX = 0 };")
 SINGULAR = (
     "hybrid/guards.c",
-    "if (!evaluate_equations(&sim->equations, t, y, y + system->n, NULL, evaluation, &problem)) {",
+    """if (!evaluate_equations(&sim->equations, t, y, at.v, at.extra, NULL, evaluation,
+                                &problem)) {""",
     'if (!fail(&problem, "the equations are singular")) {',
 )
 

@@ -118,9 +118,9 @@ class KernelSimulation:
         exchange: bool = False,
         changes: Changes = (),
     ) -> None:
+        self.tables, self.inner, self.states_of = None, None, None
         self.library = library(changes)
         self.sentence = ctypes.create_string_buffer(SENTENCE)
-        self.tables, self.inner, self.states_of = None, None, None
         self.stops, self.points = mechanism.stops, len(mechanism.frictions)
         chosen = independent(mechanism)
         self.slots = slots(mechanism, chosen)
