@@ -84,6 +84,7 @@ TOUCH_STEP_CURVED_FACTOR = 0.05  # The same if the exponent is above 1: F is not
 CONTACT_ERROR_FACTOR = 100.0  # Of the allowed error of a step: that of indentation and its rate.
 INDENTATION_MIN_RTOL = 1e-7  # Of the size: smallest scale of the error of an indentation.
 PEAK_REFINEMENTS = 3  # Parabolas through ever closer points at a peak.
+PEAK_REACH_FACTOR = 1.5  # Of half a step, from its middle: no peak if the vertex is further away.
 PEAK_REFINEMENT_FACTOR = 0.125  # Ratio of the distances of these points.
 
 # --- location of events ------------------------------------------------------------------------

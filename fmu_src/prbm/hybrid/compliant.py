@@ -15,8 +15,8 @@ import numpy as np
 from ..base.errors import SimulationError
 from ..base.tolerances import (
     DEPENDENT_FRICTION_RTOL,
-    GUARD_INTERVALS,
     IMPACT_COUNT_MAX,
+    PEAK_REACH_FACTOR,
     PEAK_REFINEMENT_FACTOR,
     PEAK_REFINEMENTS,
     SETTLED_DAMPING_RTOL,
@@ -386,21 +386,21 @@ def _along(
 
 
 def _largest(value: Callable[[float], float], start: float, end: float) -> float:
-    """Return the largest value between two times, by parabolas through its largest sample."""
-    times = np.linspace(start, end, GUARD_INTERVALS + 1).tolist()
-    samples = [value(t) for t in times]
-    k = int(np.argmax(samples))
-    t = times[min(max(k, 1), GUARD_INTERVALS - 1)]
-    distance, result = times[1] - times[0], float(samples[k])
+    """Return the largest value between two times, by parabolas through ever closer points.
+
+    A step resolves the vibration of a contact.  If the parabola through both ends and the middle
+    has no maximum in the step or close to it, the largest value is that of an end.
+    """
+    t, distance, result = 0.5 * (start + end), 0.5 * (end - start), -math.inf
     for _ in range(PEAK_REFINEMENTS):
-        before, at, after = (value(min(max(t + s * distance, start), end)) for s in (-1, 0, 1))
-        bend = before - 2.0 * at + after
-        if bend < 0.0:
-            shift = 0.5 * (before - after) / bend
-            t = min(max(t + distance * min(max(shift, -1.0), 1.0), start), end)
-        result = max(result, value(t))
+        middle = min(max(t, start + distance), end - distance)
+        before, at, after = (value(middle + s * distance) for s in (-1, 0, 1))
+        result, bend = max(result, before, at, after), before - 2.0 * at + after
+        if not bend < 0.0 or abs(before - after) > -2.0 * PEAK_REACH_FACTOR * bend:
+            return result
+        t = min(max(middle + 0.5 * distance * (before - after) / bend, start), end)
         distance *= PEAK_REFINEMENT_FACTOR
-    return result
+    return max(result, value(t))
 
 
 # --- steps ------------------------------------------------------------------------------------

@@ -487,61 +487,73 @@ PRBM bool settles_here(Simulation *sim, bool *result, Problem *problem) {
 
 /* --- maxima ----------------------------------------------------------------------------------- */
 
-/* Compute the indentation of a stop at a time of the latest step, or its force. */
-static double contact_at(Simulation *sim, int stop, double t, bool force) {
+/* An indentation and a force. */
+enum { PEAK_DEPTH, PEAK_FORCE, PEAK_VALUES };
+
+/* Compute the indentation and the force of a stop at a time of the latest step. */
+static void contact_at(Simulation *sim, int stop, double t, double value[PEAK_VALUES]) {
     Located *located = &sim->stepping.located;
     const System *system = system_of(sim);
     const Equations *equations = &sim->equations;
     arc_at(sim, t, located->y);
     directions(system, located->y, located->e);
-    const double *extra = extra_states(sim, located->y);
+    const double *extra = extra_states(sim, located->y), *v = located->y + system->n;
     double depth = -gap(equations, stop, t, located->e, extra);
-    if (!force) {
-        return depth;
-    }
-    double rate = -gap_rate(equations, stop, t, located->e, located->y + system->n, extra);
-    return contact_force(&equations->laws[stop], &equations->contacts.touching[stop], depth, rate);
+    double depth_rate = -gap_rate(equations, stop, t, located->e, v, extra);
+    value[PEAK_DEPTH] = depth;
+    value[PEAK_FORCE] = contact_force(&equations->laws[stop], &equations->contacts.touching[stop],
+                                      depth, depth_rate);
 }
 
 static double clipped(double x, double low, double high) {
     return lesser(greater(x, low), high);
 }
 
-/* Return the largest value between two times, by parabolas through its largest sample. */
-static double largest_value(Simulation *sim, int stop, bool force, double start, double end) {
-    double distance = (end - start) / (double)GUARD_INTERVALS, result = -HUGE_VAL;
-    int top = 0;
-    for (int k = 0; k <= GUARD_INTERVALS; k++) {
-        double x = contact_at(sim, stop, start + distance * k, force);
-        top = x > result ? k : top;
-        result = greater(x, result);
+/* Compute indentation and force at three times. */
+static void contact_around(Simulation *sim, int stop, double t, double distance,
+                           double value[3][PEAK_VALUES]) {
+    for (int k = 0; k < 3; k++) {
+        contact_at(sim, stop, t + (k - 1) * distance, value[k]);
     }
-    top = top < 1 ? 1 : top < GUARD_INTERVALS ? top : GUARD_INTERVALS - 1;
-    double t = start + distance * top;
+}
+
+/* Return the largest value between two times, by parabolas through ever closer points; first: the
+ * values at both ends and in the middle.  A step resolves the vibration of a contact.  If the
+ * first parabola has no maximum in the step or close to it, the largest value is that of an end. */
+static double largest_value(Simulation *sim, int stop, int which, double start, double end,
+                            double first[3][PEAK_VALUES]) {
+    double t = 0.5 * (start + end), distance = 0.5 * (end - start), result = -HUGE_VAL;
+    double near[3][PEAK_VALUES], (*value)[PEAK_VALUES] = first;
     for (int k = 0; k < PEAK_REFINEMENTS; k++) {
-        double before = contact_at(sim, stop, clipped(t - distance, start, end), force);
-        double at = contact_at(sim, stop, clipped(t, start, end), force);
-        double after = contact_at(sim, stop, clipped(t + distance, start, end), force);
-        double bend = before - 2.0 * at + after;
-        if (bend < 0.0) {
-            double shift = clipped(0.5 * (before - after) / bend, -1.0, 1.0);
-            t = clipped(t + distance * shift, start, end);
+        double middle = clipped(t, start + distance, end - distance);
+        if (k > 0) {
+            value = near;
+            contact_around(sim, stop, middle, distance, near);
         }
-        result = greater(result, contact_at(sim, stop, t, force));
+        double before = value[0][which], at = value[1][which], after = value[2][which];
+        double bend = before - 2.0 * at + after;
+        result = greater(result, greater(at, greater(before, after)));
+        if (!(bend < 0.0) || fabs(before - after) > -2.0 * PEAK_REACH_FACTOR * bend) {
+            return result;
+        }
+        t = clipped(middle + 0.5 * distance * (before - after) / bend, start, end);
         distance *= PEAK_REFINEMENT_FACTOR;
     }
-    return result;
+    contact_at(sim, stop, t, near[0]);
+    return greater(result, near[0][which]);
 }
 
 PRBM void peaks_until(Simulation *sim, int stop, double time, double *depth, double *force) {
     const Arc *arc = &sim->state.arc;
     const Latched *latched = &sim->state.latched[stop];
-    double end = lesser(time, sim->state.front_time);
+    double start = arc->start, end = lesser(time, sim->state.front_time);
+    double first[3][PEAK_VALUES];
     *depth = latched->indentation;
     *force = latched->peak_force;
-    if (is_pressed(&sim->state.touching[stop]) && arc->valid && end > arc->start) {
-        *depth = greater(*depth, largest_value(sim, stop, false, arc->start, end));
-        *force = greater(*force, largest_value(sim, stop, true, arc->start, end));
+    if (is_pressed(&sim->state.touching[stop]) && arc->valid && end > start) {
+        contact_around(sim, stop, 0.5 * (start + end), 0.5 * (end - start), first);
+        *depth = greater(*depth, largest_value(sim, stop, PEAK_DEPTH, start, end, first));
+        *force = greater(*force, largest_value(sim, stop, PEAK_FORCE, start, end, first));
     }
 }
 
