@@ -297,6 +297,37 @@ def test_the_cost_until_rest_is_a_small_multiple_of_the_rigid_one(name, ratio):
     assert steps["compliant"] <= ratio * steps["rigid"]
 
 
+def pressed_softly(restitution, speed):
+    """Return a simulation of a body in balance on a stop, with a speed [m/s], and its period [s].
+
+    The balance is at an indentation of 1e-7 m; the reference speed is that of rest.
+    """
+    own = point_mass(stiffness=1e7, restitution=restitution, displacement=1e-7, velocity=speed)
+    sim = Simulation(own, {"push.x": 1.0})
+    return sim, 2 * math.pi / math.sqrt(1e7 * sim.outputs()["stop.point.mobility"])
+
+
+@pytest.mark.parametrize("restitution", [0.6, 1.0])
+def test_a_vibration_below_the_speed_of_rest_settles_in_its_balance(restitution):
+    """After half a period, at the next passage of the balance; its energy is a loss."""
+    sim, period = pressed_softly(restitution, 5e-4)
+    start = energy_balance(sim.outputs())
+    sim.advance(0.45 * period)
+    assert sim.contacts.touching[0].phase is Phase.PRESSED
+    sim.advance(1.3 * period)
+    assert sim.contacts.touching[0].phase is Phase.SETTLED
+    out = sim.outputs()
+    assert out["stop.gap"] == pytest.approx(-1e-7, rel=5e-3)
+    assert out["stop.force"] == pytest.approx(1.0, rel=5e-3)
+    assert energy_balance(out) == pytest.approx(start, abs=1e-15)
+
+
+def test_an_elastic_vibration_above_the_speed_of_rest_continues():
+    sim, period = pressed_softly(1.0, 1.5e-3)
+    sim.advance(10 * period)
+    assert sim.contacts.touching[0].phase is Phase.PRESSED
+
+
 def test_a_settled_stop_is_released_when_its_force_changes():
     sim = resting(stiffness=1e7)
     for force, settled in ((1.004, True), (1.05, False)):

@@ -76,7 +76,6 @@ DAMPING_ELASTIC_MIN = 0.9999  # Restitution above which the first term of a seri
 DAMPING_PLASTIC_MAX = 0.03  # Restitution below which the factor of the damping is 1/e.
 DAMPING_BISECTIONS = 60  # Bisections of the factor of the damping.
 PHASE_RTOL = 1e-9  # Of the force and of the reference speed: excess at which a contact switches.
-SETTLED_DAMPING_RTOL = 1e-3  # Of the elastic force: largest damping of a contact that settles.
 SETTLED_FORCE_RTOL = 1e-2  # Of the elastic force: difference at which a settled stop is released.
 SETTLING_FACTOR = 0.5  # Of SETTLED_FORCE_RTOL: largest difference of a contact that settles.
 TOUCH_STEP_FACTOR = 0.5  # Of the depth of a free hit over its speed: first step of a contact.

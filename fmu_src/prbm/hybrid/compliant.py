@@ -7,8 +7,9 @@ constraint differs from the elastic force.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,7 +20,6 @@ from ..base.tolerances import (
     PEAK_REACH_FACTOR,
     PEAK_REFINEMENT_FACTOR,
     PEAK_REFINEMENTS,
-    SETTLED_DAMPING_RTOL,
     SETTLED_FORCE_RTOL,
     SETTLING_FACTOR,
     TOUCH_STEP_CURVED_FACTOR,
@@ -36,6 +36,7 @@ from . import contact_modes
 from .arc import Arc
 from .configuration import Configuration
 from .front import Front, Latched, Touch
+from .guards import StepView, fall_time, indentation
 from .records import Impact
 from .stepping import StepSizeController, rounded_step
 
@@ -160,46 +161,89 @@ def unsettled(front: Front) -> Front:
 # --- settling ---------------------------------------------------------------------------------
 
 
+class Rest(NamedTuple):
+    """A pressed contact that vibrates slowly, and the constraint that would hold it.
+
+    Parameters
+    ----------
+    front : Front
+        The front with the constraint at the present indentation, not projected.
+    force : float
+        Force of the constraint [N].
+    elastic : float
+        Elastic force of the contact [N].
+    time : float
+        Contact time, half the period of small vibrations [s].
+    """
+
+    front: Front
+    force: float
+    elastic: float
+    time: float
+
+    @property
+    def balanced(self) -> bool:
+        """Whether the contact can settle: the constraint is released at twice this difference."""
+        limit = SETTLING_FACTOR * SETTLED_FORCE_RTOL * self.elastic
+        return abs(self.force - self.elastic) <= limit
+
+
 def settled(
     configuration: Configuration, front: Front, arc: Arc | None
-) -> tuple[Front, list[Impact]]:
+) -> tuple[Front, list[Impact], dict[int, float]]:
     """Return the front in which contacts that have been calm for a contact time are settled.
 
-    Its outputs have the maxima up to the end of the step that leads to it.
+    Its outputs have the maxima up to the end of the step that leads to it.  The mapping has the
+    indentations [m] at which the other calm contacts would be in balance: a step ends there.
     """
     impacts: list[Impact] = []
+    balances: dict[int, float] = {}
     front = latched_until(configuration, front, arc, front.time)
     for i in front.contacts.pressed:
-        touch, calm = front.touches[i], _calm(configuration, front, i)
+        touch, rest = front.touches[i], _calm(configuration, front, i)
         assert touch is not None
-        since = (front.time if touch.calm_since is None else touch.calm_since) if calm else None
+        since = (front.time if touch.calm_since is None else touch.calm_since) if rest else None
         if since != touch.calm_since:
             front = front.with_touch(i, replace(touch, calm_since=since))
-        if since is not None and front.time - since >= _contact_time(front, i):
-            front, found = _settled(configuration, front, i)
+        if rest is None or since is None or front.time - since < rest.time:
+            continue
+        if rest.balanced:
+            front, found = _settled(configuration, front, i, rest)
             impacts += found
-    return front, impacts
+        else:
+            balances[i] = front.equations.compliant.laws[i].depth(rest.force)
+    return front, impacts, balances
 
 
-def _calm(configuration: Configuration, front: Front, stop: int) -> bool:
-    """Return whether the indentation is slow and the damping of a contact is small."""
+def _calm(configuration: Configuration, front: Front, stop: int) -> Rest | None:
+    """Return the rest of a contact that vibrates more slowly than ``rest_speed``, else None.
+
+    The speed is that at which the contact would pass its balance.  A contact that is stuck does not
+    move: it stays a force.
+    """
     touching = front.contacts.touching[stop]
     gaps, rates = front.gaps_and_rates()
     assert touching is not None
-    if touching.phase is Phase.FREE or gaps[stop] >= 0.0:
-        return False
-    rate = float(-rates[stop])
-    damping = abs(front.equations.compliant.laws[stop].damping_ratio(touching, rate) - 1.0)
-    return (
-        abs(rate) < configuration.stop_value(stop, "rest_speed") and damping < SETTLED_DAMPING_RTOL
-    )
+    depth, rate = float(-gaps[stop]), float(-rates[stop])
+    least = configuration.stop_value(stop, "rest_speed")
+    if touching.phase is Phase.FREE or depth <= 0.0 or abs(rate) >= least or _stuck(front, stop):
+        return None
+    held = replace(touching, phase=Phase.SETTLED, depth=depth)
+    # The displacement of the wall by the contact becomes part of its motion.
+    folded, walls = fold_gives(front, (stop,))
+    rest = folded.with_walls(walls).with_contacts(front.contacts.with_touching(stop, held))
+    law, inverse_mass = front.equations.compliant.laws[stop], point_mobility(front, stop)
+    force, elastic = _stop_force(rest, stop), law.elastic_force(depth)
+    stiffness = law.tangent(depth)
+    speed = math.hypot(rate, (force - elastic) * math.sqrt(inverse_mass / stiffness))
+    if force <= 0.0 or speed >= least:
+        return None
+    return Rest(rest, force, elastic, math.pi / math.sqrt(stiffness * inverse_mass))
 
 
-def _contact_time(front: Front, stop: int) -> float:
-    """Return half the period of small vibrations of a pressed contact [s]."""
-    gaps, _ = front.gaps_and_rates()
-    stiffness = front.equations.compliant.laws[stop].tangent(float(-gaps[stop]))
-    return math.pi / math.sqrt(stiffness * point_mobility(front, stop))
+def _stop_force(front: Front, stop: int) -> float:
+    """Return the force of a stop that is a constraint [N]."""
+    return float(front.equations.stop_forces(front.evaluate().lam)[stop])
 
 
 def point_mobility(front: Front, stop: int) -> float:
@@ -217,33 +261,39 @@ def _stuck(front: Front, stop: int) -> bool:
     return left <= DEPENDENT_FRICTION_RTOL * contact_modes.mobility(M, loops, G)
 
 
-def _settled(configuration: Configuration, front: Front, stop: int) -> tuple[Front, list[Impact]]:
-    """Return the front in which a calm contact is settled, if the forces are in balance.
-
-    A contact that is stuck does not move: it stays a force.
-    """
-    touching = front.contacts.touching[stop]
-    assert touching is not None
-    if _stuck(front, stop):
-        return front, []
-    gaps, _ = front.gaps_and_rates()
-    depth = float(-gaps[stop])
-    held = replace(touching, phase=Phase.SETTLED, depth=depth)
-    # The displacement of the wall by the contact becomes part of its motion.
-    folded, walls = fold_gives(front, (stop,))
-    rest = folded.with_walls(walls).with_contacts(front.contacts.with_touching(stop, held))
-    elastic = front.equations.compliant.laws[stop].elastic_force(depth)
-    force = float(rest.equations.stop_forces(rest.evaluate().lam)[stop])
-    if abs(force - elastic) > SETTLING_FACTOR * SETTLED_FORCE_RTOL * elastic:
-        return front, []
-    slow = rest.projected()
+def _settled(
+    configuration: Configuration, front: Front, stop: int, rest: Rest
+) -> tuple[Front, list[Impact]]:
+    """Return the front in which a contact is settled; its kinetic energy is a loss."""
+    slow = rest.front.projected()
     M = front.equations.mass_and_loops(front.q)[1]
-    loss = kinetic_energy(M, rest.v) - kinetic_energy(M, slow.v)
+    loss = kinetic_energy(M, rest.front.v) - kinetic_energy(M, slow.v)
     y = slow.y.copy()
     y[2 * front.equations.n] += loss
     y[2 * front.equations.n + 2 + front.equations.compliant.index(stop, Extra.LOSS)] += loss
     slow, impacts = _finished(configuration, replace(slow, y=y), stop)
+    touch = slow.touches[stop]
+    assert touch is not None
+    slow = slow.with_touch(stop, replace(touch, calm_since=None))
     return contact_modes.settle(configuration, slow), impacts
+
+
+def balance_time(view: StepView, balances: Mapping[int, float]) -> float | None:
+    """Return when a contact first passes the indentation of its balance [m] in a step, or None."""
+    start, end = view.arc.start, view.arc.start + view.arc.h
+    times = []
+    for stop, depth in balances.items():
+        inside = view.along(indentation, stop)
+        sign = 1.0 if inside(start) > depth else -1.0
+        if sign * (inside(end) - depth) < 0.0:
+            margin = _margin(inside, sign, depth)
+            times.append(fall_time(margin, start, end))
+    return min(times, default=None)
+
+
+def _margin(value: Callable[[float], float], sign: float, level: float) -> Callable[[float], float]:
+    """Return the distance of a function from a level, on the side of a sign."""
+    return lambda t: sign * (value(t) - level)
 
 
 def present_walls(front: Front, state: Callable[[], Real]) -> tuple[Wall, ...]:

@@ -323,7 +323,9 @@ class Simulation:
     def _take_step(self) -> None:
         """Take one step from the front, up to the first event within it."""
         self.step_count += 1
-        front, counted = compliant.settled(self.configuration, walls.arrived(self.front), self.arc)
+        front, counted, balances = compliant.settled(
+            self.configuration, walls.arrived(self.front), self.arc
+        )
         if front.equations is not self.front.equations:
             for i in set(self.front.contacts.pressed) & set(front.contacts.held):
                 self.controller = compliant.lengthened(self.controller, front.touches[i])
@@ -340,13 +342,18 @@ class Simulation:
         arc = Arc(front.time, step.h, front.time + step.h, front.y, step.k, n, before)
         view = StepView(configuration.scales, equations, arc, step.forces)
         event = events.first_event(view)
+        balance = compliant.balance_time(view, balances) if event is None else None
         found: Evaluation | None = None
-        if event is None:
+        if event is None and balance is None:
             y, self.k1, found = step.y, step.k[-1], step.last
         else:
             # The event does not shorten the next step.
             controller = StepSizeController(step.h, controller.last_error)
-            event, arc, y = _cut(configuration, event, view)
+            if event is not None:
+                event, arc, y = _cut(configuration, event, view)
+            elif balance is not None:
+                y = closed(configuration, equations, balance, arc.at(balance))
+                arc = replace(arc, end=balance)
             self.k1 = None
         self.front = replace(front, time=arc.end, y=y)
         self.peaks = self.peaks.stepped(self.front, found)

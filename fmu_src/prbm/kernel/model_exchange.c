@@ -415,7 +415,8 @@ static bool settle_contacts(Simulation *sim, Problem *problem) {
     if (sim->equations.pressed_count == 0) {
         return true;
     }
-    bool ok = settle_calm(sim, problem);
+    double balances[STOPS_MAX];
+    bool ok = settle_calm(sim, balances, problem);
     forget_outputs(sim);
     return ok;
 }

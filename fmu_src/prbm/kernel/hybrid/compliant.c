@@ -298,14 +298,6 @@ static double kinetic_energy(Simulation *sim, const double *v) {
     return sum;
 }
 
-/* Whether the indentation is slow and the damping of a contact is small. */
-static bool is_calm(const Simulation *sim, int stop, double gap_now, double rate) {
-    const Touching *touching = &sim->state.touching[stop];
-    double damping = fabs(damping_ratio(&sim->equations.laws[stop], touching, rate) - 1.0);
-    return touching->phase != PHASE_FREE && gap_now < 0.0 &&
-           fabs(rate) < rest_speed_of(sim, stop) && damping < SETTLED_DAMPING_RTOL;
-}
-
 /* Project the front onto the constraint of a stop that settles, and book the loss. */
 static bool stop_motion(Simulation *sim, int stop, Problem *problem) {
     size_t mark = sim->scratch.used;
@@ -326,6 +318,10 @@ static bool is_stuck(Simulation *sim, int stop, bool *result, Problem *problem) 
     size_t mark = sim->scratch.used;
     const Equations *q = &sim->equations;
     int n = q->system->n;
+    *result = false;
+    if (q->r == q->system->r) {
+        return true; /* There are no constraints but the loops. */
+    }
     double left = 0.0, own = 0.0, *G = take(&sim->scratch, (size_t)n);
     double *held = take_matrix(&sim->scratch, q->r, n);
     Inertia at = inertia_at(sim, sim->state.front);
@@ -386,81 +382,113 @@ static void press_again(Simulation *sim, int stop, const Unsettled *before) {
     state->has_k1 = before->has_k1;
 }
 
-/* Make a calm contact a constraint if its force is then close to its elastic force; *held: whether
- * it is.  A contact that is stuck does not move: it stays a force. */
-static bool hold_if_balanced(Simulation *sim, int stop, double depth, Unsettled *before,
-                             bool *held, Problem *problem) {
+/* A pressed contact that vibrates slowly: the force of the constraint that would hold it, its
+ * elastic force, and the contact time, half the period of small vibrations. */
+typedef struct {
+    bool calm;
+    double force, elastic, time;
+} Rest;
+
+/* Compute the force of the constraint that would hold a contact at its indentation. */
+static bool holding_force(Simulation *sim, int stop, double depth, double *force,
+                          Problem *problem) {
     const double *q = sim->state.front, *v = q + system_of(sim)->n;
-    bool stuck;
-    *held = false;
+    Unsettled before = hold_contact(sim, stop, depth);
+    bool ok = evaluate_equations(&sim->equations, sim->state.front_time, q, v,
+                                 extra_states(sim, q), NULL, &sim->at_front, problem);
+    *force = ok ? stop_force(&sim->equations, sim->at_front.lam, stop) : 0.0;
+    press_again(sim, stop, &before);
+    return ok;
+}
+
+/* Compute the rest of a contact.  It is calm if it would pass its balance more slowly than
+ * rest_speed.  A contact that is stuck does not move: it stays a force. */
+static bool rest_of_contact(Simulation *sim, int stop, double depth, double rate, Rest *rest,
+                      Problem *problem) {
+    const ComplianceLaw *law = &sim->equations.laws[stop];
+    double least = rest_speed_of(sim, stop), inverse_mass;
+    bool stuck = false;
+    rest->calm = false;
+    if (sim->state.touching[stop].phase == PHASE_FREE || depth <= 0.0 || fabs(rate) >= least) {
+        return true;
+    }
     if (!is_stuck(sim, stop, &stuck, problem)) {
         return false;
     }
     if (stuck) {
         return true;
     }
-    *before = hold_contact(sim, stop, depth);
-    if (!evaluate_equations(&sim->equations, sim->state.front_time, q, v, extra_states(sim, q),
-                            NULL, &sim->at_front, problem)) {
+    if (!point_mobility(sim, stop, &inverse_mass, problem) ||
+        !holding_force(sim, stop, depth, &rest->force, problem)) {
         return false;
     }
-    double elastic = elastic_force(&sim->equations.laws[stop], depth);
-    double force = stop_force(&sim->equations, sim->at_front.lam, stop);
-    *held = fabs(force - elastic) <= SETTLING_FACTOR * SETTLED_FORCE_RTOL * elastic;
-    if (!*held) {
-        press_again(sim, stop, before);
-    }
+    double stiffness = contact_tangent(law, depth);
+    rest->elastic = elastic_force(law, depth);
+    rest->time = 0.5 * TWO_PI / sqrt(stiffness * inverse_mass);
+    double speed = (rest->force - rest->elastic) * sqrt(inverse_mass / stiffness);
+    rest->calm = rest->force > 0.0 && sqrt(rate * rate + speed * speed) < least;
     return true;
 }
 
+/* Whether a contact can settle: the constraint is released at twice this difference. */
+static bool is_balanced(const Rest *rest) {
+    double limit = SETTLING_FACTOR * SETTLED_FORCE_RTOL * rest->elastic;
+    return fabs(rest->force - rest->elastic) <= limit;
+}
+
 /* Record since when a contact is calm; *due: whether it has been calm for a contact time. */
-static bool watch_contact(Simulation *sim, int stop, double gap_now, double rate, bool *due,
-                          Problem *problem) {
+static bool watch_contact(Simulation *sim, int stop, double gap_now, double rate, Rest *rest,
+                          bool *due, Problem *problem) {
     Touch *begun = &sim->state.touches[stop];
-    double inverse_mass;
     *due = false;
     if (!is_pressed(&sim->state.touching[stop])) {
         return true;
     }
-    if (!is_calm(sim, stop, gap_now, rate)) {
-        begun->calm = false;
-        begun->calm_since = 0.0;
-        return true;
-    }
-    begun->calm_since = begun->calm ? begun->calm_since : sim->state.front_time;
-    begun->calm = true;
-    if (!point_mobility(sim, stop, &inverse_mass, problem)) {
+    if (!rest_of_contact(sim, stop, -gap_now, rate, rest, problem)) {
         return false;
     }
-    double stiffness = contact_tangent(&sim->equations.laws[stop], -gap_now);
-    double time = 0.5 * TWO_PI / sqrt(stiffness * inverse_mass);
-    *due = sim->state.front_time - begun->calm_since >= time;
+    begun->calm_since = !rest->calm ? 0.0 : begun->calm ? begun->calm_since : sim->state.front_time;
+    begun->calm = rest->calm;
+    *due = rest->calm && sim->state.front_time - begun->calm_since >= rest->time;
     return true;
 }
 
-PRBM bool settle_calm(Simulation *sim, Problem *problem) {
+/* Settle a contact; its kinetic energy is a loss. */
+static bool settle_contact(Simulation *sim, int stop, double depth, Problem *problem) {
+    (void)hold_contact(sim, stop, depth);
+    sim->state.arc.valid = false;
+    if (!stop_motion(sim, stop, problem)) {
+        return false;
+    }
+    end_impact(sim, stop);
+    sim->state.touches[stop].calm = false;
+    sim->state.touches[stop].calm_since = 0.0;
+    if (!settle(sim, NULL, 0, NULL, problem)) {
+        return false;
+    }
+    resume_step(sim, stop);
+    return true;
+}
+
+PRBM bool settle_calm(Simulation *sim, double *balances, Problem *problem) {
     double gaps[STOPS_MAX], rates[STOPS_MAX];
     if (!latch_peaks(sim, sim->state.front_time, problem)) {
         return false;
     }
     gaps_and_rates(sim, gaps, rates);
     for (int i = 0; i < system_of(sim)->s; i++) {
-        Unsettled before;
-        bool due, held = false;
-        if (!watch_contact(sim, i, gaps[i], -rates[i], &due, problem) ||
-            (due && !hold_if_balanced(sim, i, -gaps[i], &before, &held, problem))) {
+        Rest rest;
+        bool due;
+        balances[i] = 0.0;
+        if (!watch_contact(sim, i, gaps[i], -rates[i], &rest, &due, problem)) {
             return false;
         }
-        sim->state.arc.valid = sim->state.arc.valid && !held;
-        if (held) {
-            if (!stop_motion(sim, i, problem)) {
+        if (due && is_balanced(&rest)) {
+            if (!settle_contact(sim, i, -gaps[i], problem)) {
                 return false;
             }
-            end_impact(sim, i);
-            if (!settle(sim, NULL, 0, NULL, problem)) {
-                return false;
-            }
-            resume_step(sim, i);
+        } else if (due) {
+            balances[i] = contact_depth(&sim->equations.laws[i], rest.force);
         }
     }
     return true;
@@ -471,16 +499,12 @@ PRBM bool settles_here(Simulation *sim, bool *result, Problem *problem) {
     gaps_and_rates(sim, gaps, rates);
     *result = false;
     for (int i = 0; i < system_of(sim)->s; i++) {
-        Unsettled before;
-        bool due, held = false;
-        if (!watch_contact(sim, i, gaps[i], -rates[i], &due, problem) ||
-            (due && !hold_if_balanced(sim, i, -gaps[i], &before, &held, problem))) {
+        Rest rest;
+        bool due;
+        if (!watch_contact(sim, i, gaps[i], -rates[i], &rest, &due, problem)) {
             return false;
         }
-        if (held) {
-            press_again(sim, i, &before);
-            *result = true;
-        }
+        *result = *result || (due && is_balanced(&rest));
     }
     return true;
 }

@@ -15,8 +15,9 @@ PRBM bool rephase(Simulation *sim, Problem *problem);
 PRBM void unsettle(Simulation *sim);
 /* Make the settled stops that are open forces; return whether there are any. */
 PRBM bool press_released(Simulation *sim);
-/* Settle the contacts at the front that have been calm for a contact time. */
-PRBM bool settle_calm(Simulation *sim, Problem *problem);
+/* Settle the contacts at the front that have been calm for a contact time.  balances (s,): the
+ * indentations at which the other calm contacts would be in balance, 0 for all other stops. */
+PRBM bool settle_calm(Simulation *sim, double *balances, Problem *problem);
 /* Whether settle_calm would settle a contact in model exchange, where the front is the present. */
 PRBM bool settles_here(Simulation *sim, bool *result, Problem *problem);
 /* Add force and indentation at the front to the maxima; at: an evaluation there.  If the motion is

@@ -555,3 +555,16 @@ PRBM bool switching_time(Simulation *sim, const Guard *guard, int contact, Fall 
     }
     return !search.failed;
 }
+
+PRBM bool balance_time(Simulation *sim, int stop, double depth, Fall *fall, Problem *problem) {
+    const Guard guard = {"balance", indentation_guard, false};
+    const Arc *arc = &sim->state.arc;
+    Search search = {sim, &guard, stop, false, problem};
+    ArcGuard on_arc = arc_guard(&search);
+    double end = arc->start + arc->h;
+    on_arc.sign = guard_at(&on_arc, arc->start) > depth ? 1.0 : -1.0;
+    on_arc.offset = -on_arc.sign * depth;
+    fall->found = guard_at(&on_arc, end) < 0.0;
+    fall->time = fall->found ? locate(&on_arc, arc->start, end) : 0.0;
+    return !search.failed;
+}

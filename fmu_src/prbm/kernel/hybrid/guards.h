@@ -58,6 +58,8 @@ PRBM bool reversal_time(Simulation *sim, const Guard *guard, int contact, Fall *
                         Problem *problem);
 PRBM bool closing_time(Simulation *sim, const Guard *guard, int stop, Fall *fall,
                        Problem *problem);
+/* Find the first time in the latest step at which an indentation passes a depth [m]. */
+PRBM bool balance_time(Simulation *sim, int stop, double depth, Fall *fall, Problem *problem);
 PRBM void sample_arc(Simulation *sim); /* for reversal_time and closing_time */
 
 #endif
