@@ -33,7 +33,7 @@ from ..mechanics.stress import SectionStresses, section_stresses
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from ..mechanism.parameters import number
-from . import compliant, contact_modes, events, impacts, snapshot, walls
+from . import compliant, contact_modes, contact_peaks, events, impacts, snapshot, walls
 from .arc import Arc, Node
 from .configuration import Configuration, Magnitudes
 from .events import Event, EventKind, EventWindow
@@ -269,7 +269,9 @@ class Simulation:
     def _restart(self, moved: tuple[Wall, ...]) -> None:
         """Continue from the present state with the present inputs, walls and parameters."""
         given, configuration = _impulses(self.mechanism, self.given), self.prepared
-        self.front = compliant.latched_until(self.configuration, self.front, self.arc, self.time)
+        self.front = contact_peaks.latched_until(
+            self.configuration, self.front, self.arc, self.time
+        )
         pushed = not np.array_equal(given, self.received)
         y = self._end_of_step(shown=pushed)
         if configuration is not self.configuration:
@@ -304,7 +306,7 @@ class Simulation:
     def _apply(self, event: Event) -> None:
         """Apply an event at the front."""
         self.window = self.window.counting(event, self.configuration.scales)
-        front = compliant.latched_until(self.configuration, self.front, self.arc, event.time)
+        front = contact_peaks.latched_until(self.configuration, self.front, self.arc, event.time)
         self._set_front(*events.apply(self.configuration, front, event))
         if event.kind is EventKind.IMPACT:
             self.controller, self.front = compliant.shortened(
@@ -432,7 +434,7 @@ class Simulation:
         if self._output_cache is None or self._output_cache[0] != self.time:
             constant = {"mode.frequency": self.frequency, **self.configuration.calculated}
             peaks = self.peaks.passed() if self.time >= self.front.time else self.peaks
-            front = compliant.latched_until(self.configuration, self.front, self.arc, self.time)
+            front = contact_peaks.latched_until(self.configuration, self.front, self.arc, self.time)
             out = all_outputs(
                 self.equations, front.latched, peaks, self.time, self.state(), constant
             )
