@@ -193,6 +193,24 @@ def test_a_wall_that_jumps_in_speed_raises_the_reference_speed():
     assert sim.contacts.touching[0].reference_speed > 2.5 * before
 
 
+@pytest.mark.parametrize(("exponent", "stiffness"), [(1.0, 1e8), (1.5, 1e12)])
+def test_the_reference_speed_at_first_touch_is_the_largest_of_the_contact(exponent, stiffness):
+    """A force accelerates the body, by less than a thousandth, until the contact's equals it."""
+    own = point_mass(stiffness=stiffness, exponent=exponent, displacement=-1e-9, velocity=0.02)
+    sim, top, phases = Simulation(own, {"push.x": 0.1}), 0.0, set()
+    while not phases:
+        sim.advance(sim.time + 5e-9)
+        phases |= {touching.phase for touching in sim.contacts.touching if touching}
+    reference = sim.contacts.touching[0].reference_speed
+    for _ in range(100):
+        top = max(top, -sim.outputs()["stop.gap_rate"])
+        sim.advance(sim.time + 5e-9)
+        phases |= {touching.phase for touching in sim.contacts.touching if touching}
+    assert phases == {Phase.PRESSED}
+    assert reference / sim.outputs()["stop.approach_speed"] > 1 + 5e-5
+    assert reference == pytest.approx(top, rel=5e-7)
+
+
 def test_a_body_that_is_pushed_into_the_stop_raises_the_reference_speed_with_its_own():
     """A force that accelerates the body in contact: the reference speed follows its speed."""
     sim = Simulation(point_mass(stiffness=1e4, displacement=-1e-9, velocity=2e-3), {"push.x": 1.0})

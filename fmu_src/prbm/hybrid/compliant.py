@@ -15,6 +15,7 @@ import numpy as np
 
 from ..base.tolerances import (
     DEPENDENT_FRICTION_RTOL,
+    FIRST_RISE_MAX,
     IMPACT_COUNT_MAX,
     SETTLED_FORCE_RTOL,
     SETTLING_FACTOR,
@@ -53,7 +54,30 @@ def touch(configuration: Configuration, front: Front, stop: int) -> Front:
             approach_speed=speed,
         )
         front = front.with_latched(stop, latched)
-    return contact_modes.settle(configuration, rephased(front))
+    return contact_modes.settle(configuration, rephased(_raised(front, stop)))
+
+
+def _raised(front: Front, stop: int) -> Front:
+    """Return the front after first touch with the reference speed that the contact will reach.
+
+    Forces that push the body into the stop raise its speed from v until the force of the contact
+    equals them.  With a constant acceleration A, the inverse mass W and a rising contact, that is
+    at the indentation d with A = W k d^n (1 + a), and v0^2 = v^2 + 2 A d n/(n + 1).  A larger rise
+    is integrated, see :func:`switch`.
+    """
+    touching = front.contacts.touching[stop]
+    assert touching is not None
+    _, rates = front.gaps_and_rates()
+    law, speed = front.equations.compliant.laws[stop], touching.reference_speed
+    acceleration = _acceleration(front, stop) if float(-rates[stop]) >= speed else 0.0
+    if acceleration <= 0.0:
+        return front
+    depth = law.depth(acceleration / (point_mobility(front, stop) * (1.0 + law.damping)))
+    rise = acceleration * depth * law.exponent / ((law.exponent + 1.0) * speed * speed)
+    if rise > FIRST_RISE_MAX:
+        return front
+    raised = Touching(Phase.PRESSED, speed * math.sqrt(1.0 + 2.0 * rise))
+    return front.with_contacts(front.contacts.with_touching(stop, raised))
 
 
 def preloaded(configuration: Configuration, front: Front, stop: int) -> Front:

@@ -19,6 +19,7 @@ from ..base.tolerances import (
     GUARD_INTERVALS,
     LOCATION_ITERATIONS_MAX,
     PHASE_RTOL,
+    REFERENCE_SPEED_RTOL,
     RELEASE_WATCH_FACTOR,
     SETTLED_FORCE_RTOL,
 )
@@ -70,7 +71,7 @@ def switching_margin(equations: Equations, stop: int, rate: float) -> float:
     ratio = equations.compliant.laws[stop].damping_ratio(touching, rate)
     if touching.phase is Phase.FREE:
         return PHASE_RTOL - ratio
-    return min(PHASE_RTOL + ratio, 1.0 + PHASE_RTOL - rate / touching.reference_speed)
+    return min(PHASE_RTOL + ratio, 1.0 + REFERENCE_SPEED_RTOL - rate / touching.reference_speed)
 
 
 def stop_force(equations: Equations, stop: int, t: float, y: Real) -> float:

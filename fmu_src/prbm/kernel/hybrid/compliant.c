@@ -160,6 +160,34 @@ PRBM bool preload(Simulation *sim, Problem *problem) {
     return ok;
 }
 
+static bool point_mobility(Simulation *sim, int stop, double *result, Problem *problem);
+
+/* Raise the reference speed after first touch to the one that the contact will reach.  Forces that
+ * push the body into the stop raise its speed until the force of the contact equals them.  A larger
+ * rise is integrated. */
+static bool raise_reference(Simulation *sim, int stop, double rate, Problem *problem) {
+    const ComplianceLaw *law = &sim->equations.laws[stop];
+    double speed = sim->state.touching[stop].reference_speed, acceleration, inverse_mass;
+    if (rate < speed) {
+        return true;
+    }
+    if (!indentation_acceleration(sim, stop, &acceleration, problem)) {
+        return false;
+    }
+    if (acceleration <= 0.0) {
+        return true;
+    }
+    if (!point_mobility(sim, stop, &inverse_mass, problem)) {
+        return false;
+    }
+    double depth = contact_depth(law, acceleration / (inverse_mass * (1.0 + law->damping)));
+    double rise = acceleration * depth * law->exponent / ((law->exponent + 1.0) * speed * speed);
+    if (rise <= FIRST_RISE_MAX) {
+        set_phase(sim, stop, PHASE_PRESSED, speed * sqrt(1.0 + 2.0 * rise), 0.0);
+    }
+    return true;
+}
+
 /* Shorten the first step of a contact to a fraction of the depth of a free hit over its speed. */
 static bool shorten_step(Simulation *sim, int stop, Problem *problem);
 
@@ -179,8 +207,8 @@ PRBM bool touch(Simulation *sim, int stop, Problem *problem) {
         fresh.approach_speed = speed;
         *latched = fresh;
     }
-    return rephase(sim, problem) && settle(sim, NULL, 0, NULL, problem) &&
-           shorten_step(sim, stop, problem);
+    return raise_reference(sim, stop, speed, problem) && rephase(sim, problem) &&
+           settle(sim, NULL, 0, NULL, problem) && shorten_step(sim, stop, problem);
 }
 
 PRBM bool switch_phase(Simulation *sim, int stop, Problem *problem) {

@@ -37,7 +37,8 @@ PRBM double switching_guard(const Equations *equations, const Instant *at, int c
     if (touching->phase == PHASE_FREE) {
         return PHASE_RTOL - ratio;
     }
-    return lesser(PHASE_RTOL + ratio, 1.0 + PHASE_RTOL - rate / touching->reference_speed);
+    return lesser(PHASE_RTOL + ratio,
+                  1.0 + REFERENCE_SPEED_RTOL - rate / touching->reference_speed);
 }
 
 /* The second derivative of the indentation, with which the reference speed rises. */
