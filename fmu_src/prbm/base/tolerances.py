@@ -80,7 +80,7 @@ REFERENCE_SPEED_RTOL = 1e-6  # Of the reference speed: excess of the rate at whi
 FIRST_RISE_MAX = 1e-3  # Of the reference speed: rise after first touch that is not integrated.
 SETTLED_FORCE_RTOL = 1e-2  # Of the elastic force: difference at which a settled stop is released.
 SETTLING_FACTOR = 0.5  # Of SETTLED_FORCE_RTOL: largest difference of a contact that settles.
-TOUCH_STEP_FACTOR = 0.5  # Of the depth of a free hit over its speed: first step of a contact.
+TOUCH_STEP_FACTOR = 0.4  # Of the depth of a free hit over its speed: first step of a contact.
 TOUCH_STEP_CURVED_FACTOR = 0.05  # The same if the exponent is above 1: F is not smooth at d = 0.
 CONTACT_ERROR_FACTOR = 100.0  # Of the allowed error of a step: that of indentation and its rate.
 INDENTATION_MIN_RTOL = 1e-7  # Of the size: smallest scale of the error of an indentation.

@@ -37,9 +37,13 @@ static double rest_speed_of(const Simulation *sim, int stop) {
 
 /* Set the contact of a stop.  A contact that becomes free, or begins, has no friction. */
 static void set_phase(Simulation *sim, int stop, Phase phase, double speed, double depth) {
-    Touching touching = {phase, speed, depth};
+    Touching touching = {phase, speed, depth}, *now = &sim->state.touching[stop];
     ContactMode *mode = &sim->state.modes[stop];
-    sim->state.touching[stop] = touching;
+    if (*mode != CONTACT_OPEN && now->phase == phase && now->reference_speed == speed &&
+        now->depth == depth) {
+        return;
+    }
+    *now = touching;
     if (phase == PHASE_NONE) {
         *mode = CONTACT_OPEN;
     } else if (phase == PHASE_FREE || *mode == CONTACT_OPEN) {
@@ -165,9 +169,10 @@ static bool point_mobility(Simulation *sim, int stop, double *result, Problem *p
 /* Raise the reference speed after first touch to the one that the contact will reach.  Forces that
  * push the body into the stop raise its speed until the force of the contact equals them.  A larger
  * rise is integrated. */
-static bool raise_reference(Simulation *sim, int stop, double rate, Problem *problem) {
+static bool raise_reference(Simulation *sim, int stop, double rate, double inverse_mass,
+                            Problem *problem) {
     const ComplianceLaw *law = &sim->equations.laws[stop];
-    double speed = sim->state.touching[stop].reference_speed, acceleration, inverse_mass;
+    double speed = sim->state.touching[stop].reference_speed, acceleration;
     if (rate < speed) {
         return true;
     }
@@ -176,9 +181,6 @@ static bool raise_reference(Simulation *sim, int stop, double rate, Problem *pro
     }
     if (acceleration <= 0.0) {
         return true;
-    }
-    if (!point_mobility(sim, stop, &inverse_mass, problem)) {
-        return false;
     }
     double depth = contact_depth(law, acceleration / (inverse_mass * (1.0 + law->damping)));
     double rise = acceleration * depth * law->exponent / ((law->exponent + 1.0) * speed * speed);
@@ -189,10 +191,10 @@ static bool raise_reference(Simulation *sim, int stop, double rate, Problem *pro
 }
 
 /* Shorten the first step of a contact to a fraction of the depth of a free hit over its speed. */
-static bool shorten_step(Simulation *sim, int stop, Problem *problem);
+static void shorten_step(Simulation *sim, int stop, double inverse_mass);
 
 PRBM bool touch(Simulation *sim, int stop, Problem *problem) {
-    double gaps[STOPS_MAX], rates[STOPS_MAX];
+    double gaps[STOPS_MAX], rates[STOPS_MAX], inverse_mass;
     Latched *latched = &sim->state.latched[stop];
     gaps_and_rates(sim, gaps, rates);
     double speed = -rates[stop];
@@ -207,8 +209,13 @@ PRBM bool touch(Simulation *sim, int stop, Problem *problem) {
         fresh.approach_speed = speed;
         *latched = fresh;
     }
-    return raise_reference(sim, stop, speed, problem) && rephase(sim, problem) &&
-           settle(sim, NULL, 0, NULL, problem) && shorten_step(sim, stop, problem);
+    if (!point_mobility(sim, stop, &inverse_mass, problem) ||
+        !raise_reference(sim, stop, speed, inverse_mass, problem) || !rephase(sim, problem) ||
+        !settle(sim, NULL, 0, NULL, problem)) {
+        return false;
+    }
+    shorten_step(sim, stop, inverse_mass);
+    return true;
 }
 
 PRBM bool switch_phase(Simulation *sim, int stop, Problem *problem) {
@@ -284,22 +291,18 @@ static bool point_mobility(Simulation *sim, int stop, double *result, Problem *p
     return ok;
 }
 
-static bool shorten_step(Simulation *sim, int stop, Problem *problem) {
+static void shorten_step(Simulation *sim, int stop, double inverse_mass) {
     const Touching *touching = &sim->state.touching[stop];
     const ComplianceLaw *law = &sim->equations.laws[stop];
-    double inverse_mass = 0.0, speed = touching->reference_speed, rise = law->exponent + 1.0;
+    double speed = touching->reference_speed, rise = law->exponent + 1.0;
     if (!is_pressed(touching)) {
-        return true;
-    }
-    if (!point_mobility(sim, stop, &inverse_mass, problem)) {
-        return false;
+        return;
     }
     double work = 0.5 * rise * (speed * speed) / (law->stiffness * inverse_mass);
     double factor = law->exponent == 1.0 ? TOUCH_STEP_FACTOR : TOUCH_STEP_CURVED_FACTOR;
     double h = rounded_step(factor * power(work, 1.0 / rise) / speed);
     sim->state.touches[stop].step = sim->state.step_size;
     sim->state.step_size = lesser(h, sim->state.step_size);
-    return true;
 }
 
 /* The kinetic energy at the front with the rates v. */

@@ -47,6 +47,7 @@ PRBM bool release_near(Simulation *sim);
 PRBM bool slip_near(Simulation *sim);
 PRBM bool reversal_near(Simulation *sim);
 PRBM bool pressed_near(Simulation *sim);
+PRBM bool separation_near(Simulation *sim);
 PRBM bool impact_near(Simulation *sim);
 /* Find the first time in the latest step at which the guard of a contact falls to zero.  The caller
  * sets fall->found to false.  Return false on failure. */
