@@ -1405,6 +1405,7 @@ def test_equations_with_pressed_stops_are_the_same(phase, mode):
     contact_force=compliance.ComplianceLaw.force,
     contact_energy=compliance.ComplianceLaw.energy,
     contact_tangent=compliance.ComplianceLaw.tangent,
+    contact_depth=compliance.ComplianceLaw.depth,
     is_pressed=ContactState.pressed.func,
 )
 def test_laws_of_compliant_stops_are_the_same():
@@ -1424,6 +1425,7 @@ def test_laws_of_compliant_stops_are_the_same():
             (kernel().contact_force(mine, touching, d, rate), theirs.force(one, d, rate)),
             (kernel().contact_energy(mine, d), theirs.energy(d)),
             (kernel().contact_tangent(mine, abs(d)), theirs.tangent(abs(d))),
+            (kernel().contact_depth(mine, abs(d)), theirs.depth(abs(d))),
         ]
         for found, expected in pairs:
             assert found == pytest.approx(expected, rel=1e-12)

@@ -75,15 +75,17 @@ IMPACT_COUNT_MAX = 2147483647  # Largest Integer of FMI.
 DAMPING_ELASTIC_MIN = 0.9999  # Restitution above which the first term of a series is exact.
 DAMPING_PLASTIC_MAX = 0.03  # Restitution below which the factor of the damping is 1/e.
 DAMPING_BISECTIONS = 60  # Bisections of the factor of the damping.
-PHASE_RTOL = 1e-9  # Of the force and of the reference speed: excess at which a contact switches.
-SETTLED_DAMPING_RTOL = 1e-3  # Of the elastic force: largest damping of a contact that settles.
+PHASE_RTOL = 1e-9  # Of the elastic force: excess of the damping at which a contact switches.
+REFERENCE_SPEED_RTOL = 1e-6  # Of the reference speed: excess of the rate at which it rises.
+FIRST_RISE_MAX = 1e-3  # Of the reference speed: rise after first touch that is not integrated.
 SETTLED_FORCE_RTOL = 1e-2  # Of the elastic force: difference at which a settled stop is released.
 SETTLING_FACTOR = 0.5  # Of SETTLED_FORCE_RTOL: largest difference of a contact that settles.
-TOUCH_STEP_FACTOR = 0.5  # Of the depth of a free hit over its speed: first step of a contact.
+TOUCH_STEP_FACTOR = 0.4  # Of the depth of a free hit over its speed: first step of a contact.
 TOUCH_STEP_CURVED_FACTOR = 0.05  # The same if the exponent is above 1: F is not smooth at d = 0.
 CONTACT_ERROR_FACTOR = 100.0  # Of the allowed error of a step: that of indentation and its rate.
 INDENTATION_MIN_RTOL = 1e-7  # Of the size: smallest scale of the error of an indentation.
 PEAK_REFINEMENTS = 3  # Parabolas through ever closer points at a peak.
+PEAK_REACH_FACTOR = 1.5  # Of half a step, from its middle: no peak if the vertex is further away.
 PEAK_REFINEMENT_FACTOR = 0.125  # Ratio of the distances of these points.
 
 # --- location of events ------------------------------------------------------------------------

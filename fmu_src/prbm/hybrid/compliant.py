@@ -7,19 +7,16 @@ constraint differs from the elastic force.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
-from ..base.errors import SimulationError
 from ..base.tolerances import (
     DEPENDENT_FRICTION_RTOL,
-    GUARD_INTERVALS,
+    FIRST_RISE_MAX,
     IMPACT_COUNT_MAX,
-    PEAK_REFINEMENT_FACTOR,
-    PEAK_REFINEMENTS,
-    SETTLED_DAMPING_RTOL,
     SETTLED_FORCE_RTOL,
     SETTLING_FACTOR,
     TOUCH_STEP_CURVED_FACTOR,
@@ -28,14 +25,15 @@ from ..base.tolerances import (
 from ..mechanics.arrays import Real
 from ..mechanics.compliant_stops import Extra
 from ..mechanics.contact_state import Phase, Touching
-from ..mechanics.dynamics import Equations
 from ..mechanics.inputs import Wall
 from ..mechanics.kinetics import kinetic_energy
 from ..mechanics.modal import fundamental_at, modal_ratio
 from . import contact_modes
 from .arc import Arc
 from .configuration import Configuration
+from .contact_peaks import check_depth, latched_until
 from .front import Front, Latched, Touch
+from .guards import StepView, fall_time, indentation
 from .records import Impact
 from .stepping import StepSizeController, rounded_step
 
@@ -56,7 +54,30 @@ def touch(configuration: Configuration, front: Front, stop: int) -> Front:
             approach_speed=speed,
         )
         front = front.with_latched(stop, latched)
-    return contact_modes.settle(configuration, rephased(front))
+    return contact_modes.settle(configuration, rephased(_raised(front, stop)))
+
+
+def _raised(front: Front, stop: int) -> Front:
+    """Return the front after first touch with the reference speed that the contact will reach.
+
+    Forces that push the body into the stop raise its speed from v until the force of the contact
+    equals them.  With a constant acceleration A, the inverse mass W and a rising contact, that is
+    at the indentation d with A = W k d^n (1 + a), and v0^2 = v^2 + 2 A d n/(n + 1).  A larger rise
+    is integrated, see :func:`switch`.
+    """
+    touching = front.contacts.touching[stop]
+    assert touching is not None
+    _, rates = front.gaps_and_rates()
+    law, speed = front.equations.compliant.laws[stop], touching.reference_speed
+    acceleration = _acceleration(front, stop) if float(-rates[stop]) >= speed else 0.0
+    if acceleration <= 0.0:
+        return front
+    depth = law.depth(acceleration / (point_mobility(front, stop) * (1.0 + law.damping)))
+    rise = acceleration * depth * law.exponent / ((law.exponent + 1.0) * speed * speed)
+    if rise > FIRST_RISE_MAX:
+        return front
+    raised = Touching(Phase.PRESSED, speed * math.sqrt(1.0 + 2.0 * rise))
+    return front.with_contacts(front.contacts.with_touching(stop, raised))
 
 
 def preloaded(configuration: Configuration, front: Front, stop: int) -> Front:
@@ -160,46 +181,89 @@ def unsettled(front: Front) -> Front:
 # --- settling ---------------------------------------------------------------------------------
 
 
+class Rest(NamedTuple):
+    """A pressed contact that vibrates slowly, and the constraint that would hold it.
+
+    Parameters
+    ----------
+    front : Front
+        The front with the constraint at the present indentation, not projected.
+    force : float
+        Force of the constraint [N].
+    elastic : float
+        Elastic force of the contact [N].
+    time : float
+        Contact time, half the period of small vibrations [s].
+    """
+
+    front: Front
+    force: float
+    elastic: float
+    time: float
+
+    @property
+    def balanced(self) -> bool:
+        """Whether the contact can settle: the constraint is released at twice this difference."""
+        limit = SETTLING_FACTOR * SETTLED_FORCE_RTOL * self.elastic
+        return abs(self.force - self.elastic) <= limit
+
+
 def settled(
     configuration: Configuration, front: Front, arc: Arc | None
-) -> tuple[Front, list[Impact]]:
+) -> tuple[Front, list[Impact], dict[int, float]]:
     """Return the front in which contacts that have been calm for a contact time are settled.
 
-    Its outputs have the maxima up to the end of the step that leads to it.
+    Its outputs have the maxima up to the end of the step that leads to it.  The mapping has the
+    indentations [m] at which the other calm contacts would be in balance: a step ends there.
     """
     impacts: list[Impact] = []
+    balances: dict[int, float] = {}
     front = latched_until(configuration, front, arc, front.time)
     for i in front.contacts.pressed:
-        touch, calm = front.touches[i], _calm(configuration, front, i)
+        touch, rest = front.touches[i], _calm(configuration, front, i)
         assert touch is not None
-        since = (front.time if touch.calm_since is None else touch.calm_since) if calm else None
+        since = (front.time if touch.calm_since is None else touch.calm_since) if rest else None
         if since != touch.calm_since:
             front = front.with_touch(i, replace(touch, calm_since=since))
-        if since is not None and front.time - since >= _contact_time(front, i):
-            front, found = _settled(configuration, front, i)
+        if rest is None or since is None or front.time - since < rest.time:
+            continue
+        if rest.balanced:
+            front, found = _settled(configuration, front, i, rest)
             impacts += found
-    return front, impacts
+        else:
+            balances[i] = front.equations.compliant.laws[i].depth(rest.force)
+    return front, impacts, balances
 
 
-def _calm(configuration: Configuration, front: Front, stop: int) -> bool:
-    """Return whether the indentation is slow and the damping of a contact is small."""
+def _calm(configuration: Configuration, front: Front, stop: int) -> Rest | None:
+    """Return the rest of a contact that vibrates more slowly than ``rest_speed``, else None.
+
+    The speed is that at which the contact would pass its balance.  A contact that is stuck does not
+    move: it stays a force.
+    """
     touching = front.contacts.touching[stop]
     gaps, rates = front.gaps_and_rates()
     assert touching is not None
-    if touching.phase is Phase.FREE or gaps[stop] >= 0.0:
-        return False
-    rate = float(-rates[stop])
-    damping = abs(front.equations.compliant.laws[stop].damping_ratio(touching, rate) - 1.0)
-    return (
-        abs(rate) < configuration.stop_value(stop, "rest_speed") and damping < SETTLED_DAMPING_RTOL
-    )
+    depth, rate = float(-gaps[stop]), float(-rates[stop])
+    least = configuration.stop_value(stop, "rest_speed")
+    if touching.phase is Phase.FREE or depth <= 0.0 or abs(rate) >= least or _stuck(front, stop):
+        return None
+    held = replace(touching, phase=Phase.SETTLED, depth=depth)
+    # The displacement of the wall by the contact becomes part of its motion.
+    folded, walls = fold_gives(front, (stop,))
+    rest = folded.with_walls(walls).with_contacts(front.contacts.with_touching(stop, held))
+    law, inverse_mass = front.equations.compliant.laws[stop], point_mobility(front, stop)
+    force, elastic = _stop_force(rest, stop), law.elastic_force(depth)
+    stiffness = law.tangent(depth)
+    speed = math.hypot(rate, (force - elastic) * math.sqrt(inverse_mass / stiffness))
+    if force <= 0.0 or speed >= least:
+        return None
+    return Rest(rest, force, elastic, math.pi / math.sqrt(stiffness * inverse_mass))
 
 
-def _contact_time(front: Front, stop: int) -> float:
-    """Return half the period of small vibrations of a pressed contact [s]."""
-    gaps, _ = front.gaps_and_rates()
-    stiffness = front.equations.compliant.laws[stop].tangent(float(-gaps[stop]))
-    return math.pi / math.sqrt(stiffness * point_mobility(front, stop))
+def _stop_force(front: Front, stop: int) -> float:
+    """Return the force of a stop that is a constraint [N]."""
+    return float(front.equations.stop_forces(front.evaluate().lam)[stop])
 
 
 def point_mobility(front: Front, stop: int) -> float:
@@ -217,33 +281,39 @@ def _stuck(front: Front, stop: int) -> bool:
     return left <= DEPENDENT_FRICTION_RTOL * contact_modes.mobility(M, loops, G)
 
 
-def _settled(configuration: Configuration, front: Front, stop: int) -> tuple[Front, list[Impact]]:
-    """Return the front in which a calm contact is settled, if the forces are in balance.
-
-    A contact that is stuck does not move: it stays a force.
-    """
-    touching = front.contacts.touching[stop]
-    assert touching is not None
-    if _stuck(front, stop):
-        return front, []
-    gaps, _ = front.gaps_and_rates()
-    depth = float(-gaps[stop])
-    held = replace(touching, phase=Phase.SETTLED, depth=depth)
-    # The displacement of the wall by the contact becomes part of its motion.
-    folded, walls = fold_gives(front, (stop,))
-    rest = folded.with_walls(walls).with_contacts(front.contacts.with_touching(stop, held))
-    elastic = front.equations.compliant.laws[stop].elastic_force(depth)
-    force = float(rest.equations.stop_forces(rest.evaluate().lam)[stop])
-    if abs(force - elastic) > SETTLING_FACTOR * SETTLED_FORCE_RTOL * elastic:
-        return front, []
-    slow = rest.projected()
+def _settled(
+    configuration: Configuration, front: Front, stop: int, rest: Rest
+) -> tuple[Front, list[Impact]]:
+    """Return the front in which a contact is settled; its kinetic energy is a loss."""
+    slow = rest.front.projected()
     M = front.equations.mass_and_loops(front.q)[1]
-    loss = kinetic_energy(M, rest.v) - kinetic_energy(M, slow.v)
+    loss = kinetic_energy(M, rest.front.v) - kinetic_energy(M, slow.v)
     y = slow.y.copy()
     y[2 * front.equations.n] += loss
     y[2 * front.equations.n + 2 + front.equations.compliant.index(stop, Extra.LOSS)] += loss
     slow, impacts = _finished(configuration, replace(slow, y=y), stop)
+    touch = slow.touches[stop]
+    assert touch is not None
+    slow = slow.with_touch(stop, replace(touch, calm_since=None))
     return contact_modes.settle(configuration, slow), impacts
+
+
+def balance_time(view: StepView, balances: Mapping[int, float]) -> float | None:
+    """Return when a contact first passes the indentation of its balance [m] in a step, or None."""
+    start, end = view.arc.start, view.arc.start + view.arc.h
+    times = []
+    for stop, depth in balances.items():
+        inside = view.along(indentation, stop)
+        sign = 1.0 if inside(start) > depth else -1.0
+        if sign * (inside(end) - depth) < 0.0:
+            margin = _margin(inside, sign, depth)
+            times.append(fall_time(margin, start, end))
+    return min(times, default=None)
+
+
+def _margin(value: Callable[[float], float], sign: float, level: float) -> Callable[[float], float]:
+    """Return the distance of a function from a level, on the side of a sign."""
+    return lambda t: sign * (value(t) - level)
 
 
 def present_walls(front: Front, state: Callable[[], Real]) -> tuple[Wall, ...]:
@@ -307,100 +377,6 @@ def _modal_restitution(front: Front, touch: Touch) -> float:
     """
     momentum = np.array(touch.momentum)
     return modal_ratio(momentum, np.array(touch.v), momentum, front.v)
-
-
-def latched_until(
-    configuration: Configuration, front: Front, arc: Arc | None, time: float
-) -> Front:
-    """Return the front whose outputs have the maxima up to a time of a step.
-
-    Parameters
-    ----------
-    configuration : Configuration
-        Mechanism and scales.
-    front : Front
-        The end of the step, with the maxima up to its start.
-    arc : Arc or None
-        The step that leads to the front.
-    time : float
-        A time in the step, or later [s].
-
-    Raises
-    ------
-    SimulationError
-        If an indentation is larger than the mechanism.
-    """
-    end = min(time, front.time)
-    if not front.equations.pressed or arc is None or end <= arc.start:
-        return front
-    latched, equations = list(front.latched), front.equations
-    for i in equations.pressed:
-        depth, force = (
-            _largest(value, arc.start, end)
-            for value in (_along(equations, arc, i, part) for part in (_depth, _force))
-        )
-        check_depth(configuration, i, depth, end)
-        latched[i] = replace(
-            latched[i],
-            peak_force=max(latched[i].peak_force, force),
-            indentation=max(latched[i].indentation, depth),
-        )
-    return replace(front, latched=tuple(latched))
-
-
-def check_depth(configuration: Configuration, stop: int, depth: float, time: float) -> None:
-    """Reject an indentation [m] at a time [s] that is larger than the mechanism.
-
-    Raises
-    ------
-    SimulationError
-        If it is.
-    """
-    if not depth <= configuration.scales.length:
-        raise SimulationError(
-            f"{configuration.mechanism.stops[stop].name} is indented by {depth:.3g} m at t = "
-            f"{time:.9g} s, more than the size of the mechanism: raise its stiffness, or move it"
-        )
-
-
-def _depth(equations: Equations, stop: int, gap: float, rate: float) -> float:
-    return -gap
-
-
-def _force(equations: Equations, stop: int, gap: float, rate: float) -> float:
-    return equations.compliant.force(stop, -gap, -rate)
-
-
-def _along(
-    equations: Equations, arc: Arc, stop: int, part: Callable[[Equations, int, float, float], float]
-) -> Callable[[float], float]:
-    """Return the force or the indentation of a pressed stop as a function of time in a step."""
-
-    def value(t: float) -> float:
-        y, n = arc.at(t), equations.n
-        e, v, extras = equations.system.directions(y[:n]), y[n : 2 * n], y[2 * n + 2 :]
-        gap = float(equations.gaps(t, e, extras)[stop])
-        return part(equations, stop, gap, float(equations.gap_rates(t, e, v, extras)[stop]))
-
-    return value
-
-
-def _largest(value: Callable[[float], float], start: float, end: float) -> float:
-    """Return the largest value between two times, by parabolas through its largest sample."""
-    times = np.linspace(start, end, GUARD_INTERVALS + 1).tolist()
-    samples = [value(t) for t in times]
-    k = int(np.argmax(samples))
-    t = times[min(max(k, 1), GUARD_INTERVALS - 1)]
-    distance, result = times[1] - times[0], float(samples[k])
-    for _ in range(PEAK_REFINEMENTS):
-        before, at, after = (value(min(max(t + s * distance, start), end)) for s in (-1, 0, 1))
-        bend = before - 2.0 * at + after
-        if bend < 0.0:
-            shift = 0.5 * (before - after) / bend
-            t = min(max(t + distance * min(max(shift, -1.0), 1.0), start), end)
-        result = max(result, value(t))
-        distance *= PEAK_REFINEMENT_FACTOR
-    return result
 
 
 # --- steps ------------------------------------------------------------------------------------

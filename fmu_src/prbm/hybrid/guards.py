@@ -19,6 +19,7 @@ from ..base.tolerances import (
     GUARD_INTERVALS,
     LOCATION_ITERATIONS_MAX,
     PHASE_RTOL,
+    REFERENCE_SPEED_RTOL,
     RELEASE_WATCH_FACTOR,
     SETTLED_FORCE_RTOL,
 )
@@ -70,7 +71,7 @@ def switching_margin(equations: Equations, stop: int, rate: float) -> float:
     ratio = equations.compliant.laws[stop].damping_ratio(touching, rate)
     if touching.phase is Phase.FREE:
         return PHASE_RTOL - ratio
-    return min(PHASE_RTOL + ratio, 1.0 + PHASE_RTOL - rate / touching.reference_speed)
+    return min(PHASE_RTOL + ratio, 1.0 + REFERENCE_SPEED_RTOL - rate / touching.reference_speed)
 
 
 def stop_force(equations: Equations, stop: int, t: float, y: Real) -> float:
@@ -321,15 +322,9 @@ def reversal_time(view: StepView, guard: Guard, contact: int) -> float | None:
 
 def switching_time(view: StepView, guard: Guard, stop: int) -> float | None:
     """Return when the phase of a pressed stop changes."""
-    equations, (times, _, _, _) = view.equations, view.samples
-    touching = equations.contacts.touching[stop]
-    z = view.along(guard, stop)
-    if touching is not None and touching.phase is Phase.RISING:
-        seen = [(float(t), z(float(t))) for t in times[:: GUARD_INTERVALS // 2]]
-        return _first_fall(z, seen)
-    _, rates = view.gaps_and_rates
-    margins = [switching_margin(equations, stop, -float(rate)) for rate in rates[:, stop]]
-    return _first_fall(z, list(zip(times.tolist(), margins, strict=True)))
+    z, arc = view.along(guard, stop), view.arc
+    times = (arc.start, arc.start + arc.h / 2, arc.start + arc.h)
+    return _first_fall(z, [(t, z(t)) for t in times])
 
 
 def release_time(view: StepView, guard: Guard, stop: int) -> float | None:

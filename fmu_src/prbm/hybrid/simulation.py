@@ -33,7 +33,7 @@ from ..mechanics.stress import SectionStresses, section_stresses
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from ..mechanism.parameters import number
-from . import compliant, contact_modes, events, impacts, snapshot, walls
+from . import compliant, contact_modes, contact_peaks, events, impacts, snapshot, walls
 from .arc import Arc, Node
 from .configuration import Configuration, Magnitudes
 from .events import Event, EventKind, EventWindow
@@ -269,7 +269,9 @@ class Simulation:
     def _restart(self, moved: tuple[Wall, ...]) -> None:
         """Continue from the present state with the present inputs, walls and parameters."""
         given, configuration = _impulses(self.mechanism, self.given), self.prepared
-        self.front = compliant.latched_until(self.configuration, self.front, self.arc, self.time)
+        self.front = contact_peaks.latched_until(
+            self.configuration, self.front, self.arc, self.time
+        )
         pushed = not np.array_equal(given, self.received)
         y = self._end_of_step(shown=pushed)
         if configuration is not self.configuration:
@@ -304,7 +306,7 @@ class Simulation:
     def _apply(self, event: Event) -> None:
         """Apply an event at the front."""
         self.window = self.window.counting(event, self.configuration.scales)
-        front = compliant.latched_until(self.configuration, self.front, self.arc, event.time)
+        front = contact_peaks.latched_until(self.configuration, self.front, self.arc, event.time)
         self._set_front(*events.apply(self.configuration, front, event))
         if event.kind is EventKind.IMPACT:
             self.controller, self.front = compliant.shortened(
@@ -323,7 +325,9 @@ class Simulation:
     def _take_step(self) -> None:
         """Take one step from the front, up to the first event within it."""
         self.step_count += 1
-        front, counted = compliant.settled(self.configuration, walls.arrived(self.front), self.arc)
+        front, counted, balances = compliant.settled(
+            self.configuration, walls.arrived(self.front), self.arc
+        )
         if front.equations is not self.front.equations:
             for i in set(self.front.contacts.pressed) & set(front.contacts.held):
                 self.controller = compliant.lengthened(self.controller, front.touches[i])
@@ -340,13 +344,18 @@ class Simulation:
         arc = Arc(front.time, step.h, front.time + step.h, front.y, step.k, n, before)
         view = StepView(configuration.scales, equations, arc, step.forces)
         event = events.first_event(view)
+        balance = compliant.balance_time(view, balances) if event is None else None
         found: Evaluation | None = None
-        if event is None:
+        if event is None and balance is None:
             y, self.k1, found = step.y, step.k[-1], step.last
         else:
             # The event does not shorten the next step.
             controller = StepSizeController(step.h, controller.last_error)
-            event, arc, y = _cut(configuration, event, view)
+            if event is not None:
+                event, arc, y = _cut(configuration, event, view)
+            elif balance is not None:
+                y = closed(configuration, equations, balance, arc.at(balance))
+                arc = replace(arc, end=balance)
             self.k1 = None
         self.front = replace(front, time=arc.end, y=y)
         self.peaks = self.peaks.stepped(self.front, found)
@@ -425,7 +434,7 @@ class Simulation:
         if self._output_cache is None or self._output_cache[0] != self.time:
             constant = {"mode.frequency": self.frequency, **self.configuration.calculated}
             peaks = self.peaks.passed() if self.time >= self.front.time else self.peaks
-            front = compliant.latched_until(self.configuration, self.front, self.arc, self.time)
+            front = contact_peaks.latched_until(self.configuration, self.front, self.arc, self.time)
             out = all_outputs(
                 self.equations, front.latched, peaks, self.time, self.state(), constant
             )

@@ -7,6 +7,7 @@
 #include "hybrid/compliant.h"
 #include "hybrid/configuration.h"
 #include "hybrid/contact_modes.h"
+#include "hybrid/contact_peaks.h"
 #include "hybrid/events.h"
 #include "hybrid/impacts.h"
 #include "hybrid/peaks.h"

@@ -8,6 +8,7 @@
 #include "hybrid/compliant.h"
 #include "hybrid/configuration.h"
 #include "hybrid/contact_modes.h"
+#include "hybrid/contact_peaks.h"
 #include "hybrid/events.h"
 #include "hybrid/guards.h"
 #include "hybrid/impacts.h"
@@ -415,7 +416,8 @@ static bool settle_contacts(Simulation *sim, Problem *problem) {
     if (sim->equations.pressed_count == 0) {
         return true;
     }
-    bool ok = settle_calm(sim, problem);
+    double balances[STOPS_MAX];
+    bool ok = settle_calm(sim, balances, problem);
     forget_outputs(sim);
     return ok;
 }

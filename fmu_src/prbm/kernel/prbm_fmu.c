@@ -47,6 +47,7 @@
 #include "hybrid/walls.c"
 #include "hybrid/impacts.c"
 #include "hybrid/compliant.c"
+#include "hybrid/contact_peaks.c"
 #include "hybrid/rest.c"
 #include "hybrid/contact_modes.c"
 #include "hybrid/stability.c"

@@ -84,6 +84,16 @@ class ComplianceLaw(NamedTuple):
         """
         return self.elastic_force(abs(d)) * abs(d) / (self.exponent + 1.0)
 
+    def depth(self, force: float) -> float:
+        """Return the indentation d at which an elastic force >= 0 [N] acts [m].
+
+        Examples
+        --------
+        >>> ComplianceLaw(8.0, 1.5, 0.0).depth(1.0)
+        0.25
+        """
+        return math.pow(force / self.stiffness, 1.0 / self.exponent)
+
     def tangent(self, d: float) -> float:
         """Return the stiffness of small motions about an indentation d > 0 [N/m]."""
         return self.exponent * self.elastic_force(d) / d

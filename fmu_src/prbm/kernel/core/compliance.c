@@ -45,6 +45,10 @@ PRBM double contact_energy(const ComplianceLaw *law, double d) {
     return elastic_force(law, fabs(d)) * fabs(d) / (law->exponent + 1.0);
 }
 
+PRBM double contact_depth(const ComplianceLaw *law, double force) {
+    return power(force / law->stiffness, 1.0 / law->exponent);
+}
+
 PRBM double contact_tangent(const ComplianceLaw *law, double d) {
     return law->exponent * elastic_force(law, d) / d;
 }

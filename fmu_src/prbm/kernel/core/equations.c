@@ -24,6 +24,7 @@ PRBM void equations_place(Equations *equations, const System *system, Memory *me
     q.held = place(memory, s, sizeof(int));
     q.pressed = place(memory, s, sizeof(int));
     q.laws = place(memory, s, sizeof(ComplianceLaw));
+    q.restitutions = place(memory, s, sizeof(double));
     q.sticking = place(memory, s + f, sizeof(int));
     q.slipping = place(memory, s + f, sizeof(int));
     q.stop_friction = place(memory, s, sizeof(double));
@@ -157,7 +158,11 @@ static void set_laws(Equations *q) {
         if (stop->compliant) {
             q->laws[i].stiffness = evaluate(stop->stiffness, values);
             q->laws[i].exponent = evaluate(stop->exponent, values);
-            q->laws[i].damping = damping_factor(evaluate(stop->restitution, values));
+            double restitution = evaluate(stop->restitution, values);
+            if (restitution != q->restitutions[i]) {
+                q->laws[i].damping = damping_factor(restitution);
+                q->restitutions[i] = restitution;
+            }
         }
     }
     for (int i = 0; i < m->friction_count; i++) {

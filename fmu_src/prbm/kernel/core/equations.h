@@ -36,6 +36,7 @@ typedef struct {
     int *pressed;           /* the compliant stops that are forces */
     int pressed_count;
     ComplianceLaw *laws;    /* (s,) of compliant stops */
+    double *restitutions;   /* (s,) from which the factors of their damping have been computed */
     int *sticking;          /* contacts; the k-th has the row first_stick + k */
     int *slipping;          /* contacts; the first slipping_stops of them are held stops */
     int slipping_stops;

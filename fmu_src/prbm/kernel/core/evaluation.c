@@ -535,12 +535,14 @@ RARE void add_pressure(const Equations *q, Evaluation *result) {
     double t = result->at.time;
     for (int k = 0; k < q->pressed_count; k++) {
         int i = q->pressed[k];
-        double d = -gap(q, i, t, result->at.e, result->at.extra);
-        double rate = -gap_rate(q, i, t, result->at.e, result->at.speed, result->at.extra);
+        const double *extra = result->at.extra;
+        row_jacobian(&gaps, i, result->at.e, result->row);
+        double d = -gap(q, i, t, result->at.e, extra);
+        double rate = -dot(q->system->n, result->row, result->at.speed) -
+                      wall_motion(&q->inputs.walls[i], t).v - give_of(q, i, extra, EXTRA_GIVE_RATE);
         double force = contact_force(&q->laws[i], &q->contacts.touching[i], d, rate);
         result->pressure[i] = force;
         result->contact_loss[i] = (force - elastic_force(&q->laws[i], d)) * rate;
-        row_jacobian(&gaps, i, result->at.e, result->row);
         add_scaled(q->system->n, force, result->row, result->a);
     }
 }

@@ -1,7 +1,6 @@
 /* Contacts at compliant stops: first touch, phases, settling, separation, and their outputs: the
  * twin of hybrid/compliant.py. */
 #include <math.h>
-#include <string.h>
 
 #include "core/matrix.h"
 #include "core/modal.h"
@@ -10,6 +9,7 @@
 #include "hybrid/compliant.h"
 #include "hybrid/configuration.h"
 #include "hybrid/contact_modes.h"
+#include "hybrid/contact_peaks.h"
 #include "hybrid/impacts.h"
 #include "hybrid/simulation.h"
 #include "hybrid/stepping.h"
@@ -37,9 +37,13 @@ static double rest_speed_of(const Simulation *sim, int stop) {
 
 /* Set the contact of a stop.  A contact that becomes free, or begins, has no friction. */
 static void set_phase(Simulation *sim, int stop, Phase phase, double speed, double depth) {
-    Touching touching = {phase, speed, depth};
+    Touching touching = {phase, speed, depth}, *now = &sim->state.touching[stop];
     ContactMode *mode = &sim->state.modes[stop];
-    sim->state.touching[stop] = touching;
+    if (*mode != CONTACT_OPEN && now->phase == phase && now->reference_speed == speed &&
+        now->depth == depth) {
+        return;
+    }
+    *now = touching;
     if (phase == PHASE_NONE) {
         *mode = CONTACT_OPEN;
     } else if (phase == PHASE_FREE || *mode == CONTACT_OPEN) {
@@ -147,17 +151,6 @@ static bool begin_contact(Simulation *sim, int stop, double speed, bool counted,
     return ok;
 }
 
-static bool check_depth(const Simulation *sim, int stop, double depth, double time,
-                        Problem *problem) {
-    if (!(depth <= sim->configuration.scales.length)) {
-        return fail(problem,
-                    "%s is indented by %.3g m at t = %.9g s, more than the size of the mechanism: "
-                    "raise its stiffness, or move it",
-                    stop_of(sim, stop)->name, depth, time);
-    }
-    return true;
-}
-
 PRBM bool preload(Simulation *sim, Problem *problem) {
     double gaps[STOPS_MAX], rates[STOPS_MAX];
     bool ok = true;
@@ -171,11 +164,37 @@ PRBM bool preload(Simulation *sim, Problem *problem) {
     return ok;
 }
 
+static bool point_mobility(Simulation *sim, int stop, double *result, Problem *problem);
+
+/* Raise the reference speed after first touch to the one that the contact will reach.  Forces that
+ * push the body into the stop raise its speed until the force of the contact equals them.  A larger
+ * rise is integrated. */
+static bool raise_reference(Simulation *sim, int stop, double rate, double inverse_mass,
+                            Problem *problem) {
+    const ComplianceLaw *law = &sim->equations.laws[stop];
+    double speed = sim->state.touching[stop].reference_speed, acceleration;
+    if (rate < speed) {
+        return true;
+    }
+    if (!indentation_acceleration(sim, stop, &acceleration, problem)) {
+        return false;
+    }
+    if (acceleration <= 0.0) {
+        return true;
+    }
+    double depth = contact_depth(law, acceleration / (inverse_mass * (1.0 + law->damping)));
+    double rise = acceleration * depth * law->exponent / ((law->exponent + 1.0) * speed * speed);
+    if (rise <= FIRST_RISE_MAX) {
+        set_phase(sim, stop, PHASE_PRESSED, speed * sqrt(1.0 + 2.0 * rise), 0.0);
+    }
+    return true;
+}
+
 /* Shorten the first step of a contact to a fraction of the depth of a free hit over its speed. */
-static bool shorten_step(Simulation *sim, int stop, Problem *problem);
+static void shorten_step(Simulation *sim, int stop, double inverse_mass);
 
 PRBM bool touch(Simulation *sim, int stop, Problem *problem) {
-    double gaps[STOPS_MAX], rates[STOPS_MAX];
+    double gaps[STOPS_MAX], rates[STOPS_MAX], inverse_mass;
     Latched *latched = &sim->state.latched[stop];
     gaps_and_rates(sim, gaps, rates);
     double speed = -rates[stop];
@@ -190,8 +209,13 @@ PRBM bool touch(Simulation *sim, int stop, Problem *problem) {
         fresh.approach_speed = speed;
         *latched = fresh;
     }
-    return rephase(sim, problem) && settle(sim, NULL, 0, NULL, problem) &&
-           shorten_step(sim, stop, problem);
+    if (!point_mobility(sim, stop, &inverse_mass, problem) ||
+        !raise_reference(sim, stop, speed, inverse_mass, problem) || !rephase(sim, problem) ||
+        !settle(sim, NULL, 0, NULL, problem)) {
+        return false;
+    }
+    shorten_step(sim, stop, inverse_mass);
+    return true;
 }
 
 PRBM bool switch_phase(Simulation *sim, int stop, Problem *problem) {
@@ -267,22 +291,18 @@ static bool point_mobility(Simulation *sim, int stop, double *result, Problem *p
     return ok;
 }
 
-static bool shorten_step(Simulation *sim, int stop, Problem *problem) {
+static void shorten_step(Simulation *sim, int stop, double inverse_mass) {
     const Touching *touching = &sim->state.touching[stop];
     const ComplianceLaw *law = &sim->equations.laws[stop];
-    double inverse_mass = 0.0, speed = touching->reference_speed, rise = law->exponent + 1.0;
+    double speed = touching->reference_speed, rise = law->exponent + 1.0;
     if (!is_pressed(touching)) {
-        return true;
-    }
-    if (!point_mobility(sim, stop, &inverse_mass, problem)) {
-        return false;
+        return;
     }
     double work = 0.5 * rise * (speed * speed) / (law->stiffness * inverse_mass);
     double factor = law->exponent == 1.0 ? TOUCH_STEP_FACTOR : TOUCH_STEP_CURVED_FACTOR;
     double h = rounded_step(factor * power(work, 1.0 / rise) / speed);
     sim->state.touches[stop].step = sim->state.step_size;
     sim->state.step_size = lesser(h, sim->state.step_size);
-    return true;
 }
 
 /* The kinetic energy at the front with the rates v. */
@@ -296,14 +316,6 @@ static double kinetic_energy(Simulation *sim, const double *v) {
     }
     sim->scratch.used = mark;
     return sum;
-}
-
-/* Whether the indentation is slow and the damping of a contact is small. */
-static bool is_calm(const Simulation *sim, int stop, double gap_now, double rate) {
-    const Touching *touching = &sim->state.touching[stop];
-    double damping = fabs(damping_ratio(&sim->equations.laws[stop], touching, rate) - 1.0);
-    return touching->phase != PHASE_FREE && gap_now < 0.0 &&
-           fabs(rate) < rest_speed_of(sim, stop) && damping < SETTLED_DAMPING_RTOL;
 }
 
 /* Project the front onto the constraint of a stop that settles, and book the loss. */
@@ -326,6 +338,10 @@ static bool is_stuck(Simulation *sim, int stop, bool *result, Problem *problem) 
     size_t mark = sim->scratch.used;
     const Equations *q = &sim->equations;
     int n = q->system->n;
+    *result = false;
+    if (q->r == q->system->r) {
+        return true; /* There are no constraints but the loops. */
+    }
     double left = 0.0, own = 0.0, *G = take(&sim->scratch, (size_t)n);
     double *held = take_matrix(&sim->scratch, q->r, n);
     Inertia at = inertia_at(sim, sim->state.front);
@@ -386,81 +402,113 @@ static void press_again(Simulation *sim, int stop, const Unsettled *before) {
     state->has_k1 = before->has_k1;
 }
 
-/* Make a calm contact a constraint if its force is then close to its elastic force; *held: whether
- * it is.  A contact that is stuck does not move: it stays a force. */
-static bool hold_if_balanced(Simulation *sim, int stop, double depth, Unsettled *before,
-                             bool *held, Problem *problem) {
+/* A pressed contact that vibrates slowly: the force of the constraint that would hold it, its
+ * elastic force, and the contact time, half the period of small vibrations. */
+typedef struct {
+    bool calm;
+    double force, elastic, time;
+} Rest;
+
+/* Compute the force of the constraint that would hold a contact at its indentation. */
+static bool holding_force(Simulation *sim, int stop, double depth, double *force,
+                          Problem *problem) {
     const double *q = sim->state.front, *v = q + system_of(sim)->n;
-    bool stuck;
-    *held = false;
+    Unsettled before = hold_contact(sim, stop, depth);
+    bool ok = evaluate_equations(&sim->equations, sim->state.front_time, q, v,
+                                 extra_states(sim, q), NULL, &sim->at_front, problem);
+    *force = ok ? stop_force(&sim->equations, sim->at_front.lam, stop) : 0.0;
+    press_again(sim, stop, &before);
+    return ok;
+}
+
+/* Compute the rest of a contact.  It is calm if it would pass its balance more slowly than
+ * rest_speed.  A contact that is stuck does not move: it stays a force. */
+static bool rest_of_contact(Simulation *sim, int stop, double depth, double rate, Rest *rest,
+                      Problem *problem) {
+    const ComplianceLaw *law = &sim->equations.laws[stop];
+    double least = rest_speed_of(sim, stop), inverse_mass;
+    bool stuck = false;
+    rest->calm = false;
+    if (sim->state.touching[stop].phase == PHASE_FREE || depth <= 0.0 || fabs(rate) >= least) {
+        return true;
+    }
     if (!is_stuck(sim, stop, &stuck, problem)) {
         return false;
     }
     if (stuck) {
         return true;
     }
-    *before = hold_contact(sim, stop, depth);
-    if (!evaluate_equations(&sim->equations, sim->state.front_time, q, v, extra_states(sim, q),
-                            NULL, &sim->at_front, problem)) {
+    if (!point_mobility(sim, stop, &inverse_mass, problem) ||
+        !holding_force(sim, stop, depth, &rest->force, problem)) {
         return false;
     }
-    double elastic = elastic_force(&sim->equations.laws[stop], depth);
-    double force = stop_force(&sim->equations, sim->at_front.lam, stop);
-    *held = fabs(force - elastic) <= SETTLING_FACTOR * SETTLED_FORCE_RTOL * elastic;
-    if (!*held) {
-        press_again(sim, stop, before);
-    }
+    double stiffness = contact_tangent(law, depth);
+    rest->elastic = elastic_force(law, depth);
+    rest->time = 0.5 * TWO_PI / sqrt(stiffness * inverse_mass);
+    double speed = (rest->force - rest->elastic) * sqrt(inverse_mass / stiffness);
+    rest->calm = rest->force > 0.0 && sqrt(rate * rate + speed * speed) < least;
     return true;
 }
 
+/* Whether a contact can settle: the constraint is released at twice this difference. */
+static bool is_balanced(const Rest *rest) {
+    double limit = SETTLING_FACTOR * SETTLED_FORCE_RTOL * rest->elastic;
+    return fabs(rest->force - rest->elastic) <= limit;
+}
+
 /* Record since when a contact is calm; *due: whether it has been calm for a contact time. */
-static bool watch_contact(Simulation *sim, int stop, double gap_now, double rate, bool *due,
-                          Problem *problem) {
+static bool watch_contact(Simulation *sim, int stop, double gap_now, double rate, Rest *rest,
+                          bool *due, Problem *problem) {
     Touch *begun = &sim->state.touches[stop];
-    double inverse_mass;
     *due = false;
     if (!is_pressed(&sim->state.touching[stop])) {
         return true;
     }
-    if (!is_calm(sim, stop, gap_now, rate)) {
-        begun->calm = false;
-        begun->calm_since = 0.0;
-        return true;
-    }
-    begun->calm_since = begun->calm ? begun->calm_since : sim->state.front_time;
-    begun->calm = true;
-    if (!point_mobility(sim, stop, &inverse_mass, problem)) {
+    if (!rest_of_contact(sim, stop, -gap_now, rate, rest, problem)) {
         return false;
     }
-    double stiffness = contact_tangent(&sim->equations.laws[stop], -gap_now);
-    double time = 0.5 * TWO_PI / sqrt(stiffness * inverse_mass);
-    *due = sim->state.front_time - begun->calm_since >= time;
+    begun->calm_since = !rest->calm ? 0.0 : begun->calm ? begun->calm_since : sim->state.front_time;
+    begun->calm = rest->calm;
+    *due = rest->calm && sim->state.front_time - begun->calm_since >= rest->time;
     return true;
 }
 
-PRBM bool settle_calm(Simulation *sim, Problem *problem) {
+/* Settle a contact; its kinetic energy is a loss. */
+static bool settle_contact(Simulation *sim, int stop, double depth, Problem *problem) {
+    (void)hold_contact(sim, stop, depth);
+    sim->state.arc.valid = false;
+    if (!stop_motion(sim, stop, problem)) {
+        return false;
+    }
+    end_impact(sim, stop);
+    sim->state.touches[stop].calm = false;
+    sim->state.touches[stop].calm_since = 0.0;
+    if (!settle(sim, NULL, 0, NULL, problem)) {
+        return false;
+    }
+    resume_step(sim, stop);
+    return true;
+}
+
+PRBM bool settle_calm(Simulation *sim, double *balances, Problem *problem) {
     double gaps[STOPS_MAX], rates[STOPS_MAX];
     if (!latch_peaks(sim, sim->state.front_time, problem)) {
         return false;
     }
     gaps_and_rates(sim, gaps, rates);
     for (int i = 0; i < system_of(sim)->s; i++) {
-        Unsettled before;
-        bool due, held = false;
-        if (!watch_contact(sim, i, gaps[i], -rates[i], &due, problem) ||
-            (due && !hold_if_balanced(sim, i, -gaps[i], &before, &held, problem))) {
+        Rest rest;
+        bool due;
+        balances[i] = 0.0;
+        if (!watch_contact(sim, i, gaps[i], -rates[i], &rest, &due, problem)) {
             return false;
         }
-        sim->state.arc.valid = sim->state.arc.valid && !held;
-        if (held) {
-            if (!stop_motion(sim, i, problem)) {
+        if (due && is_balanced(&rest)) {
+            if (!settle_contact(sim, i, -gaps[i], problem)) {
                 return false;
             }
-            end_impact(sim, i);
-            if (!settle(sim, NULL, 0, NULL, problem)) {
-                return false;
-            }
-            resume_step(sim, i);
+        } else if (due) {
+            balances[i] = contact_depth(&sim->equations.laws[i], rest.force);
         }
     }
     return true;
@@ -471,149 +519,14 @@ PRBM bool settles_here(Simulation *sim, bool *result, Problem *problem) {
     gaps_and_rates(sim, gaps, rates);
     *result = false;
     for (int i = 0; i < system_of(sim)->s; i++) {
-        Unsettled before;
-        bool due, held = false;
-        if (!watch_contact(sim, i, gaps[i], -rates[i], &due, problem) ||
-            (due && !hold_if_balanced(sim, i, -gaps[i], &before, &held, problem))) {
+        Rest rest;
+        bool due;
+        if (!watch_contact(sim, i, gaps[i], -rates[i], &rest, &due, problem)) {
             return false;
         }
-        if (held) {
-            press_again(sim, i, &before);
-            *result = true;
-        }
+        *result = *result || (due && is_balanced(&rest));
     }
     return true;
-}
-
-/* --- maxima ----------------------------------------------------------------------------------- */
-
-/* Compute the indentation of a stop at a time of the latest step, or its force. */
-static double contact_at(Simulation *sim, int stop, double t, bool force) {
-    Located *located = &sim->stepping.located;
-    const System *system = system_of(sim);
-    const Equations *equations = &sim->equations;
-    arc_at(sim, t, located->y);
-    directions(system, located->y, located->e);
-    const double *extra = extra_states(sim, located->y);
-    double depth = -gap(equations, stop, t, located->e, extra);
-    if (!force) {
-        return depth;
-    }
-    double rate = -gap_rate(equations, stop, t, located->e, located->y + system->n, extra);
-    return contact_force(&equations->laws[stop], &equations->contacts.touching[stop], depth, rate);
-}
-
-static double clipped(double x, double low, double high) {
-    return lesser(greater(x, low), high);
-}
-
-/* Return the largest value between two times, by parabolas through its largest sample. */
-static double largest_value(Simulation *sim, int stop, bool force, double start, double end) {
-    double distance = (end - start) / (double)GUARD_INTERVALS, result = -HUGE_VAL;
-    int top = 0;
-    for (int k = 0; k <= GUARD_INTERVALS; k++) {
-        double x = contact_at(sim, stop, start + distance * k, force);
-        top = x > result ? k : top;
-        result = greater(x, result);
-    }
-    top = top < 1 ? 1 : top < GUARD_INTERVALS ? top : GUARD_INTERVALS - 1;
-    double t = start + distance * top;
-    for (int k = 0; k < PEAK_REFINEMENTS; k++) {
-        double before = contact_at(sim, stop, clipped(t - distance, start, end), force);
-        double at = contact_at(sim, stop, clipped(t, start, end), force);
-        double after = contact_at(sim, stop, clipped(t + distance, start, end), force);
-        double bend = before - 2.0 * at + after;
-        if (bend < 0.0) {
-            double shift = clipped(0.5 * (before - after) / bend, -1.0, 1.0);
-            t = clipped(t + distance * shift, start, end);
-        }
-        result = greater(result, contact_at(sim, stop, t, force));
-        distance *= PEAK_REFINEMENT_FACTOR;
-    }
-    return result;
-}
-
-PRBM void peaks_until(Simulation *sim, int stop, double time, double *depth, double *force) {
-    const Arc *arc = &sim->state.arc;
-    const Latched *latched = &sim->state.latched[stop];
-    double end = lesser(time, sim->state.front_time);
-    *depth = latched->indentation;
-    *force = latched->peak_force;
-    if (is_pressed(&sim->state.touching[stop]) && arc->valid && end > arc->start) {
-        *depth = greater(*depth, largest_value(sim, stop, false, arc->start, end));
-        *force = greater(*force, largest_value(sim, stop, true, arc->start, end));
-    }
-}
-
-static Dent dent_now(Simulation *sim, int stop, double gap_now, double rate,
-                     const Evaluation *at) {
-    size_t mark = sim->scratch.used;
-    const Equations *q = &sim->equations;
-    const ComplianceLaw *law = &q->laws[stop];
-    const Touching *touching = &q->contacts.touching[stop];
-    const double *front = sim->state.front;
-    double t = sim->state.front_time;
-    Dent dent = {1.0, t, -gap_now, rate, at->pressure[stop], 0.0};
-    if (touching->phase != PHASE_FREE) {
-        double bend = -gap_acceleration(q, stop, t, directions_at(sim, front),
-                                        front + system_of(sim)->n, at);
-        dent.force_rate = contact_stiffness(law, dent.depth) * rate *
-                              damping_ratio(law, touching, rate) +
-                          elastic_force(law, dent.depth) * damping_slope(law, touching) * bend;
-    }
-    sim->scratch.used = mark;
-    return dent;
-}
-
-/* Return the largest value of a cubic from (0, a) to (h, b) with the rates u and w there. */
-static double largest_of_cubic(double h, double a, double u, double b, double w) {
-    double c3 = 2.0 * (a - b) / h + u + w, c2 = 3.0 * (b - a) / h - 2.0 * u - w;
-    double best = greater(a, b), root = c2 * c2 - 3.0 * c3 * u;
-    if (root > 0.0) { /* s = t/h at the maximum: 3 c3 s^2 + 2 c2 s + u = 0. */
-        double s = u / (sqrt(root) - c2);
-        double value = a + h * s * (u + s * (c2 + s * c3));
-        best = s > 0.0 && s < 1.0 ? greater(best, value) : best;
-    }
-    return best;
-}
-
-PRBM bool latch_present(Simulation *sim, const Evaluation *at, bool smooth, Problem *problem) {
-    double gaps[STOPS_MAX], rates[STOPS_MAX];
-    bool ok = true;
-    gaps_and_rates(sim, gaps, rates);
-    for (int k = 0; ok && k < sim->equations.pressed_count; k++) {
-        int i = sim->equations.pressed[k];
-        Latched *latched = &sim->state.latched[i];
-        double *stored = sim->state.dents + DENT_NUMBERS * (stop_of(sim, i)->extra / EXTRA_STATES);
-        Dent last, now = dent_now(sim, i, gaps[i], -rates[i], at);
-        memcpy(&last, stored, sizeof last);
-        double h = now.time - last.time;
-        if (smooth && last.known > 0.0 && h > 0.0) {
-            double depth = largest_of_cubic(h, last.depth, last.depth_rate, now.depth, -rates[i]);
-            double force =
-                largest_of_cubic(h, last.force, last.force_rate, now.force, now.force_rate);
-            latched->indentation = greater(latched->indentation, depth);
-            latched->peak_force = greater(latched->peak_force, force);
-        }
-        latched->indentation = greater(latched->indentation, now.depth);
-        latched->peak_force = greater(latched->peak_force, now.force);
-        memcpy(stored, &now, sizeof now);
-        ok = check_depth(sim, i, now.depth, now.time, problem);
-    }
-    return ok;
-}
-
-PRBM bool latch_peaks(Simulation *sim, double time, Problem *problem) {
-    bool ok = true;
-    for (int k = 0; ok && k < sim->equations.pressed_count; k++) {
-        int i = sim->equations.pressed[k];
-        double depth, force;
-        peaks_until(sim, i, time, &depth, &force);
-        sim->state.latched[i].indentation = depth;
-        sim->state.latched[i].peak_force = force;
-        ok = check_depth(sim, i, depth, time, problem);
-    }
-    return ok;
 }
 
 /* --- errors of steps -------------------------------------------------------------------------- */

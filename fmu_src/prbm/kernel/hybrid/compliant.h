@@ -15,17 +15,11 @@ PRBM bool rephase(Simulation *sim, Problem *problem);
 PRBM void unsettle(Simulation *sim);
 /* Make the settled stops that are open forces; return whether there are any. */
 PRBM bool press_released(Simulation *sim);
-/* Settle the contacts at the front that have been calm for a contact time. */
-PRBM bool settle_calm(Simulation *sim, Problem *problem);
+/* Settle the contacts at the front that have been calm for a contact time.  balances (s,): the
+ * indentations at which the other calm contacts would be in balance, 0 for all other stops. */
+PRBM bool settle_calm(Simulation *sim, double *balances, Problem *problem);
 /* Whether settle_calm would settle a contact in model exchange, where the front is the present. */
 PRBM bool settles_here(Simulation *sim, bool *result, Problem *problem);
-/* Add force and indentation at the front to the maxima; at: an evaluation there.  If the motion is
- * smooth since the last sample, cubics through both give the maxima between them. */
-PRBM bool latch_present(Simulation *sim, const Evaluation *at, bool smooth, Problem *problem);
-/* Compute the largest indentation and force of a stop up to a time of the latest step. */
-PRBM void peaks_until(Simulation *sim, int stop, double time, double *depth, double *force);
-/* Add the maxima up to a time of the latest step to the latched values. */
-PRBM bool latch_peaks(Simulation *sim, double time, Problem *problem);
 /* Return the error of the contacts in a step of size h, relative to their scales. */
 PRBM double contact_error(Simulation *sim, double h);
 PRBM double *extra_of(const Simulation *sim, double *y, int stop); /* states of a stop in y (ny,) */

@@ -41,10 +41,10 @@ static const Transition TRANSITIONS[EVENT_KINDS] = {
                     apply_friction},
     [EVENT_REVERSAL] = {{"reversal", reversal_guard, false}, slipping_contact, reversal_near, true,
                         reversal_time, apply_friction},
-    [EVENT_SWITCH] = {{"switch", switching_guard, false}, pressed_stop, pressed_near, true,
+    [EVENT_SWITCH] = {{"switch", switching_guard, false}, pressed_stop, pressed_near, false,
                       switching_time, apply_switch},
-    [EVENT_SEPARATION] = {{"separation", indentation_guard, false}, pressed_stop, pressed_near,
-                          true, closing_time, apply_separation},
+    [EVENT_SEPARATION] = {{"separation", indentation_guard, false}, pressed_stop,
+                          separation_near, true, closing_time, apply_separation},
     [EVENT_IMPACT] = {{"impact", gap_guard, false}, open_stop, impact_near, true, closing_time,
                       apply_impact},
 };

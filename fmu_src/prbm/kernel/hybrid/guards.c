@@ -37,7 +37,8 @@ PRBM double switching_guard(const Equations *equations, const Instant *at, int c
     if (touching->phase == PHASE_FREE) {
         return PHASE_RTOL - ratio;
     }
-    return lesser(PHASE_RTOL + ratio, 1.0 + PHASE_RTOL - rate / touching->reference_speed);
+    return lesser(PHASE_RTOL + ratio,
+                  1.0 + REFERENCE_SPEED_RTOL - rate / touching->reference_speed);
 }
 
 /* The second derivative of the indentation, with which the reference speed rises. */
@@ -180,6 +181,25 @@ PRBM bool impact_near(Simulation *sim) {
     for (int s = 0; s < system->s; s++) {
         if (sim->state.modes[s] == CONTACT_OPEN &&
             !(gap(&sim->equations, s, start, e, extra) > near + gap_reach(sim, s, e, arms))) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Whether a contact may end within the step. */
+PRBM bool separation_near(Simulation *sim) {
+    const Equations *q = &sim->equations;
+    const Complex *e = sim->stepping.reference.e;
+    double start = sim->state.arc.start, *arms = sim->stepping.reach;
+    const double *extra = extra_states(sim, sim->state.arc.y);
+    if (q->pressed_count == 0 || q->walls_give) {
+        return q->pressed_count > 0;
+    }
+    bound_arms(sim, arms);
+    for (int k = 0; k < q->pressed_count; k++) {
+        int s = q->pressed[k];
+        if (!(-gap(q, s, start, e, extra) > gap_reach(sim, s, e, arms))) {
             return true;
         }
     }
@@ -511,7 +531,7 @@ PRBM bool reversal_time(Simulation *sim, const Guard *guard, int contact, Fall *
     return !search.failed;
 }
 
-/* Find the time at which the guard of a force falls to zero, from its values at the start, the
+/* Find the time at which a guard falls to zero, from its values at the start, the
  * middle and the end of the step. */
 PRBM bool yield_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
                      Problem *problem) {
@@ -519,15 +539,12 @@ PRBM bool yield_time(Simulation *sim, const Guard *guard, int contact, Fall *fal
     ArcGuard on_arc = arc_guard(&search);
     const Arc *arc = &sim->state.arc;
     double times[3] = {arc->start, arc->start + arc->h / 2, arc->start + arc->h};
-    double before = guard_at(&on_arc, times[0]);
     for (int part = 0; !fall->found && part < 2; part++) {
-        double after = guard_at(&on_arc, times[part + 1]);
-        if (after <= 0.0) {
-            double a = times[part], b = times[part + 1];
+        double a = times[part], b = times[part + 1];
+        if (guard_at(&on_arc, b) <= 0.0) {
             fall->found = true;
-            fall->time = before > 0.0 ? locate(&on_arc, a, b) : a;
+            fall->time = locate(&on_arc, a, b); /* At a if the guard has fallen there. */
         }
-        before = after;
     }
     return !search.failed;
 }
@@ -536,22 +553,19 @@ PRBM bool yield_time(Simulation *sim, const Guard *guard, int contact, Fall *fal
 PRBM bool switching_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
                          Problem *problem) {
     const Guard rising = {guard->event, rising_guard, true};
-    if (sim->equations.contacts.touching[contact].phase == PHASE_RISING) {
-        return yield_time(sim, &rising, contact, fall, problem);
-    }
-    Search search = {sim, guard, contact, false, problem};
+    bool rises = sim->equations.contacts.touching[contact].phase == PHASE_RISING;
+    return yield_time(sim, rises ? &rising : guard, contact, fall, problem);
+}
+
+PRBM bool balance_time(Simulation *sim, int stop, double depth, Fall *fall, Problem *problem) {
+    const Guard guard = {"balance", indentation_guard, false};
+    const Arc *arc = &sim->state.arc;
+    Search search = {sim, &guard, stop, false, problem};
     ArcGuard on_arc = arc_guard(&search);
-    Instant start = sample(sim, 0);
-    double before = guard->value(&sim->equations, &start, contact);
-    for (int k = 0; !fall->found && k < GUARD_INTERVALS; k++) {
-        Instant at = sample(sim, k + 1);
-        double after = guard->value(&sim->equations, &at, contact);
-        if (after <= 0.0) {
-            double a = sample_time(sim, k), b = sample_time(sim, k + 1);
-            fall->found = true;
-            fall->time = before > 0.0 ? locate(&on_arc, a, b) : a;
-        }
-        before = after;
-    }
+    double end = arc->start + arc->h;
+    on_arc.sign = guard_at(&on_arc, arc->start) > depth ? 1.0 : -1.0;
+    on_arc.offset = -on_arc.sign * depth;
+    fall->found = guard_at(&on_arc, end) < 0.0;
+    fall->time = fall->found ? locate(&on_arc, arc->start, end) : 0.0;
     return !search.failed;
 }

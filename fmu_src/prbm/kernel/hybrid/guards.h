@@ -47,6 +47,7 @@ PRBM bool release_near(Simulation *sim);
 PRBM bool slip_near(Simulation *sim);
 PRBM bool reversal_near(Simulation *sim);
 PRBM bool pressed_near(Simulation *sim);
+PRBM bool separation_near(Simulation *sim);
 PRBM bool impact_near(Simulation *sim);
 /* Find the first time in the latest step at which the guard of a contact falls to zero.  The caller
  * sets fall->found to false.  Return false on failure. */
@@ -58,6 +59,8 @@ PRBM bool reversal_time(Simulation *sim, const Guard *guard, int contact, Fall *
                         Problem *problem);
 PRBM bool closing_time(Simulation *sim, const Guard *guard, int stop, Fall *fall,
                        Problem *problem);
+/* Find the first time in the latest step at which an indentation passes a depth [m]. */
+PRBM bool balance_time(Simulation *sim, int stop, double depth, Fall *fall, Problem *problem);
 PRBM void sample_arc(Simulation *sim); /* for reversal_time and closing_time */
 
 #endif

@@ -4,6 +4,7 @@
 #include "core/sections.h"
 #include "hybrid/compliant.h"
 #include "hybrid/configuration.h"
+#include "hybrid/contact_peaks.h"
 #include "hybrid/impacts.h"
 #include "hybrid/outputs.h"
 #include "hybrid/peaks.h"

@@ -261,13 +261,36 @@ static bool cut_step(Simulation *sim, const Event *event, Problem *problem) {
     return event->kind == EVENT_REVERSAL && end_on_arc(sim, state->pending.time, problem);
 }
 
+/* End the step where the first calm contact passes its balance, if there is one. */
+static bool end_at_balance(Simulation *sim, const double *balances, bool *found,
+                           Problem *problem) {
+    State *state = &sim->state;
+    double first = HUGE_VAL;
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        Fall fall = {false, 0.0};
+        if (balances[i] > 0.0 && !balance_time(sim, i, balances[i], &fall, problem)) {
+            return false;
+        }
+        first = fall.found ? lesser(first, fall.time) : first;
+    }
+    *found = first < HUGE_VAL;
+    if (!*found) {
+        return true;
+    }
+    state->step_size = state->arc.h; /* The balance does not shorten the next step. */
+    state->has_k1 = false;
+    return end_on_arc(sim, first, problem) && step_peaks_to_event(sim, problem);
+}
+
 /* Take one step from the front, up to its first event. */
 PRBM bool take_step(Simulation *sim, Problem *problem) {
     State *state = &sim->state;
     Stepping *stepping = &sim->stepping;
     int ny = state_size(sim);
     double h = 0.0, longest = sim->equations.walls_move ? follow_cubics(sim) : HUGE_VAL;
-    if (sim->equations.pressed_count > 0 && !settle_calm(sim, problem)) {
+    double balances[STOPS_MAX];
+    bool pressed = sim->equations.pressed_count > 0, ended = false;
+    if (pressed && !settle_calm(sim, balances, problem)) {
         return false;
     }
     if (!state->has_k1) {
@@ -297,6 +320,12 @@ PRBM bool take_step(Simulation *sim, Problem *problem) {
     state->arc.valid = true;
     if (event.kind != EVENT_NONE) {
         return cut_step(sim, &event, problem) && step_peaks_to_event(sim, problem);
+    }
+    if (pressed && !end_at_balance(sim, balances, &ended, problem)) {
+        return false;
+    }
+    if (ended) {
+        return true;
     }
     state->front_time = end;
     step_peaks(sim, &stepping->evaluation);
