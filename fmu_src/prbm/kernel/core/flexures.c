@@ -283,11 +283,10 @@ static bool set_panels(const System *system, const Flexure *flexure, const Flexu
 static bool walk_beam(System *system, const Step *step, Scratch *scratch, Problem *problem) {
     const Flexure *flexure = step->flexure;
     const FlexureType *kind = &system->mechanism->types[flexure->type];
-    bool notched = kind->profile == PROFILE_NOTCH, waisted = !is_hinge(kind);
     Panel panels[PANELS_MAX];
     Beam beam = {.order = kind->order,
-                 .nodes = node_count(notched, waisted, kind->nodes),
-                 .panel_count = panel_count(notched, waisted),
+                 .nodes = node_count(kind),
+                 .panel_count = panel_count(kind),
                  .panels = panels,
                  .youngs_modulus = evaluate(kind->youngs_modulus, system->values),
                  .density = evaluate(kind->density, system->values)};

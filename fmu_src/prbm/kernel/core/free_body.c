@@ -46,10 +46,9 @@ PRBM void place_free_bodies(System *system, Memory *memory) {
         const FlexureType *kind = &m->types[flexure->type];
         FreeBody none, *body = memory->base ? &system->free_bodies[i] : &none;
         if (kind->order > 0) {
-            bool notched = kind->profile == PROFILE_NOTCH;
-            size_t N = (size_t)node_count(notched, !is_hinge(kind), kind->nodes);
-            size_t cuts = N + CUTS_BESIDE_NODES, terms = (size_t)kind->order + 1;
-            place_arrays(body, cuts, notched ? 2 * N : N, N, cuts * terms, memory);
+            size_t N = (size_t)node_count(kind), cuts = N + CUTS_BESIDE_NODES;
+            size_t masses = kind->profile == PROFILE_NOTCH ? 2 * N : N;
+            place_arrays(body, cuts, masses, N, cuts * ((size_t)kind->order + 1), memory);
         } else {
             size_t links = (size_t)links_of(kind, flexure->type_at_start, flexure->type_at_end);
             place_arrays(body, links + 3, 3 * links + 5, 2, 0, memory);

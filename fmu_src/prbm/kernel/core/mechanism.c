@@ -9,6 +9,20 @@ PRBM bool is_hinge(const FlexureType *kind) {
     return kind->profile == PROFILE_NOTCH && !has_dimension(kind, DIMENSION_WAIST_LENGTH);
 }
 
+PRBM int panel_count(const FlexureType *kind) {
+    if (kind->profile != PROFILE_NOTCH) {
+        return 1;
+    }
+    return is_hinge(kind) ? 3 : PANELS_MAX;
+}
+
+PRBM int node_count(const FlexureType *kind) {
+    if (kind->profile != PROFILE_NOTCH) {
+        return kind->nodes;
+    }
+    return kind->nodes + 2 * THICK_NODES + (is_hinge(kind) ? 0 : 2 * FILLET_NODES);
+}
+
 PRBM double evaluate(Expression quantity, const double *values) {
     double result = 0.0;
     for (int i = 0; i < quantity.count; i++) {

@@ -196,6 +196,11 @@ typedef struct {
 PRBM bool has_dimension(const FlexureType *kind, int dimension);
 /* Whether a flexure has a notch without a waist, which bends like a hinge. */
 PRBM bool is_hinge(const FlexureType *kind);
+/* The panels of a notch with a waist. */
+enum { PANELS_MAX = 5 };
+PRBM int panel_count(const FlexureType *kind);
+/* Return the number of nodes in all panels of a beam. */
+PRBM int node_count(const FlexureType *kind);
 PRBM double evaluate(Expression quantity, const double *values); /* Twin: Affine in mechanism/. */
 PRBM bool check_parameter(const Parameter *parameter, double x, Problem *problem);
 /* Check all values and the fields that are expressions (Mechanism.values of the twin). */
