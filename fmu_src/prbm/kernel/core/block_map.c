@@ -135,29 +135,35 @@ static bool consecutive(const BlockMap *block) {
     return true;
 }
 
-/* Set the mass matrices of the coordinates for each pair of nodes, and that of the diagonal. */
+/* Set one entry of the mass matrices of the coordinates: its place, the part of the diagonal, and
+ * the product for each pair of nodes. */
+static void set_entry(const System *system, int nodes, int k, BlockMap *block) {
+    const int a = BEAM_ENTRY[k][0], b = BEAM_ENTRY[k][1], even = block->even;
+    const double *x = block->change + a * even, *y = block->change + b * even;
+    double *next = block->products + k;
+    block->place[k] = mass_index(block, a, b);
+    block->constant[k] = 0.0;
+    for (int i = 0; i < block->size; i++) {
+        block->constant[k] += system->own[block->start + i] * x[i] * y[i];
+    }
+    for (int i = 0; i < nodes; i++) {
+        for (int j = 0; j < i; j++) {
+            *next = block->H.re[i * even + j] * (x[i] * y[j] + x[j] * y[i]);
+            next += BEAM_ENTRIES;
+        }
+    }
+}
+
+/* Set the members of a block that are used for beams only. */
 static void set_products(const System *system, int nodes, BlockMap *block) {
-    double *next = block->products;
     block->together = consecutive(block);
-    zeros(BEAM_ENTRIES, block->constant);
     for (int i = 0; i < block->size; i++) {
         for (int a = 0; a < BEAM_COORDINATES; a++) {
             block->rows[i * BEAM_COORDINATES + a] = block->change[a * block->even + i];
         }
-        for (int j = i < nodes ? 0 : i; j <= i; j++) {
-            double mass = block->H.re[i * block->even + j];
-            for (int k = 0; k < BEAM_ENTRIES; k++) {
-                const double *x = block->change + BEAM_ENTRY[k][0] * block->even;
-                const double *y = block->change + BEAM_ENTRY[k][1] * block->even;
-                if (j < i) {
-                    next[k] = mass * (x[i] * y[j] + x[j] * y[i]);
-                } else {
-                    block->constant[k] += system->own[block->start + i] * x[i] * y[i];
-                }
-                block->place[k] = mass_index(block, BEAM_ENTRY[k][0], BEAM_ENTRY[k][1]);
-            }
-            next += j < i ? BEAM_ENTRIES : 0;
-        }
+    }
+    for (int k = 0; k < BEAM_ENTRIES; k++) {
+        set_entry(system, nodes, k, block);
     }
 }
 
