@@ -1,6 +1,7 @@
 """Cost of flexure models at equal error of the second frequency: beams, chains, ANCF elements.
 
     python benchmarks/flexure_cost.py
+    python benchmarks/flexure_cost.py --default-run
 
 The steel guide of the thesis swings freely from its release at -18 mm: its wall is out of reach, so
 that Exudyn integrates without the interruptions of impacts.  All CPU times are measured in one run
@@ -15,6 +16,10 @@ Beams and chains run in the C kernel (explicit pair 7(5), adaptive steps).  Exud
 elements with its generalised-alpha method, modified Newton iterations, sparse matrices and fixed
 steps.  Of several tolerances and halved step sizes, the cheapest with an error of the integration
 below a target counts.
+
+With --default-run, valgrind counts the instructions of native FMUs instead, with beams of the order
+3 relative to the 2R: those of a right-hand side near the release, and those of all communication
+steps of the default run, with its impacts.
 """
 
 import argparse
@@ -33,8 +38,11 @@ from numpy.typing import NDArray
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fmu_src"))
 
 from flexure_models import guide, guide_figures, limit_of_elements
+from native import POINTS
 from prbm.kernel.simulation import KernelSimulation
 from prbm.references.finite_elements import FiniteElements
+from scaling import beams, counted, instructions
+from support import mechanism
 
 Real = NDArray[np.float64]
 
@@ -189,11 +197,26 @@ def found(model: tuple[Any, ...], repeat: int) -> Found:
     return of_kernel(model[0], model[1], DURATION, repeat)
 
 
-def main() -> None:
+def print_default_runs() -> None:
+    """Print the instructions of right-hand sides and default runs, relative to the 2R."""
+    guides = {
+        "2R": mechanism("PRBDM2R"),
+        "beam, 5 nodes": beams(3, 5, False),
+        "beam, 6 nodes": mechanism("GuideBeam"),
+    }
+    reference: tuple[float, float] | None = None
+    for name, given in guides.items():
+        one, run = instructions(given), counted(given, POINTS, ("fmi2DoStep",))[1]
+        reference = reference or (one, run)
+        print(
+            f"  {name:14s} right-hand side {one:6.0f}, ratio {one / reference[0]:5.3f}; "
+            f"default run {run / 1e6:6.1f} million, ratio {run / reference[1]:5.3f}",
+            flush=True,
+        )
+
+
+def print_equal_errors(repeat: int) -> None:
     """Print cost and errors of all models."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--runs", type=int, default=5, help="runs of a beam (default: %(default)s)")
-    repeat = parser.parse_args().runs
     for level in LEVELS:
         models = [found(model, repeat) for model in level]
         for target in TARGETS:
@@ -207,6 +230,20 @@ def main() -> None:
                     f"ratio {run.seconds / beam:7.1f}",
                     flush=True,
                 )
+
+
+def main() -> None:
+    """Print the comparison that the command line asks for."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--runs", type=int, default=5, help="runs of a beam (default: %(default)s)")
+    parser.add_argument(
+        "--default-run", action="store_true", help="count the instructions of default runs"
+    )
+    arguments = parser.parse_args()
+    if arguments.default_run:
+        print_default_runs()
+    else:
+        print_equal_errors(arguments.runs)
 
 
 if __name__ == "__main__":

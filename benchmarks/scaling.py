@@ -19,11 +19,12 @@ import dataclasses
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
+from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fmu_src"))
@@ -38,6 +39,8 @@ from prbm.mechanism.description import Mechanism
 from prbm.mechanism.parts import Flexure
 from prbm.runs.experiment import Experiment
 from support import mechanism
+
+Real = NDArray[np.float64]
 
 LINKS = (4, 8, 12, 18, 25, 35, 50)  # Links per flexure.
 LEAVES = (2, 3, 4, 6, 8, 10, 12)  # Parallel flexures.
@@ -89,25 +92,35 @@ def unpacked(given: Mechanism, folder: Path) -> Path:
     return unpack(folder / "model.fmu", folder / "model")
 
 
-def instructions(given: Mechanism) -> float:
-    """Return the mean number of instructions of a right-hand side of a mechanism."""
-    stop_time = min(STOP_TIME_MAX, STEPS_MAX / steps(given, {}, Experiment(1.0)))
+def counted(given: Mechanism, points: Real, functions: Sequence[str]) -> tuple[int, int]:
+    """Return the calls and inclusive instructions of functions of a native FMU.
+
+    Parameters
+    ----------
+    given : Mechanism
+        Mechanism of the FMU.
+    points : array (k,)
+        Communication points of the run [s].
+    functions : sequence of str
+        Functions of the kernel or of FMI 2.0.
+    """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         unpacked(given, folder)
         optimized = [flag for flag in FLAGS if flag != "-g0"]
         library = kernel_library("profiled", ("-g", *optimized))
-        job = Job(
-            folder / "model",
-            points=np.array([0.0, stop_time]),
-            records=("shuttle.x",),
-            library=library,
-        )
+        job = Job(folder / "model", points=points, records=("shuttle.x",), library=library)
         counter = ("valgrind", "--tool=callgrind", f"--callgrind-out-file={folder / 'profile'}")
         done = execute(job, before=counter)
         if done.status:
             raise RuntimeError(done.errors)
-        calls, total = inclusive(folder / "profile", RIGHT_HAND_SIDE)
+        return inclusive(folder / "profile", functions)
+
+
+def instructions(given: Mechanism) -> float:
+    """Return the mean number of instructions of a right-hand side of a mechanism."""
+    stop_time = min(STOP_TIME_MAX, STEPS_MAX / steps(given, {}, Experiment(1.0)))
+    calls, total = counted(given, np.array([0.0, stop_time]), RIGHT_HAND_SIDE)
     return total / calls
 
 

@@ -48,6 +48,7 @@ DTYPES = {
 
 
 ENUMERATIONS = (
+    "BeamKind",
     "ContactMode",
     "Phase",
 )  # Those that are types of arguments or of structure members.

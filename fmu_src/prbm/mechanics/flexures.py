@@ -2,6 +2,7 @@
 
 import cmath
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -217,8 +218,8 @@ def _add_beam(parts: Collection, flexure: Flexure, beam: Beam, kind: FlexureType
         pin if end == PIN else turned if body == new else parts.angle(parts.index[body])
         for pin, body, end in zip(pins, bodies, flexure.ends, strict=True)
     ]
-    known = zip(beam.turns, beam.strains, strict=True)
-    arms = [_add_node(parts, [*ends, *bends], turns, strain, own) for turns, own in known]
+    nodes = zip(beam.turns, beam.strains, strict=True)
+    arms = [_add_node(parts, [*ends, *bends], turns, strain, share) for turns, share in nodes]
     reached = None if turned is None else parts.direction({turned: 1.0})
     _place_beam(parts, flexure, beam, arms, reached, (ends, bends), thick=kind.profile == NOTCH)
     rates = beam.rates.tolist()
@@ -230,13 +231,13 @@ def _add_beam(parts: Collection, flexure: Flexure, beam: Beam, kind: FlexureType
 
 
 def _add_node(
-    parts: Collection, coordinates: list[int | None], turns: Real, strain: int | None, own: float
+    parts: Collection, coordinates: list[int | None], turns: Real, strain: int | None, share: float
 ) -> int:
-    """Add the arm of a node, and its stretch, own times the strain; return its direction."""
-    known = zip(coordinates, turns, strict=True)
-    arm = parts.direction({j: float(turn) for j, turn in known if j is not None})
+    """Add the arm of a node, and its stretch, share times the strain; return its direction."""
+    changes = zip(coordinates, turns, strict=True)
+    arm = parts.direction({j: float(turn) for j, turn in changes if j is not None})
     if strain is not None:
-        parts.direction({strain: float(own)}, arm=arm)
+        parts.direction({strain: float(share)}, arm=arm)
     return arm
 
 
@@ -250,7 +251,7 @@ def _place_beam(
     *,
     thick: bool,
 ) -> None:
-    """Place the masses and the far end of a beam.
+    """Place a beam: its masses, its far end, its free body and its curve.
 
     Parameters
     ----------
@@ -269,24 +270,17 @@ def _place_beam(
     thick : bool
         Whether the sections have rotary inertia.
     """
-    z_start, z_end = parts.end(flexure, flexure.start), parts.end(flexure, flexure.end)
-    direction = (z_end - z_start) / abs(z_end - z_start)
-    whole = beam.whole
-    forwards = body_of(flexure.start) in parts.origin
-    near, z_near = (flexure.start, z_start) if forwards else (flexure.end, z_end)
-    far, z_far = (flexure.end, z_end) if forwards else (flexure.start, z_start)
-    root = parts.on(body_of(near), z_near)
-
-    def at(lengths: Complex) -> Place:
-        place = root
-        for arm, length in zip(arms, lengths if forwards else lengths - whole, strict=True):
-            place = place.plus(arm, complex(length) * direction)
-        return place
-
+    near, far = flexure.start, flexure.end
+    chord = parts.end(flexure, far) - parts.end(flexure, near)
+    forwards = body_of(near) in parts.origin
+    if not forwards:
+        near, far = far, near
+    z_near, z_far = parts.end(flexure, near), parts.end(flexure, far)
+    root, direction = parts.on(body_of(near), z_near), chord / abs(chord)
+    laid = _LaidBeam(beam, arms, root, direction, forwards)
     first = len(parts.masses)
-    across = 1j * direction if thick else 0j
-    points = _add_masses(parts, beam, arms, [at(row) for row in beam.node_positions], across)
-    tip = at(whole if forwards else 0.0 * whole)
+    points = _add_masses(parts, laid, thick=thick)
+    tip = laid.at(beam.whole if forwards else 0.0 * beam.whole)
     if turned is None:
         parts.close(flexure.name, tip, parts.on(body_of(far), z_far))
     else:
@@ -294,33 +288,70 @@ def _place_beam(
     masses = slice(first, len(parts.masses))
     free = of_beam(flexure.name, forwards, beam, direction, coordinates, arms, masses, points)
     parts.connect(body_of(near), body_of(far), turned is None, free)
-    curve_points = [np.linspace(-1.0, 1.0, CURVE_POINTS)] * len(beam.panels)
-    curve = [at(lengths) for lengths in beam.positions(curve_points)]
-    parts.lines.append((flexure.name, "flexure", curve, beam.thickness(curve_points)))
+    _draw_beam(parts, flexure.name, laid)
 
 
-def _add_masses(
-    parts: Collection, beam: Beam, arms: list[int], places: list[Place], across: complex
-) -> list[tuple[int, float]]:
+@dataclass(frozen=True)
+class _LaidBeam:
+    """A beam as drawn, laid from the body that has been reached first, at its near end.
+
+    Parameters
+    ----------
+    beam : Beam
+        The beam.
+    arms : list of int
+        Directions of the nodes.
+    root : Place
+        Place of the near end.
+    direction : complex
+        Direction of the chord, from the start to the end.
+    forwards : bool
+        Whether the near end is the start.
+    """
+
+    beam: Beam
+    arms: list[int]
+    root: Place
+    direction: complex
+    forwards: bool
+
+    def at(self, lengths: Complex) -> Place:
+        """Return the place at lengths along the nodes, (N,) [m], measured from the start."""
+        place = self.root
+        lengths = lengths if self.forwards else lengths - self.beam.whole
+        for arm, length in zip(self.arms, lengths, strict=True):
+            place = place.plus(arm, complex(length) * self.direction)
+        return place
+
+
+def _add_masses(parts: Collection, laid: _LaidBeam, *, thick: bool) -> list[tuple[int, float]]:
     """Add the masses of a beam at its nodes.
 
-    Two masses across the flexure, in the given direction, have the moment of inertia of a section.
-    With the direction 0 there is one mass.
+    Two masses across the flexure have the moment of inertia of a thick section.
 
     Returns
     -------
     list of (int, float)
         For each mass: the number of its node, and its distance from it to the left [m].
     """
+    beam, across = laid.beam, 1j * laid.direction
+    places = [laid.at(row) for row in beam.node_positions]
     first, points = len(parts.masses), list[tuple[int, float]]()
-    nodes = zip(arms, beam.masses.tolist(), beam.radii.tolist(), places, strict=True)
+    nodes = zip(laid.arms, beam.masses.tolist(), beam.radii.tolist(), places, strict=True)
     for i, (arm, mass, radius, place) in enumerate(nodes):
-        for left in (-radius, radius) if across else (0.0,):
-            spot = place.plus(arm, left * across) if across else place
-            parts.mass(spot, mass / 2 if across else mass)
+        for left in (-radius, radius) if thick else (0.0,):
+            spot = place.plus(arm, left * across) if thick else place
+            parts.mass(spot, mass / 2 if thick else mass)
             if len(parts.masses) - first > len(points):
                 points.append((i, left))
     return points
+
+
+def _draw_beam(parts: Collection, name: str, laid: _LaidBeam) -> None:
+    """Add the curve of a beam and its thickness to the lines of the drawing."""
+    points = [np.linspace(-1.0, 1.0, CURVE_POINTS)] * len(laid.beam.panels)
+    curve = [laid.at(lengths) for lengths in laid.beam.positions(points)]
+    parts.lines.append((name, "flexure", curve, laid.beam.thickness(points)))
 
 
 def coefficients(

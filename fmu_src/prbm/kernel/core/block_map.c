@@ -96,23 +96,28 @@ static bool has_body(const BlockMap *block) {
     return true;
 }
 
-/* Whether a block is that of a beam of the order 3 with 5 or 6 nodes between two clamps, with or
- * without a body.  Its code is compiled separately for each size.  The coupling of the nodes is
- * real. */
-static bool is_beam(const System *system, const BlockMap *block) {
+/* Return the kind of the beam of a block.  The coupling of its nodes is real. */
+static BeamKind beam_kind(const System *system, const BlockMap *block, bool body) {
+    const int nodes = block->size - body;
     for (int k = 0; k < system->stretch_count; k++) {
         int j = system->stretches[k] - block->start;
         if (j >= 0 && j < block->size) {
-            return false;
+            return NO_BEAM;
         }
     }
-    const int nodes = block->size - block->body;
     for (int k = 0; k < nodes * block->even; k++) {
         if (block->H.im[k] != 0.0) {
-            return false;
+            return NO_BEAM;
         }
     }
-    return block->count == BEAM_COORDINATES && nodes >= BEAM_NODES_MIN && nodes <= BEAM_NODES_MAX;
+    if (block->count != BEAM_COORDINATES) {
+        return NO_BEAM;
+    }
+    switch (nodes) {
+    case 5: return body ? BEAM_5_BODY : BEAM_5;
+    case 6: return body ? BEAM_6_BODY : BEAM_6;
+    default: return NO_BEAM;
+    }
 }
 
 /* Rows and columns of the entries of a symmetric matrix of the coordinates.  The first entries are
@@ -130,30 +135,35 @@ static bool consecutive(const BlockMap *block) {
     return true;
 }
 
-/* Set the mass matrices of the coordinates for each pair of nodes, and that of the diagonal. */
-static void set_products(const System *system, BlockMap *block) {
-    double *next = block->products;
-    const int nodes = block->size - block->body;
+/* Set one entry of the mass matrices of the coordinates: its place, the part of the diagonal, and
+ * the product for each pair of nodes. */
+static void set_entry(const System *system, int nodes, int k, BlockMap *block) {
+    const int a = BEAM_ENTRY[k][0], b = BEAM_ENTRY[k][1], even = block->even;
+    const double *x = block->change + a * even, *y = block->change + b * even;
+    double *next = block->products + k;
+    block->place[k] = mass_index(block, a, b);
+    block->constant[k] = 0.0;
+    for (int i = 0; i < block->size; i++) {
+        block->constant[k] += system->own[block->start + i] * x[i] * y[i];
+    }
+    for (int i = 0; i < nodes; i++) {
+        for (int j = 0; j < i; j++) {
+            *next = block->H.re[i * even + j] * (x[i] * y[j] + x[j] * y[i]);
+            next += BEAM_ENTRIES;
+        }
+    }
+}
+
+/* Set the members of a block that are used for beams only. */
+static void set_products(const System *system, int nodes, BlockMap *block) {
     block->together = consecutive(block);
-    zeros(BEAM_ENTRIES, block->constant);
     for (int i = 0; i < block->size; i++) {
         for (int a = 0; a < BEAM_COORDINATES; a++) {
             block->rows[i * BEAM_COORDINATES + a] = block->change[a * block->even + i];
         }
-        for (int j = i < nodes ? 0 : i; j <= i; j++) {
-            double mass = block->H.re[i * block->even + j];
-            for (int k = 0; k < BEAM_ENTRIES; k++) {
-                const double *x = block->change + BEAM_ENTRY[k][0] * block->even;
-                const double *y = block->change + BEAM_ENTRY[k][1] * block->even;
-                if (j < i) {
-                    next[k] = mass * (x[i] * y[j] + x[j] * y[i]);
-                } else {
-                    block->constant[k] += system->own[block->start + i] * x[i] * y[i];
-                }
-                block->place[k] = mass_index(block, BEAM_ENTRY[k][0], BEAM_ENTRY[k][1]);
-            }
-            next += j < i ? BEAM_ENTRIES : 0;
-        }
+    }
+    for (int k = 0; k < BEAM_ENTRIES; k++) {
+        set_entry(system, nodes, k, block);
     }
 }
 
@@ -169,17 +179,17 @@ PRBM void set_block_maps(System *system, Scratch *scratch) {
         set_changes(system, map);
         set_coupling(system, map);
         find_mass_block(system, map);
-        map->body = has_body(map);
-        map->beam = is_beam(system, map);
-        if (map->beam) {
-            set_products(system, map);
+        bool body = has_body(map);
+        map->beam = beam_kind(system, map, body);
+        if (map->beam != NO_BEAM) {
+            set_products(system, map->size - body, map);
         }
         next = *map;
         next.coordinate += map->count;
         next.change += map->count * map->even;
         next.H.re += map->size * map->even;
         next.H.im += map->size * map->even;
-        next.products += map->beam ? map->size * (map->size - 1) / 2 * BEAM_ENTRIES : 0;
+        next.products += map->beam != NO_BEAM ? map->size * (map->size - 1) / 2 * BEAM_ENTRIES : 0;
         if (k + 1 < system->block_count) {
             system->maps[k + 1] = next;
         }
@@ -189,32 +199,46 @@ PRBM void set_block_maps(System *system, Scratch *scratch) {
 
 /* --- directions and derivatives --------------------------------------------------------------- */
 
-/* Compute the directions out of coordinates x for a beam.  The last lane may belong to the next
- * block, and is then not stored. */
-SIZED void map_beam(int size, const BlockMap *map, const double *ALONE x, double *ALONE out) {
-    const int even = even_length(size);
-    const double *change = map->change;
-    Lanes sum[BEAM_DIRECTIONS_MAX + 1], each = all_lanes(x[map->coordinate[0]]);
+/* Compute the directions out of the coordinates x of a beam.  A last direction without a pair is
+ * stored alone, because the next number belongs to the next block. */
+SIZED void map_beam(int nodes, bool body, const double *change, const double *ALONE x,
+                    double *ALONE out) {
+    const int size = nodes + body, even = even_length(size), paired = size - size % PAIR;
+    const int computed = body ? paired : even;
+    Lanes sum[BEAM_DIRECTIONS_MAX + 1];
     UNROLLED
-    for (int i = 0; i < even; i += LANES) {
-        sum[i] = each * aligned_lanes(change + i);
-    }
-    UNROLLED
-    for (int c = 1; c < BEAM_COORDINATES; c++) {
-        each = all_lanes(x[map->coordinate[c]]);
+    for (int c = 0; c < BEAM_COORDINATES; c++) {
+        Lanes each = all_lanes(x[c]);
         UNROLLED
-        for (int i = 0; i < even; i += LANES) {
-            sum[i] += each * aligned_lanes(change + c * even + i);
+        for (int i = 0; i < computed; i += LANES) {
+            Lanes term = each * aligned_lanes(change + c * even + i);
+            sum[i] = c == 0 ? term : sum[i] + term;
         }
     }
-    const int pairs = size - size % PAIR;
     UNROLLED
-    for (int i = 0; i < pairs; i += LANES) {
-        set_lanes(out + map->start + i, sum[i]);
+    for (int i = 0; i < paired; i += LANES) {
+        set_lanes(out + i, sum[i]);
     }
-    if (pairs < size) {
-        out[map->start + size - 1] = LANE(sum[size - 1], 0);
+    if (paired < size) {
+        out[paired] = body ? x[BEAM_COORDINATES - 1] : LANE(sum[paired], 0);
     }
+}
+
+/* Compute the directions and their rates for a beam. */
+SIZED void map_beam_motion(int nodes, bool body, const BlockMap *map, Kinematics *at) {
+    const double *angle = at->angle + map->coordinate[0];
+    const double *speed = at->speed + map->coordinate[0];
+    double angles[BEAM_COORDINATES], speeds[BEAM_COORDINATES];
+    if (!map->together) {
+        for (int c = 0; c < BEAM_COORDINATES; c++) {
+            angles[c] = at->angle[map->coordinate[c]];
+            speeds[c] = at->speed[map->coordinate[c]];
+        }
+        angle = angles;
+        speed = speeds;
+    }
+    map_beam(nodes, body, map->change, angle, at->theta + map->start);
+    map_beam(nodes, body, map->change, speed, at->turn + map->start);
 }
 
 RARE void map_block(const BlockMap *map, const double *x, double *out) {
@@ -231,25 +255,24 @@ RARE void map_block(const BlockMap *map, const double *x, double *out) {
     }
 }
 
-SIZED void map_one(const BlockMap *map, const double *x, double *out) {
-    switch (map->beam ? map->size : 0) {
-    case 5: map_beam(5, map, x, out); break;
-    case 6: map_beam(6, map, x, out); break;
-    case 7: map_beam(7, map, x, out); break;
-    default: map_block(map, x, out);
-    }
-}
-
 PRBM void map_directions(const System *system, const double *x, double *out) {
     for (int k = 0; k < system->block_count; k++) {
-        map_one(&system->maps[k], x, out);
+        map_block(&system->maps[k], x, out);
     }
 }
 
 PRBM void map_motion(const System *system, Kinematics *at) {
     for (int k = 0; k < system->block_count; k++) {
-        map_one(&system->maps[k], at->angle, at->theta);
-        map_one(&system->maps[k], at->speed, at->turn);
+        const BlockMap *map = &system->maps[k];
+        switch (map->beam) {
+        case BEAM_5: map_beam_motion(5, false, map, at); break;
+        case BEAM_5_BODY: map_beam_motion(5, true, map, at); break;
+        case BEAM_6: map_beam_motion(6, false, map, at); break;
+        case BEAM_6_BODY: map_beam_motion(6, true, map, at); break;
+        case NO_BEAM:
+            map_block(map, at->angle, at->theta);
+            map_block(map, at->speed, at->turn);
+        }
     }
 }
 
@@ -267,14 +290,14 @@ RARE void pull_block(const BlockMap *map, const double *x, double *out) {
     }
 }
 
-/* Compute the derivatives by the coordinates out of those by the first directions of a beam. */
-SIZED void pull_first(int size, const BlockMap *map, const double *ALONE x, Lanes *ALONE sum) {
+/* Compute the derivatives by the coordinates out of those by the directions at the nodes. */
+SIZED void pull_nodes(int nodes, const BlockMap *map, const double *ALONE x, Lanes *ALONE sum) {
     UNROLLED
     for (int c = 0; c < BEAM_COORDINATES; c += LANES) {
         sum[c / LANES] = x[0] * lanes_at(map->rows + c);
     }
     UNROLLED
-    for (int i = 1; i < size; i++) {
+    for (int i = 1; i < nodes; i++) {
         Lanes each = all_lanes(x[i]);
         UNROLLED
         for (int c = 0; c < BEAM_COORDINATES; c += LANES) {
@@ -283,10 +306,17 @@ SIZED void pull_first(int size, const BlockMap *map, const double *ALONE x, Lane
     }
 }
 
-SIZED void pull_beam(int size, const BlockMap *map, const double *ALONE x, double *ALONE out) {
+/* Add the derivatives by the directions of a beam, pulled back to the coordinates, to out. */
+SIZED void pull_beam(int nodes, bool body, const BlockMap *map, const double *ALONE x,
+                     double *ALONE out) {
     Lanes sum[BEAM_COORDINATES / LANES];
     double entries[BEAM_COORDINATES];
-    pull_first(size, map, x + map->start, sum);
+    pull_nodes(nodes, map, x + map->start, sum);
+    if (body) {
+        Lanes rotation = NO_LANES;
+        LANE(rotation, LANES - 1) = x[map->start + nodes];
+        sum[BEAM_COORDINATES / LANES - 1] += rotation;
+    }
     if (map->together) {
         out += map->coordinate[0];
         UNROLLED
@@ -344,7 +374,8 @@ SIZED void couple_block(int size, int nodes, Parts H, Parts e, const double *ALO
                     turned += h_im * re;
                 }
                 set_lanes(M + i * even + j, mass);
-                sum[SUM_OF(j)] += turned * lanes_at(squares + j);
+                Lanes term = turned * lanes_at(squares + j);
+                sum[SUM_OF(j)] = j < PAIR ? term : sum[SUM_OF(j)] + term;
                 set_lanes(x + j, lanes_at(x + j) - turned * square);
             }
         }
@@ -381,7 +412,7 @@ SIZED void pull_beam_mass(int nodes, bool body, const BlockMap *map, const doubl
     }
     if (body) {
         Lanes row[BEAM_COORDINATES / LANES];
-        pull_first(nodes, map, M + nodes * even, row);
+        pull_nodes(nodes, map, M + nodes * even, row);
         UNROLLED
         for (int c = 0; c < BEAM_COORDINATES; c += LANES) {
             sum[(BEAM_BODY + c) / LANES] += row[c / LANES] * lanes_at(TIMES + c);
@@ -409,9 +440,9 @@ SIZED void add_beam_terms(int nodes, bool body, const System *system, const Bloc
     couple_block(size, nodes, map->H, parts_from(at->e_parts, start), at->squares + start,
                  result->block, result->load + start);
     pull_beam_mass(nodes, body, map, result->block, result->mass);
-    pull_beam(size, map, result->load, result->a);
+    pull_beam(nodes, body, map, result->load, result->a);
     for (int row = 0; row < r; row++) {
-        pull_beam(size, map, result->rows + row * system->wide,
+        pull_beam(nodes, body, map, result->rows + row * system->wide,
                   result->factors.Z + row * system->even);
     }
 }
@@ -469,15 +500,11 @@ RARE void add_any_terms(const System *system, const BlockMap *map, const double 
 
 PRBM void add_block_terms(const System *system, const BlockMap *map, const double *own, int r,
                           Evaluation *result) {
-    if (!map->beam) {
-        add_any_terms(system, map, own, r, result);
-    } else if (map->size == 7) {
-        add_beam_terms(6, true, system, map, r, result);
-    } else if (map->size == 5) {
-        add_beam_terms(5, false, system, map, r, result);
-    } else if (map->body) {
-        add_beam_terms(5, true, system, map, r, result);
-    } else {
-        add_beam_terms(6, false, system, map, r, result);
+    switch (map->beam) {
+    case BEAM_5: add_beam_terms(5, false, system, map, r, result); break;
+    case BEAM_5_BODY: add_beam_terms(5, true, system, map, r, result); break;
+    case BEAM_6: add_beam_terms(6, false, system, map, r, result); break;
+    case BEAM_6_BODY: add_beam_terms(6, true, system, map, r, result); break;
+    case NO_BEAM: add_any_terms(system, map, own, r, result);
     }
 }

@@ -133,24 +133,25 @@ typedef struct {
     int start, end, first, strain;
 } BeamCoordinates;
 
+/* Return the coordinate of the rotation of a body at an end of a beam: the next one after those of
+ * the beam, if the beam reaches the body. */
+static int rotation_of(const System *system, const Step *step, int body, int next) {
+    const Connection *between = &step->flexure->between;
+    bool far = body == (step->backwards ? between->start : between->end);
+    return far && !step->closes ? next : coordinate_of(system, system->origins[body].j);
+}
+
 static BeamCoordinates beam_coordinates(const System *system, const Step *step) {
     const Flexure *flexure = step->flexure;
     const FlexureType *kind = kind_of(system->mechanism, flexure);
-    BeamCoordinates at = {FIXED, FIXED, step->first, FIXED};
-    at.start = flexure->type_at_start == PIN ? at.first++ : FIXED;
-    at.end = flexure->type_at_end == PIN ? at.first++ : FIXED;
-    int next = at.first + kind->order;
-    at.strain = kind->axial ? next++ : FIXED;
-    int far = step->backwards ? flexure->between.start : flexure->between.end;
-    for (int side = 0; side < 2; side++) {
-        int body = side == 0 ? flexure->between.start : flexure->between.end;
-        int type = side == 0 ? flexure->type_at_start : flexure->type_at_end;
-        int turned = !step->closes && body == far
-                         ? next
-                         : coordinate_of(system, system->origins[body].j);
-        int *end = side == 0 ? &at.start : &at.end;
-        *end = type == PIN ? *end : turned;
-    }
+    bool start_pinned = flexure->type_at_start == PIN, end_pinned = flexure->type_at_end == PIN;
+    BeamCoordinates at;
+    at.first = step->first + start_pinned + end_pinned;
+    at.strain = kind->axial ? at.first + kind->order : FIXED;
+    int next = at.first + kind->order + kind->axial;
+    at.start = start_pinned ? step->first
+                            : rotation_of(system, step, flexure->between.start, next);
+    at.end = end_pinned ? at.first - 1 : rotation_of(system, step, flexure->between.end, next);
     return at;
 }
 
@@ -283,11 +284,10 @@ static bool set_panels(const System *system, const Flexure *flexure, const Flexu
 static bool walk_beam(System *system, const Step *step, Scratch *scratch, Problem *problem) {
     const Flexure *flexure = step->flexure;
     const FlexureType *kind = kind_of(system->mechanism, flexure);
-    bool notched = kind->profile == PROFILE_NOTCH, waisted = !is_hinge(kind);
     Panel panels[PANELS_MAX];
     Beam beam = {.order = kind->order,
-                 .nodes = node_count(notched, waisted, kind->nodes),
-                 .panel_count = panel_count(notched, waisted),
+                 .nodes = node_count(kind),
+                 .panel_count = panel_count(kind),
                  .panels = panels,
                  .youngs_modulus = evaluate(kind->youngs_modulus, system->values),
                  .density = evaluate(kind->density, system->values)};

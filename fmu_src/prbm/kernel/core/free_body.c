@@ -42,10 +42,9 @@ PRBM void place_free_bodies(System *system, Memory *memory) {
         const FlexureType *kind = kind_of(m, flexure);
         FreeBody none, *body = memory->base ? &system->free_bodies[i] : &none;
         if (kind->order > 0) {
-            bool notched = kind->profile == PROFILE_NOTCH;
-            size_t N = (size_t)node_count(notched, !is_hinge(kind), kind->nodes);
-            size_t cuts = N + CUTS_BESIDE_NODES, terms = (size_t)kind->order + 1;
-            place_arrays(body, cuts, notched ? 2 * N : N, N, cuts * terms, memory);
+            size_t N = (size_t)node_count(kind), cuts = N + CUTS_BESIDE_NODES;
+            size_t masses = kind->profile == PROFILE_NOTCH ? 2 * N : N;
+            place_arrays(body, cuts, masses, N, cuts * ((size_t)kind->order + 1), memory);
         } else {
             size_t links = (size_t)links_of(kind, flexure->type_at_start, flexure->type_at_end);
             place_arrays(body, links + 3, 3 * links + 5, 2, 0, memory);
@@ -80,12 +79,13 @@ static void set_section(const System *system, const FlexureType *kind, FreeBody 
     }
 }
 
-/* Set a section: its rank among the mass points, its position, and the arms of its tangent. */
+/* Set the rank of a section among the mass points, and its position. */
 static void set_place(FreeBody *body, int i, double rank, double position) {
     body->section_ranks[i] = rank;
     body->position[i] = position;
 }
 
+/* Set the two arms of the tangent of a section, and their drawn directions times their shares. */
 static void set_tangent(FreeBody *body, int i, int a, int b, Complex drawn_a, Complex drawn_b) {
     body->tangents[2 * i] = a;
     body->tangents[2 * i + 1] = b;
@@ -158,9 +158,9 @@ PRBM void keep_links(System *system, const Step *step, const Segments *pieces, C
 
 /* --- beams ------------------------------------------------------------------------------------ */
 
-/* Set the levers of the mass points, in units of the direction of the chord.  The two mass points
- * of a thick node are at its right and at its left. */
-static void set_levers(FreeBody *body, const Beam *beam, bool thick) {
+/* Set the levers of the mass points of a beam, from its ranks, in the direction of the chord.  The
+ * two mass points of a thick node are at its right and at its left. */
+static void set_levers(FreeBody *body, const Beam *beam, Complex direction, bool thick) {
     int N = beam->nodes;
     for (int i = 0; i <= body->count; i++) {
         int node = i < body->count ? (int)body->ranks[i] : N;
@@ -174,16 +174,15 @@ static void set_levers(FreeBody *body, const Beam *beam, bool thick) {
             bool second = i > 0 && body->ranks[i - 1] == node;
             lever[node].im += second ? beam->radii[node] : -beam->radii[node];
         }
+        for (int j = 0; j < N; j++) {
+            lever[j] = product(lever[j], direction);
+        }
     }
 }
 
-/* Set the direction of a beam, in which its levers are measured until then; rank its mass points
- * from the near end. */
-static void turn_beam(FreeBody *body, int nodes, Complex direction) {
-    for (int i = 0; i < (body->count + 1) * nodes; i++) {
-        body->levers[i] = product(body->levers[i], direction);
-    }
-    for (int i = 0; i < body->count && !body->forwards; i++) {
+/* Rank the mass points of a beam that is added from its end to its start. */
+static void rank_backwards(FreeBody *body, int nodes) {
+    for (int i = 0; i < body->count; i++) {
         body->ranks[i] = nodes - 1 - body->ranks[i];
     }
 }
@@ -236,8 +235,10 @@ PRBM void keep_beam(System *system, const Step *step, const Beam *beam, Complex 
         body->turning[body->forwards ? j : N + j] = 1.0 - S[0];
         body->turning[body->forwards ? N + j : j] = S[0];
     }
-    set_levers(body, beam, kind->profile == PROFILE_NOTCH);
-    turn_beam(body, N, direction);
+    set_levers(body, beam, direction, kind->profile == PROFILE_NOTCH);
+    if (!body->forwards) {
+        rank_backwards(body, N);
+    }
     copy(beam->cut_count * terms, beam->moments, body->moments);
     for (int i = 0; i < beam->cut_count; i++) {
         set_cut(body, i, beam, body->forwards ? i : beam->cut_count - 1 - i, direction, ends);

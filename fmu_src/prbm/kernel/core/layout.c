@@ -25,18 +25,12 @@ static int pin_count(const Flexure *flexure) {
 /* The largest number of corners of a flexure in addition to its links or nodes. */
 enum { CORNERS_BESIDE_ARMS = 3 };
 
-/* Return the number of nodes in all panels of a beam. */
-static int all_nodes(const FlexureType *kind) {
-    return node_count(kind->profile == PROFILE_NOTCH, !is_hinge(kind), kind->nodes);
-}
-
 static size_t size_of_beam(const FlexureType *kind) {
-    bool notched = kind->profile == PROFILE_NOTCH;
-    return beam_size(kind->order, all_nodes(kind), panel_count(notched, !is_hinge(kind)));
+    return beam_size(kind->order, node_count(kind), panel_count(kind));
 }
 
 static Addition beam_addition(const FlexureType *kind, const Flexure *flexure) {
-    int nodes = all_nodes(kind), stretches = kind->axial ? nodes : 0;
+    int nodes = node_count(kind), stretches = kind->axial ? nodes : 0;
     int masses = kind->profile == PROFILE_NOTCH ? 2 * nodes : nodes;
     Addition result = {kind->order + pin_count(flexure), kind->axial, nodes, stretches,
                        1 + kind->order + kind->axial, masses,
@@ -193,7 +187,7 @@ static void add_beam(const FlexureType *kind, const Flexure *flexure, Walk *walk
     int body = reached != GROUND ? add_body_angle(walk, reached) : FIXED;
     int start = end_angle(walk, flexure->type_at_start, start_pin, flexure->between.start);
     int end = end_angle(walk, flexure->type_at_end, end_pin, flexure->between.end);
-    for (int i = 0; i < all_nodes(kind); i++) {
+    for (int i = 0; i < node_count(kind); i++) {
         int arm = add_direction(walk, FIXED);
         depend(walk, start);
         depend(walk, end);

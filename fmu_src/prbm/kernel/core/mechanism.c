@@ -17,6 +17,20 @@ PRBM bool has_stress(const Mechanism *mechanism, int i) {
     return kind_of(mechanism, &mechanism->flexures[i])->stress;
 }
 
+PRBM int panel_count(const FlexureType *kind) {
+    if (kind->profile != PROFILE_NOTCH) {
+        return 1;
+    }
+    return is_hinge(kind) ? 3 : PANELS_MAX;
+}
+
+PRBM int node_count(const FlexureType *kind) {
+    if (kind->profile != PROFILE_NOTCH) {
+        return kind->nodes;
+    }
+    return kind->nodes + 2 * THICK_NODES + (is_hinge(kind) ? 0 : 2 * FILLET_NODES);
+}
+
 PRBM double evaluate(Expression quantity, const double *values) {
     double result = 0.0;
     for (int i = 0; i < quantity.count; i++) {

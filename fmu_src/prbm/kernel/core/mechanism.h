@@ -200,6 +200,11 @@ PRBM bool is_hinge(const FlexureType *kind);
 PRBM const FlexureType *kind_of(const Mechanism *mechanism, const Flexure *flexure);
 /* Whether the stress of the i-th flexure is an output. */
 PRBM bool has_stress(const Mechanism *mechanism, int i);
+/* The panels of a notch with a waist. */
+enum { PANELS_MAX = 5 };
+PRBM int panel_count(const FlexureType *kind);
+/* Return the number of nodes in all panels of a beam. */
+PRBM int node_count(const FlexureType *kind);
 PRBM double evaluate(Expression quantity, const double *values); /* Twin: Affine in mechanism/. */
 PRBM bool check_parameter(const Parameter *parameter, double x, Problem *problem);
 /* Check all values and the fields that are expressions (Mechanism.values of the twin). */

@@ -120,14 +120,6 @@ PRBM double notch_length(const Notch *notch) {
     return 2.0 * notch->along * edge.im + (notch->waisted ? notch->waist_length : 0.0);
 }
 
-PRBM int panel_count(bool notched, bool waisted) {
-    return notched ? waisted ? PANELS_MAX : 3 : 1;
-}
-
-PRBM int node_count(bool notched, bool waisted, int nodes) {
-    return nodes + (notched ? 2 * THICK_NODES + (waisted ? 2 * FILLET_NODES : 0) : 0);
-}
-
 PRBM bool notch_panels(const char *name, const Notch *notch, double L, int nodes, Panel *panels,
                        Problem *problem) {
     double h = notch->thickness, H = notch->end_thickness, width = notch->width;

@@ -6,8 +6,6 @@
 
 #define HALF_TURN 3.141592653589793 /* rad */
 
-enum { PANELS_MAX = 5 };
-
 /* A section: position and its change with x, thickness and width [m]. */
 typedef struct {
     double v, dv, thickness, width;
@@ -52,9 +50,6 @@ PRBM double notch_length(const Notch *notch);
 /* Set the panels of a notch in the middle of a flexure of the length L [m]. */
 PRBM bool notch_panels(const char *name, const Notch *notch, double L, int nodes, Panel *panels,
                        Problem *problem);
-PRBM int panel_count(bool notched, bool waisted);
-/* Return the number of nodes in all panels, with the given number in the leaf, notch or waist. */
-PRBM int node_count(bool notched, bool waisted, int nodes);
 /* Return the range of the positions along a line [m]. */
 PRBM double line_length(Line line);
 /* Return dz/dv at a position, turned by the same angle everywhere [-]. */

@@ -58,14 +58,17 @@ typedef struct {
     int start, size, apart;
 } Block;
 
-/* Sizes of the blocks whose code is compiled separately: those of a beam of the order 3. */
+/* Blocks whose code is compiled separately: beams of the order 3 between two clamps, with 5 or 6
+ * nodes and without stretch.  The last direction of those with a body is the last coordinate, the
+ * rotation of the body. */
+typedef enum { NO_BEAM, BEAM_5, BEAM_5_BODY, BEAM_6, BEAM_6_BODY } BeamKind;
+
+/* Sizes of these blocks. */
 enum {
     BEAM_COORDINATES = 4,
     BEAM_ENTRIES = 10, /* of a symmetric matrix of the coordinates */
     BEAM_PAIRED = 8,   /* the first of them, which are pairs in the rows of the matrix */
     BEAM_BODY = 4,    /* the first of the entries in the row of a body */
-    BEAM_NODES_MIN = 5,
-    BEAM_NODES_MAX = 6,
     BEAM_DIRECTIONS_MAX = 7,
     BEAM_CHANGES = BEAM_DIRECTIONS_MAX * BEAM_COORDINATES
 };
@@ -79,8 +82,7 @@ typedef struct {
     Parts H;               /* (size, even) below the diagonal, and zero elsewhere */
     int mass_first, mass_size; /* The mass of the coordinates i and j <= i is at the index
                                 * mass_first + i mass_size + j of the mass blocks. */
-    bool body;             /* Whether the last direction is the last coordinate, of a body. */
-    bool beam;             /* Whether the members below are used. */
+    BeamKind beam;         /* The members below are used unless it is NO_BEAM. */
     bool together;         /* Whether the coordinates are consecutive. */
     int place[BEAM_ENTRIES];       /* The indices of the masses of the coordinates. */
     double constant[BEAM_ENTRIES]; /* The part of these masses that is constant. */
