@@ -23,6 +23,7 @@ from ..hybrid.given import changed_values, checked_times, start_values
 from ..hybrid.outputs import Outputs
 from ..hybrid.records import Impact
 from ..hybrid.simulation import Simulation
+from ..hybrid.snapshot import check_owner
 from ..interface import tables
 from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble, calculated
@@ -389,16 +390,15 @@ class KernelSimulation:
         ParameterError
             If the state belongs to another mechanism or engine, or is damaged.
         """
-        if saved.get("engine") != self.engine:
-            raise ParameterError("the saved state belongs to the Python engine: restore it there")
-        known = saved.get("values")
-        if isinstance(known, Mapping) and known.keys() != self.values.keys():
-            raise ParameterError("the saved state belongs to another mechanism")
+        check_owner(saved, self.engine, self.values)
         try:
             numbers = np.array(saved["numbers"], float)
-            values = {name: saved["values"][name] for name in self.values}
-            given = {name: saved["given"][name] for name in self.given}
+            values = self.mechanism.values({name: saved["values"][name] for name in self.values})
+            known = {name: saved["given"][name] for name in self.given}
+            given = changed_values(self.mechanism, values, known, known)[1]
             wanted = saved["tolerance"]
+            if wanted is not None:
+                wanted = checked_tolerance(wanted)
         except (KeyError, TypeError, ValueError) as error:
             raise ParameterError(f"the saved state is damaged: {error}") from None
         with self._lock:
