@@ -24,6 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.arguments import checked
 from ..mechanics.arrays import Real
 from ..mechanics.stress import stressed
 from ..mechanism.description import Mechanism
@@ -150,6 +151,7 @@ def damage(series: Sequence[float] | Real, kind: FlexureType) -> float | None:
     return total
 
 
+@checked()
 def loadings(
     columns: Columns,
     mechanism: Mechanism,

@@ -8,6 +8,7 @@ from dataclasses import replace
 from importlib.resources import files as package_files
 from importlib.resources.abc import Traversable
 
+from ..base.arguments import checked
 from ..base.errors import MechanismError
 from ..base.text import printable
 from ..interface.variables import Variable
@@ -70,6 +71,7 @@ class {name}(MechanismSlave):
 '''
 
 
+@checked()
 def build(
     mechanism: Mechanism,
     changes: Mapping[str, float] | None = None,

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ..base.arguments import check
 from ..base.errors import ParameterError, SimulationError
 from ..base.names import unknown
 from ..base.tolerances import (
@@ -32,7 +33,7 @@ from ..mechanics.inputs import WALL_INPUTS, Inputs, Wall, impulse_names
 from ..mechanics.stress import SectionStresses, section_stresses
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
-from ..mechanism.parameters import number
+from ..mechanism.parameters import finite, number
 from . import compliant, contact_modes, contact_peaks, events, impacts, snapshot, walls
 from .arc import Arc, Node
 from .configuration import Configuration, Magnitudes
@@ -369,7 +370,7 @@ class Simulation:
         SimulationError
             As :meth:`prbm.hybrid.stability.FastestMode.check_effort`.
         """
-        self.fastest.check_effort(self.equations, step)
+        self.fastest.check_effort(self.equations, finite("step", step, "s"))
 
     # -- state and outputs --
 
@@ -468,6 +469,7 @@ class Simulation:
             As :meth:`advance`; the simulation has then reached the times before.
         """
         times, outputs = checked_times(times), self.outputs()
+        check("names", names, Sequence[str])
         for name in names:
             if name not in outputs:
                 raise ParameterError(unknown(name, outputs))
@@ -484,6 +486,7 @@ class Simulation:
     def snapshot(self) -> dict[str, Any]:
         """Return the complete state as plain values that JSON keeps exactly."""
         return {
+            "engine": self.engine,
             "values": dict(self.values),
             "acting": dict(self.configuration.values),
             "given": dict(self.given),
@@ -510,28 +513,17 @@ class Simulation:
         Raises
         ------
         ParameterError
-            If the state belongs to another mechanism or engine.
+            If the state belongs to another mechanism or engine, or is damaged.  The simulation is
+            then unchanged.
         """
-        if saved.get("engine", self.engine) != self.engine:
-            raise ParameterError("the saved state belongs to the kernel: restore it there")
-        same_names = saved["values"].keys() == self.values.keys()
-        if not same_names or len(saved["front"]["y"]) != len(self.front.y):
-            raise ParameterError("the saved state belongs to another mechanism")
-        acting = self.configuration.restored(
-            saved["acting"], saved["frequency"], saved["tolerance"], saved["step"]
-        )
-        self.configuration, self.prepared = acting, acting.with_values(dict(saved["values"]))
-        self.given, self.received = dict(saved["given"]), np.array(saved["received"])
-        self.changed, self.time = saved["changed"], saved["time"]
-        self.front = snapshot.front_of(saved["front"], acting)
-        self.course = snapshot.course_of(saved["course"])
-        self.window = EventWindow(**saved["window"])
-        self.controller = StepSizeController(**saved["controller"])
-        self.fastest = snapshot.fastest_of(saved["fastest"])
-        self.arc = snapshot.arc_of(saved["arc"])
-        self.pending = snapshot.event_of(saved["pending"])
-        self.k1 = snapshot.array_of(saved["k1"])
-        self.peaks = snapshot.peaks_of(saved["peaks"])
+        snapshot.check_owner(saved, self.engine, self.values)
+        try:
+            snapshot.check_form("", {**saved, "engine": self.engine}, self.snapshot())
+            changed_values(self.mechanism, self.values, self.given, saved["given"])
+            restored = snapshot.restored(saved, self.configuration)
+        except (AttributeError, LookupError, OverflowError, TypeError, ValueError) as error:
+            raise ParameterError(f"the saved state is damaged: {error}") from None
+        vars(self).update(restored)
         self._output_cache = None
 
 

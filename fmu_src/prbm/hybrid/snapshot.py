@@ -1,23 +1,37 @@
 """Conversion of a state to plain values, which JSON stores exactly, and back."""
 
-from collections.abc import Mapping
+import math
+import re
+import reprlib
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
+from ..base.arguments import check_fields
+from ..base.errors import ParameterError
+from ..base.tolerances import EVENTS_MAX, IMPACT_COUNT_MAX, TOLERANCE_MIN, TOLERANCE_USED_MAX
 from ..mechanics.arrays import Real
 from ..mechanics.contact_state import ContactMode, ContactState, Phase, Touching
 from ..mechanics.inputs import Inputs, Wall
 from .arc import Arc, Node
 from .configuration import Configuration
-from .events import Event, EventKind
+from .events import Event, EventKind, EventWindow
 from .front import Front, Latched, Touch
 from .peaks import Peak, PeakRecord, Sample
+from .runge_kutta import TSITOURAS_PAPAKOSTAS
 from .stability import FastestMode
+from .stepping import StepSizeController
 from .walls import Course
 
+T = TypeVar("T")
 Plain = dict[str, Any]
+# Parts that may be None, and lists of samples, whose number varies.
+OPTIONAL = re.compile(
+    r"step|arc|arc\.before|pending|k1|front\.(touching|touches)\[\d+\]|.*\.calm_since"
+)
+SAMPLES = re.compile(r"peaks\.(ahead|peaks\[\d+\]\.last)")
 
 
 def plain_inputs(inputs: Inputs) -> Plain:
@@ -37,7 +51,7 @@ def inputs_of(plain: Mapping[str, Any]) -> Inputs:
         tuple(complex(*f) for f in plain["forces"]),
         tuple(plain["moments"]),
         complex(*plain["base"]),
-        tuple(Wall(**wall) for wall in plain["walls"]),
+        tuple(_made(Wall, wall) for wall in plain["walls"]),
         tuple(plain["mobilities"]),
     )
 
@@ -59,7 +73,7 @@ def front_of(plain: Mapping[str, Any], configuration: Configuration) -> Front:
     """Return a front from plain values, the inverse of :func:`plain_front`."""
     modes = tuple(ContactMode(mode) for mode in plain["modes"])
     touching = tuple(
-        Touching(Phase(one["phase"]), one["reference_speed"], one["depth"]) if one else None
+        _made(Touching, {**one, "phase": Phase(one["phase"])}) if one is not None else None
         for one in plain["touching"]
     )
     contacts = ContactState(modes, len(configuration.mechanism.stops), touching)
@@ -67,7 +81,7 @@ def front_of(plain: Mapping[str, Any], configuration: Configuration) -> Front:
         plain["time"],
         np.array(plain["y"]),
         configuration.equations(inputs_of(plain["inputs"]), contacts),
-        tuple(Latched(**latched) for latched in plain["latched"]),
+        tuple(_made(Latched, latched) for latched in plain["latched"]),
         tuple(touch_of(touch) for touch in plain["touches"]),
     )
 
@@ -77,7 +91,7 @@ def touch_of(plain: Mapping[str, Any] | None) -> Touch | None:
     if plain is None:
         return None
     arrays = {name: tuple(plain[name]) for name in ("q", "v", "momentum")}
-    return Touch(**{**plain, **arrays})
+    return _made(Touch, {**plain, **arrays})
 
 
 def course_of(plain: Mapping[str, Any]) -> Course:
@@ -102,7 +116,9 @@ def arc_of(plain: Mapping[str, Any] | None) -> Arc | None:
     start, h, end = plain["start"], plain["h"], plain["end"]
     before = plain["before"]
     node = (
-        Node(before["time"], np.array(before["y"]), np.array(before["rates"])) if before else None
+        Node(before["time"], np.array(before["y"]), np.array(before["rates"]))
+        if before is not None
+        else None
     )
     return Arc(start, h, end, np.array(plain["y"]), np.array(plain["k"]), plain["n"], node)
 
@@ -154,4 +170,171 @@ def peaks_of(plain: Mapping[str, Any]) -> PeakRecord:
 
 def _samples_of(plain: Any) -> tuple[Sample, ...]:
     """Return samples of the stress from plain values."""
-    return tuple(Sample(**sample) for sample in plain)
+    return tuple(_made(Sample, sample) for sample in plain)
+
+
+def _made(kind: type[T], plain: Mapping[str, Any]) -> T:
+    """Return an object with fields of the types of their annotations."""
+    made = kind(**plain)
+    check_fields(made)
+    return made
+
+
+# --- checks ---------------------------------------------------------------------------------------
+
+
+def check_owner(saved: Any, engine: str, names: Iterable[str]) -> None:
+    """Reject a saved state of the other engine or of another mechanism.
+
+    Parameters
+    ----------
+    saved : object
+        The saved state; states without a name of the engine are those of the Python engine.
+    engine : str
+        Name of the engine that restores the state.
+    names : iterable of str
+        Names of the parameters of the mechanism.
+
+    Raises
+    ------
+    ParameterError
+        If the state is not a mapping, or belongs to another engine or mechanism.
+    """
+    if not isinstance(saved, Mapping):
+        raise ParameterError(f"the saved state is damaged: it is a {type(saved).__name__}")
+    if saved.get("engine", "python") != engine:
+        other = "kernel" if engine == "python" else "Python engine"
+        raise ParameterError(f"the saved state belongs to the {other}: restore it there")
+    known = saved.get("values")
+    if isinstance(known, Mapping) and known.keys() != {*names}:
+        raise ParameterError("the saved state belongs to another mechanism")
+
+
+def check_form(name: str, saved: Any, own: Any) -> None:
+    """Reject plain values of another form than those of the present state.
+
+    Parameters
+    ----------
+    name : str
+        Name of the values in the saved state, for messages; empty for the complete state.
+    saved, own : object
+        The saved and the present values.
+
+    Raises
+    ------
+    ValueError
+        If keys, numbers of elements or types differ, or a number is not finite.
+    """
+    if OPTIONAL.fullmatch(name) and (saved is None or own is None):
+        own = saved  # Only its numbers are checked here.
+    if isinstance(own, Mapping):
+        if not isinstance(saved, Mapping) or saved.keys() != own.keys():
+            raise ValueError(f"{name or 'it'} must have the keys {', '.join(own)}")
+        for key, x in own.items():
+            check_form(f"{name}.{key}" if name else key, saved[key], x)
+    elif isinstance(own, list | tuple):
+        samples = SAMPLES.fullmatch(name) is not None
+        if not isinstance(saved, list | tuple) or (len(saved) != len(own) and not samples):
+            raise ValueError(f"{name} must have {len(own)} elements")
+        for k, x in enumerate(saved if samples else own):
+            check_form(f"{name}[{k}]", saved[k], x)
+    else:
+        _check_scalar(name, saved, own)
+
+
+def _check_scalar(name: str, saved: Any, own: Any) -> None:
+    """Reject a scalar of another type than the present one; integers may stand for real numbers."""
+    kind = next(one for one in (bool, int, float, object) if isinstance(own, one))
+    if kind in (int, float):
+        same = isinstance(saved, int | kind) and not isinstance(saved, bool)
+        same = same and math.isfinite(saved)
+    else:
+        same = isinstance(saved, type(own)) and (name == "engine" or not isinstance(saved, str))
+    if not same:
+        raise ValueError(f"{name} = {reprlib.repr(saved)} must be a finite {kind.__name__}")
+
+
+def restored(saved: Mapping[str, Any], configuration: Configuration) -> dict[str, Any]:
+    """Return the attributes of a simulation in a saved state whose form has been checked.
+
+    Parameters
+    ----------
+    saved : mapping
+        The saved state.
+    configuration : Configuration
+        A configuration of the same mechanism.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of its range, an array has another shape, or parts do not agree with
+        each other.  The kernel makes the same checks.
+    """
+    for values in (saved["values"], saved["acting"]):
+        configuration.mechanism.values(values)
+    acting = configuration.restored(
+        saved["acting"], saved["frequency"], saved["tolerance"], saved["step"]
+    )
+    found = {
+        "configuration": acting,
+        "prepared": acting.with_values(dict(saved["values"])),
+        "given": dict(saved["given"]),
+        "received": np.array(saved["received"]),
+        "changed": saved["changed"],
+        "time": saved["time"],
+        "front": front_of(saved["front"], acting),
+        "course": course_of(saved["course"]),
+        "window": _made(EventWindow, saved["window"]),
+        "controller": _made(StepSizeController, saved["controller"]),
+        "fastest": fastest_of(saved["fastest"]),
+        "arc": arc_of(saved["arc"]),
+        "pending": event_of(saved["pending"]),
+        "k1": array_of(saved["k1"]),
+        "peaks": peaks_of(saved["peaks"]),
+    }
+    for name, holds in _conditions(found).items():
+        if not holds:
+            raise ValueError(f"{name}: its numbers are not a state of this mechanism")
+    return found
+
+
+def _conditions(found: Mapping[str, Any]) -> dict[str, bool]:
+    """Return whether the parts of a restored state agree with each other, by part."""
+    configuration, front, fastest = found["configuration"], found["front"], found["fastest"]
+    arc, event = found["arc"], found["pending"]
+    n, mechanism = configuration.system.n, configuration.mechanism
+    stops, modes = len(mechanism.stops), front.contacts.modes
+    friction = event is not None and event.kind in (EventKind.SLIP, EventKind.REVERSAL)
+    begun = zip(mechanism.stops, front.contacts.touching, front.touches, strict=True)
+    return {
+        "shapes": _shaped(len(front.y), n, arc, found["k1"], fastest),
+        "touching": all(stop.compliant or (one, two) == (None, None) for stop, one, two in begun),
+        "modes": ContactMode.OPEN not in modes[stops:],
+        "latched": all(0 <= x.impact_count <= IMPACT_COUNT_MAX for x in front.latched),
+        "window": 0 <= found["window"].count <= EVENTS_MAX,
+        "pending": event is None or 0 <= event.contact < (len(modes) if friction else stops),
+        "controller": found["controller"].h >= 0.0,
+        "tolerance": TOLERANCE_MIN <= configuration.tolerance <= TOLERANCE_USED_MAX,
+        "frequency": configuration.frequency >= 0.0,
+        "step": configuration.step is None or configuration.step > 0.0,
+        "fastest": fastest.rate >= 0.0,
+        "arc": arc is None or (arc.h > 0.0 and arc.n == n and _before(arc) <= arc.start),
+        "time": front.time >= found["time"],
+    }
+
+
+def _shaped(size: int, n: int, arc: Arc | None, k1: Real | None, fastest: FastestMode) -> bool:
+    """Return whether the arrays of a state of n coordinates have their shapes."""
+    shapes: list[tuple[Real, tuple[int, ...]]] = [(fastest.direction, (n,))]
+    if k1 is not None:
+        shapes.append((k1, (size,)))
+    if arc is not None:
+        shapes += [(arc.y, (size,)), (arc.k, (len(TSITOURAS_PAPAKOSTAS.weights), size))]
+        before = arc.before
+        shapes += [(before.y, (size,)), (before.rates, (size,))] if before is not None else []
+    return all(x.shape == shape for x, shape in shapes)
+
+
+def _before(arc: Arc) -> float:
+    """Return the time of the node before an arc; the start of the arc without one [s]."""
+    return arc.start if arc.before is None else arc.before.time

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.arguments import check
 from ..base.errors import ParameterError, SimulationError
 from ..base.names import unknown
 from ..base.tolerances import TOLERANCE_USED_MAX
@@ -22,6 +23,7 @@ from ..hybrid.given import changed_values, checked_times, start_values
 from ..hybrid.outputs import Outputs
 from ..hybrid.records import Impact
 from ..hybrid.simulation import Simulation
+from ..hybrid.snapshot import check_owner
 from ..interface import tables
 from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble, calculated
@@ -30,7 +32,7 @@ from ..mechanics.independent import independent
 from ..mechanics.stress import SectionStresses, section_positions
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
-from ..mechanism.parameters import number
+from ..mechanism.parameters import finite, number
 from .library import MESSAGE_LENGTH, library
 
 Slots = NDArray[np.intc]
@@ -240,6 +242,7 @@ class KernelSimulation:
         SimulationError
             As :meth:`prbm.hybrid.stability.FastestMode.check_effort`.
         """
+        step = finite("step", step, "s")
         if not self._library.prbm_check_step(self._address, step, self._message):
             raise self._error()
 
@@ -349,6 +352,7 @@ class KernelSimulation:
 
         Parameters and errors as for :meth:`prbm.hybrid.simulation.Simulation.sample`.
         """
+        check("names", names, Sequence[str])
         t, slots, done = checked_times(times), self._slots(names), ctypes.c_int(0)
         x = np.empty((len(t), len(slots)))
         arguments = (
@@ -385,16 +389,15 @@ class KernelSimulation:
         ParameterError
             If the state belongs to another mechanism or engine, or is damaged.
         """
-        if saved.get("engine") != self.engine:
-            raise ParameterError("the saved state belongs to the Python engine: restore it there")
-        known = saved.get("values")
-        if isinstance(known, Mapping) and known.keys() != self.values.keys():
-            raise ParameterError("the saved state belongs to another mechanism")
+        check_owner(saved, self.engine, self.values)
         try:
             numbers = np.array(saved["numbers"], float)
-            values = {name: saved["values"][name] for name in self.values}
-            given = {name: saved["given"][name] for name in self.given}
+            values = self.mechanism.values({name: saved["values"][name] for name in self.values})
+            known = {name: saved["given"][name] for name in self.given}
+            given = changed_values(self.mechanism, values, known, known)[1]
             wanted = saved["tolerance"]
+            if wanted is not None:
+                wanted = checked_tolerance(wanted)
         except (KeyError, TypeError, ValueError) as error:
             raise ParameterError(f"the saved state is damaged: {error}") from None
         with self._lock:

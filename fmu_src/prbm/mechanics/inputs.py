@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
+from ..base.arguments import checked
 from ..base.errors import ParameterError
 from ..base.names import unknown
 from ..base.tolerances import WALL_MOBILITY_MAX
@@ -170,6 +171,7 @@ def input_units(mechanism: Mechanism) -> dict[str, str]:
     return {name: unit for group in INPUT_GROUPS for name, unit in groups[group].items()}
 
 
+@checked()
 def input_names(mechanism: Mechanism) -> tuple[str, ...]:
     """Return the names of the inputs in the order of the interface."""
     return tuple(input_units(mechanism))
@@ -186,6 +188,22 @@ def _impulse_units(mechanism: Mechanism) -> dict[str, str]:
         for force in mechanism.forces
         for axis, unit in LOADS.items()
     }
+
+
+def checked_loads(mechanism: Mechanism, loads: Mapping[str, float]) -> dict[str, float]:
+    """Return all forces [N] and moments [N m] by name, 0 for those that are not given.
+
+    Raises
+    ------
+    ParameterError
+        If a load is unknown, or not a finite number.
+    """
+    known = {f"{f.name}.{component}": 0.0 for f in mechanism.forces for component in LOADS}
+    for name, x in loads.items():
+        if name not in known:
+            raise ParameterError(unknown(name, known))
+        known[name] = finite(name, x)
+    return known
 
 
 def check_input(name: str, number: float, known: Mapping[str, float]) -> float:

@@ -29,6 +29,7 @@ from .arrays import Complex, Real
 from .contact_state import ContactMode
 from .dynamics import Equations, Evaluation, sliding_friction
 from .free_body import SectionLoads
+from .inputs import checked_loads
 from .kinetics import mass_accelerations
 from .statics import Equilibrium
 from .system import FIXED, System, unit
@@ -126,11 +127,16 @@ def static_section_loads(
         The shape, free or held.
     inputs : mapping or None
         The forces that act there, as for :func:`prbm.mechanics.statics.equilibrium`.
+
+    Raises
+    ------
+    ParameterError
+        If a load is unknown, or not a finite number.
     """
-    given, mechanism = inputs or {}, system.mechanism
+    mechanism = system.mechanism
+    given = checked_loads(mechanism, inputs or {})
     pulls = [
-        (f.body, complex(given.get(f"{f.name}.x", 0.0), given.get(f"{f.name}.y", 0.0)))
-        for f in mechanism.forces
+        (f.body, complex(given[f"{f.name}.x"], given[f"{f.name}.y"])) for f in mechanism.forces
     ]
     if not mechanism.release.turns:
         release = mechanism.release

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.arguments import checked
 from ..base.errors import EquilibriumError, ParameterError, SimulationError
-from ..base.names import unknown
 from ..base.tolerances import (
     RELEASE_LEVER_RTOL,
     RELEASE_MOBILITY_RTOL,
@@ -30,11 +30,11 @@ from ..base.tolerances import (
     STATICS_TURN_MAX,
     STATICS_TURN_MIN,
 )
-from ..mechanism.parameters import finite
 from . import constraints, contact
 from .arrays import Complex, Real, Whole
 from .direction_map import DirectionMap
 from .forces import field_row, force_row, springs
+from .inputs import checked_loads
 from .system import System, values
 
 
@@ -110,6 +110,7 @@ def tangent_stiffness(
     return K + (D if Phi is None else Phi.congruence(D))
 
 
+@checked(displacement="m or rad")
 def equilibrium(
     system: System,
     displacement: float | None = None,
@@ -174,14 +175,9 @@ def equilibrium(
 
 def _loads(system: System, loads: Mapping[str, float]) -> tuple[Complex, Real]:
     """Return the row of gravity and the given forces, and the given moments [N m]."""
-    forces = system.mechanism.forces
-    given = {f"{f.name}.{what}": 0.0 for f in forces for what in ("x", "y", "moment")}
-    for name, x in loads.items():
-        if name not in given:
-            raise ParameterError(unknown(name, given))
-        given[name] = finite(name, x)
+    given = checked_loads(system.mechanism, loads)
     w, moment = field_row(system.S, system.gravity), np.zeros(system.n)
-    for force, frame in zip(forces, system.pushed, strict=True):
+    for force, frame in zip(system.mechanism.forces, system.pushed, strict=True):
         x, y, turning = (given[f"{force.name}.{what}"] for what in ("x", "y", "moment"))
         w = w + force_row(frame.A, complex(x, y))
         moment[frame.j] += turning

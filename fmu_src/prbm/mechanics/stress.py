@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base.arguments import checked
 from ..base.tolerances import STRESS_TIE_RTOL
 from ..mechanism.description import Mechanism
 from .arrays import Real
@@ -116,6 +117,7 @@ def section_positions(system: System) -> dict[str, Real]:
     }
 
 
+@checked()
 def static_stresses(
     system: System, shape: Equilibrium, inputs: Mapping[str, float] | None = None
 ) -> dict[str, Stress]:

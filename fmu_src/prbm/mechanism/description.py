@@ -17,6 +17,7 @@ from functools import cached_property
 from keyword import iskeyword
 from typing import Any
 
+from ..base.arguments import check_fields, checked
 from ..base.errors import MechanismError, ParameterError
 from ..base.names import proposal, unknown
 from ..base.tolerances import TOLERANCE_MAX, TOLERANCE_MIN, TOLERANCE_USED_MAX
@@ -129,6 +130,7 @@ class Mechanism:
         printer.text(f"<Mechanism {self.name}: {self.title}>")
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if not re.fullmatch(r"[A-Za-z_]\w*", self.name, re.ASCII) or iskeyword(self.name):
             raise MechanismError(
                 f"mechanism name {self.name!r}: use letters a to z, digits and _, not starting "
@@ -212,6 +214,7 @@ class Mechanism:
         nodes = max(order + NODES_EXTRA, NOTCH_NODES if kind.hinge else 0)
         return replace(MODELS[BEAM], order=order, nodes=nodes if kind.nodes is None else kind.nodes)
 
+    @checked()
     def values(self, changes: Mapping[str, float] | None = None) -> dict[str, float]:
         """Return the values of all parameters: the defaults, or the given changes.
 

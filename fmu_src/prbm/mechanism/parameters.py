@@ -2,6 +2,7 @@
 
 import math
 import re
+import reprlib
 from dataclasses import dataclass
 
 from ..base.errors import MechanismError, ParameterError
@@ -82,7 +83,7 @@ def number(name: str, value: float, unit: str = "") -> float:
         return float(value)
     except (TypeError, ValueError, OverflowError):
         of_unit = f" in {unit}" if unit else ""
-        raise ParameterError(f"{name} = {value!r} must be a number{of_unit}") from None
+        raise ParameterError(f"{name} = {reprlib.repr(value)} must be a number{of_unit}") from None
 
 
 def finite(name: str, value: float, unit: str = "") -> float:

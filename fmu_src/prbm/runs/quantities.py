@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 SETTLED_ENERGY_RTOL = 1e-4
 """A motion has settled if its kinetic energy stays below this share of its largest value."""
+STILL_ENERGY_RTOL = 1e-12  # Below this share of its largest kinetic energy nothing moves.
 SETTLED_PERIODS = 0.5  # Least time without motion, in periods of the fundamental mode.
 
 KINETIC, FREQUENCY = "energy.kinetic", "mode.frequency"
@@ -72,14 +73,18 @@ def settling(columns: Table) -> float:
     """Return the time from which on the kinetic energy stays small [s].
 
     It is the last time at which the kinetic energy falls below :data:`SETTLED_ENERGY_RTOL` times
-    the largest kinetic energy of the run, interpolated between two communication points.  At the
-    end of the run the kinetic energy must have been small for half a period of the fundamental
-    mode, because it is also small where a vibration turns back; if a stop holds, any time suffices.
+    the largest kinetic energy of the run, interpolated between two communication points.  The
+    kinetic energy is that of all bodies of the mechanism, whether they rest on a stop or not, and
+    not that of a partner that is coupled by ``stop.mobility``.
+
+    At the end of the run it must have been small for half a period of the fundamental mode, because
+    it is also small where a vibration turns back.  Stops that hold only raise the frequencies of
+    the rest of the mechanism.  If nothing moves at the last two times, any time suffices.
 
     Parameters
     ----------
     columns : mapping
-        ``time``, ``energy.kinetic``, ``mode.frequency`` and ``contact`` of each stop, (m,) each.
+        ``time``, ``energy.kinetic`` and ``mode.frequency``, (m,) each.
 
     Returns
     -------
@@ -93,7 +98,8 @@ def settling(columns: Table) -> float:
     2.5
     """
     t, energy = np.asarray(columns["time"], float), np.asarray(columns[KINETIC], float)
-    limit = SETTLED_ENERGY_RTOL * float(energy.max())
+    largest = float(energy.max())
+    limit = SETTLED_ENERGY_RTOL * largest
     moving = np.flatnonzero(energy > limit)
     if not len(moving):
         return float(t[0])
@@ -103,8 +109,8 @@ def settling(columns: Table) -> float:
     share = (energy[k] - limit) / (energy[k] - energy[k + 1])
     settled = float(t[k] + share * (t[k + 1] - t[k]))
     frequency = float(np.max(columns[FREQUENCY][-1]))
-    held = any(columns[name][-1] for name in _named(columns, ".contact"))
-    wait = 0.0 if held or not frequency > 0.0 else SETTLED_PERIODS / frequency
+    still = float(energy[-2:].max()) <= STILL_ENERGY_RTOL * largest
+    wait = 0.0 if still or not frequency > 0.0 else SETTLED_PERIODS / frequency
     return settled if float(t[-1]) - settled >= wait else nan
 
 
@@ -146,7 +152,7 @@ def _named(columns: Table, suffix: str) -> list[str]:
 
 
 QUANTITIES: dict[str, Quantity] = {
-    "settling": Quantity("s", "settling time", (KINETIC, FREQUENCY, ".contact"), settling),
+    "settling": Quantity("s", "settling time", (KINETIC, FREQUENCY), settling),
     "impacts": Quantity("", "number of impacts", (".impact_count",), impacts),
     "impact_speed": Quantity(
         "m/s", "largest closing speed of an impact", (".approach_speed",), impact_speed

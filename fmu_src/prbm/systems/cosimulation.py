@@ -28,6 +28,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Self
 
+from ..base.arguments import checked
 from ..base.progress import Progress
 from ..runs.result import Columns, structured
 from ..runs.run import Source, communication_points
@@ -177,6 +178,7 @@ class System:
         If an FMU cannot be used, a name is unknown or a connection does not lead to an input.
     """
 
+    @checked()
     def __init__(
         self,
         fmus: Mapping[str, str | Path],
@@ -415,6 +417,7 @@ class System:
             instance.leave_events()
 
 
+@checked(stop_time="s", step="s")
 def simulate(
     fmus: Mapping[str, str | Path],
     connections: Mapping[str, str],

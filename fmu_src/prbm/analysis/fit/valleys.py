@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...base.arguments import checked
 from ...base.progress import Progress
 from ...data.uncertainty import EvaluationError
 from ...mechanics.arrays import Real
@@ -46,6 +47,7 @@ class Valley:
         return "\n".join([head, *rows])
 
 
+@checked()
 def valley(
     found: Fit,
     along: str | None = None,
