@@ -24,7 +24,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.arguments import checked
 from ..mechanics.arrays import Real
 from ..mechanics.stress import stressed
 from ..mechanism.description import Mechanism
@@ -151,7 +150,6 @@ def damage(series: Sequence[float] | Real, kind: FlexureType) -> float | None:
     return total
 
 
-@checked()
 def loadings(
     columns: Columns,
     mechanism: Mechanism,

@@ -17,10 +17,6 @@ class ParameterError(PrbmError, ValueError):
     """A parameter or an input is unknown, or its value is outside its bounds."""
 
 
-class ArgumentError(ParameterError, TypeError):
-    """An argument has the wrong type."""
-
-
 class EquilibriumError(PrbmError, ValueError):
     """No static shape satisfies the conditions."""
 

@@ -6,8 +6,6 @@ import time
 from collections.abc import Callable
 from typing import TextIO
 
-from .arguments import checked
-
 Progress = Callable[[float], object]
 
 DELAY = 1.0  # A shorter computation reports nothing [s].
@@ -17,7 +15,6 @@ WIDTH = 24  # Characters of the line on a terminal.
 CLEAR = f"\r{'':{WIDTH}}\r"
 
 
-@checked()
 def reporter(stream: TextIO | None = None) -> Progress:
     """Return a progress callback, to be called with the completed fraction, from 0 to 1.
 

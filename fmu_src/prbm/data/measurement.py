@@ -24,7 +24,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.arguments import check_fields, checked
 from ..mechanics.arrays import Real
 from .series import Series
 from .uncertainty import CORRELATION_FACTOR, Estimate, EvaluationError, Line, line, power_law
@@ -121,7 +120,6 @@ class Calibration:
         )
 
 
-@checked()
 def calibrate(
     quantity: Real, reading: Real, unit: str = "m", reading_unit: str = "V"
 ) -> Calibration:
@@ -183,7 +181,6 @@ class Beam:
     thickness: Estimate
 
     def __post_init__(self) -> None:
-        check_fields(self)
         for dimension in DIMENSIONS:
             x = getattr(self, dimension).value
             if x <= 0.0:
@@ -329,7 +326,6 @@ def _listed(words: Sequence[str]) -> str:
     return " and ".join([", ".join(words[:-1]), words[-1]] if words[1:] else words)
 
 
-@checked(sensor_angle="deg")
 def youngs_modulus(
     deflection: Real,
     force: Real,

@@ -33,7 +33,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base import reading
-from ..base.arguments import checked
 from ..files.record_units import KNOWN, in_si, is_unit, same_dimension, si_unit
 from ..mechanics.arrays import Real
 from .cells import MISSING, Table, is_number, name_and_unit
@@ -95,7 +94,6 @@ class Record:
         """Names of the channels."""
         return tuple(channel.name for channel in self.channels)
 
-    @checked()
     def channel(self, name: str) -> Channel:
         """Return a channel by its name; upper and lower case are equal if no name matches exactly.
 
@@ -117,7 +115,6 @@ class Record:
         hint = f"did you mean {near[0]!r}?" if near else f"columns are {', '.join(self.names)}"
         raise RecordError(f"{self.source}: unknown column {name!r}; {hint}")
 
-    @checked()
     def column(self, name: str, unit: str) -> Real:
         """Return the values of a column in SI.
 
@@ -134,8 +131,6 @@ class Record:
             If the column does not exist, or its unit is missing, unknown or of another dimension.
         """
         channel = self.channel(name)
-        if not is_unit(unit):
-            raise RecordError(f"unit = {unit!r} is unknown; known units are {KNOWN}")
         if channel.unit is None:
             state = "has no unit"
             if channel.written:
@@ -201,7 +196,6 @@ class Record:
         return "\n".join(rows)
 
 
-@checked()
 def read_record(
     path: str | Path,
     *,

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arguments import check_fields
 from ..base.errors import PrbmError
 from ..mechanics.arrays import Real
 
@@ -50,7 +49,6 @@ class Series:
     lines: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64), repr=False)
 
     def __post_init__(self) -> None:
-        check_fields(self)
         time, values = self.time, self.values
         if len(time) != len(values):
             raise RecordError(

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from ..base.arguments import check_fields
 from ..base.errors import PrbmError
 from ..mechanics.arrays import Real
 
@@ -59,7 +58,6 @@ class Estimate:
     freedom: float = math.inf
 
     def __post_init__(self) -> None:
-        check_fields(self)
         if not math.isfinite(self.value) or math.isnan(self.uncertainty) or self.uncertainty < 0.0:
             raise EvaluationError(
                 f"invalid estimate {self.value:g} with the standard uncertainty "

@@ -16,7 +16,6 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.signal import find_peaks
 
-from ..base.arguments import checked
 from ..mechanics.arrays import Real
 from .series import Series
 from .uncertainty import CONFIDENCE_LEVEL, Estimate, EvaluationError, serial_correlation, widening
@@ -172,7 +171,6 @@ def damping_verdict(zeta: Estimate) -> str:
     return f"too small to measure: {zeta} includes zero; below {high:.2g} at 95 %"
 
 
-@checked()
 def free_vibration(series: Series) -> FreeVibration:
     """Return frequency and damping of a free vibration.
 

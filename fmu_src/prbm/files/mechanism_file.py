@@ -17,7 +17,6 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core.core_schema import DictSchema, NullableSchema, TupleSchema, WithDefaultSchema
 
 from ..base import reading
-from ..base.arguments import checked
 from ..base.errors import MechanismError, ParameterError, PrbmError
 from ..base.names import proposal
 from ..mechanism.description import Mechanism
@@ -115,7 +114,6 @@ def shipped() -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
-@checked()
 def load(name: str | Path) -> Mechanism:
     """Return a shipped mechanism, or read one from a file.
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 
-from ..base.arguments import checked
 from ..kernel.compiler import browser_module
 from ..mechanism.description import Mechanism
 from ..runs.experiment import experiment
@@ -10,7 +9,6 @@ from .documentation import explorer_page
 from .native_fmu import described, simulated_part
 
 
-@checked()
 def explorer(mechanism: Mechanism, changes: Mapping[str, float] | None = None) -> str:
     """Return an HTML page that simulates a mechanism, as the page of a native FMU does.
 

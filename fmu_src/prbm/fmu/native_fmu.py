@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from importlib.resources import files
 
-from ..base.arguments import checked
 from ..base.errors import MechanismError
 from ..interface.native import NativeInterface, native_interface
 from ..interface.tables import FILE, tables
@@ -42,7 +41,6 @@ LICENSES = ("prbm-impact.txt", "zig.txt")
 WINDOWS_LICENSE, LIVE_LICENSE = "mingw-w64.txt", "wasi-libc.txt"
 
 
-@checked()
 def build(
     mechanism: Mechanism,
     changes: Mapping[str, float] | None = None,

@@ -8,7 +8,6 @@ from dataclasses import replace
 from importlib.resources import files as package_files
 from importlib.resources.abc import Traversable
 
-from ..base.arguments import checked
 from ..base.errors import MechanismError
 from ..base.text import printable
 from ..interface.variables import Variable
@@ -71,7 +70,6 @@ class {name}(MechanismSlave):
 '''
 
 
-@checked()
 def build(
     mechanism: Mechanism,
     changes: Mapping[str, float] | None = None,

@@ -27,7 +27,6 @@ from ..mechanics.inputs import Inputs
 from ..mechanics.modal import fundamental_frequency
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
-from ..mechanism.parameters import finite, number
 from ..mechanism.parts import value
 
 
@@ -206,7 +205,7 @@ class Configuration:
         system = assemble(mechanism, values)
         known = calculated(mechanism, values)
         wanted = checked_tolerance(values["solver.tolerance"] if tolerance is None else tolerance)
-        if step is not None and finite("step", step, "s") <= 0.0:
+        if step is not None and not (math.isfinite(step) and step > 0.0):
             raise ParameterError(f"step = {step} s must be positive")
         frequency = fundamental_frequency(system)
         scales = Scales.of(system, 2 * math.pi * frequency)
@@ -259,14 +258,13 @@ def checked_tolerance(tolerance: float) -> float:
     Raises
     ------
     ParameterError
-        If it is not a number or out of bounds.
+        If it is out of bounds.
     """
-    tolerance = number("tolerance", tolerance)
     if not (math.isfinite(tolerance) and TOLERANCE_MIN <= tolerance <= TOLERANCE_MAX):
         raise ParameterError(
             f"tolerance = {tolerance:g} must lie between {TOLERANCE_MIN:g} and {TOLERANCE_MAX:g}"
         )
-    return tolerance
+    return float(tolerance)
 
 
 def replaced_tolerance(wanted: float) -> str:

@@ -4,13 +4,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..base.arguments import check
 from ..base.errors import ParameterError
 from ..base.names import unknown
 from ..mechanics.arrays import Real
 from ..mechanics.inputs import check_input, input_names
 from ..mechanism.description import Mechanism
-from ..mechanism.parameters import finite
+from ..mechanism.parameters import by_name, finite
 
 Values = dict[str, float]
 
@@ -36,13 +35,14 @@ def start_values(
     ParameterError
         If a name is unknown, or a value is not a finite number or out of bounds.
     """
-    check("mechanism", mechanism, Mechanism)
-    check("values", changes, Mapping[str, float] | None)
+    if not isinstance(mechanism, Mechanism):
+        raise TypeError(f"mechanism = {mechanism!r} must be a Mechanism, as prbm.load returns")
     given = dict.fromkeys(input_names(mechanism), 0.0)
     parameters = {p.name for p in mechanism.parameters}
-    own = {name: x for name, x in (changes or {}).items() if name in parameters}
+    changes = by_name("values", changes)
+    own = {name: x for name, x in changes.items() if name in parameters}
     values = mechanism.values(own)
-    for name, x in (changes or {}).items():
+    for name, x in changes.items():
         if name in given:
             given[name] = check_input(name, x, given)
         elif name not in parameters:
@@ -72,8 +72,7 @@ def changed_values(
     ParameterError
         If a name is unknown or belongs to a fixed parameter, or a value is out of bounds.
     """
-    check("changes", changes, Mapping[str, float])
-    known, inputs = dict(values), dict(given)
+    changes, known, inputs = by_name("changes", changes), dict(values), dict(given)
     only_inputs = changes.keys() <= inputs.keys()
     parameters = {} if only_inputs else {p.name: p for p in mechanism.parameters}
     for name, x in changes.items():
@@ -101,8 +100,6 @@ def checked_times(times: Sequence[float] | Real) -> Real:
     """
     try:
         found = np.array(times, float)
-        if np.isnan(found).any():  # Of None, too.
-            raise ValueError
     except (TypeError, ValueError):
         raise ParameterError(f"times = {times!r} must be a list of numbers in s") from None
     if found.ndim != 1:

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arguments import check
 from ..base.errors import ParameterError, SimulationError
 from ..base.names import unknown
 from ..base.tolerances import (
@@ -33,7 +32,7 @@ from ..mechanics.inputs import WALL_INPUTS, Inputs, Wall, impulse_names
 from ..mechanics.stress import SectionStresses, section_stresses
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
-from ..mechanism.parameters import finite, number
+from ..mechanism.parameters import number
 from . import compliant, contact_modes, contact_peaks, events, impacts, snapshot, walls
 from .arc import Arc, Node
 from .configuration import Configuration, Magnitudes
@@ -370,7 +369,7 @@ class Simulation:
         SimulationError
             As :meth:`prbm.hybrid.stability.FastestMode.check_effort`.
         """
-        self.fastest.check_effort(self.equations, finite("step", step, "s"))
+        self.fastest.check_effort(self.equations, step)
 
     # -- state and outputs --
 
@@ -469,7 +468,6 @@ class Simulation:
             As :meth:`advance`; the simulation has then reached the times before.
         """
         times, outputs = checked_times(times), self.outputs()
-        check("names", names, Sequence[str])
         for name in names:
             if name not in outputs:
                 raise ParameterError(unknown(name, outputs))

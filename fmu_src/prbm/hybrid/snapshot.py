@@ -9,7 +9,6 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..base.arguments import check_fields
 from ..base.errors import ParameterError
 from ..base.tolerances import EVENTS_MAX, IMPACT_COUNT_MAX, TOLERANCE_MIN, TOLERANCE_USED_MAX
 from ..mechanics.arrays import Real
@@ -27,10 +26,9 @@ from .walls import Course
 
 T = TypeVar("T")
 Plain = dict[str, Any]
-# Parts that may be None, and lists of samples, whose number varies.
-OPTIONAL = re.compile(
-    r"step|arc|arc\.before|pending|k1|front\.(touching|touches)\[\d+\]|.*\.calm_since"
-)
+# Parts and numbers that may be None, and lists of samples, whose number varies.
+OPTIONAL_PARTS = re.compile(r"arc|arc\.before|pending|k1|front\.(touching|touches)\[\d+\]")
+OPTIONAL_NUMBERS = re.compile(r"step|.*\.calm_since")
 SAMPLES = re.compile(r"peaks\.(ahead|peaks\[\d+\]\.last)")
 
 
@@ -174,10 +172,17 @@ def _samples_of(plain: Any) -> tuple[Sample, ...]:
 
 
 def _made(kind: type[T], plain: Mapping[str, Any]) -> T:
-    """Return an object with fields of the types of their annotations."""
-    made = kind(**plain)
-    check_fields(made)
-    return made
+    """Return an object with fields of plain values.
+
+    Raises
+    ------
+    ValueError
+        If a text stands for a number.  Missing fields raise TypeError.
+    """
+    texts = [name for name, x in plain.items() if isinstance(x, str)]
+    if texts:
+        raise ValueError(f"{texts[0]} = {plain[texts[0]]!r} must be a number")
+    return kind(**plain)
 
 
 # --- checks ---------------------------------------------------------------------------------------
@@ -225,7 +230,9 @@ def check_form(name: str, saved: Any, own: Any) -> None:
     ValueError
         If keys, numbers of elements or types differ, or a number is not finite.
     """
-    if OPTIONAL.fullmatch(name) and (saved is None or own is None):
+    if OPTIONAL_NUMBERS.fullmatch(name) and (saved is None or own is None):
+        own = None if saved is None else 0.0
+    if OPTIONAL_PARTS.fullmatch(name) and (saved is None or own is None):
         own = saved  # Only its numbers are checked here.
     if isinstance(own, Mapping):
         if not isinstance(saved, Mapping) or saved.keys() != own.keys():

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arguments import check
 from ..base.errors import ParameterError, SimulationError
 from ..base.names import unknown
 from ..base.tolerances import TOLERANCE_USED_MAX
@@ -32,7 +31,7 @@ from ..mechanics.independent import independent
 from ..mechanics.stress import SectionStresses, section_positions
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
-from ..mechanism.parameters import finite, number
+from ..mechanism.parameters import number
 from .library import MESSAGE_LENGTH, library
 
 Slots = NDArray[np.intc]
@@ -242,7 +241,6 @@ class KernelSimulation:
         SimulationError
             As :meth:`prbm.hybrid.stability.FastestMode.check_effort`.
         """
-        step = finite("step", step, "s")
         if not self._library.prbm_check_step(self._address, step, self._message):
             raise self._error()
 
@@ -352,7 +350,6 @@ class KernelSimulation:
 
         Parameters and errors as for :meth:`prbm.hybrid.simulation.Simulation.sample`.
         """
-        check("names", names, Sequence[str])
         t, slots, done = checked_times(times), self._slots(names), ctypes.c_int(0)
         x = np.empty((len(t), len(slots)))
         arguments = (

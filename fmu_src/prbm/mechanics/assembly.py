@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from scipy.linalg import qr
 
-from ..base.arguments import checked
 from ..base.errors import MechanismError, ParameterError
 from ..base.tolerances import (
     DEPENDENT_LOOP_RTOL,
@@ -40,7 +39,6 @@ from .system import FIXED, NO_THICKNESS, BodyFrame, Outline, Place, System, stac
 NAMES_MAX = 5  # Parameters that a message names.
 
 
-@checked()
 def assemble(mechanism: Mechanism, values: Mapping[str, float]) -> System:
     """Return the constant arrays of a mechanism.
 

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
-from ..base.arguments import checked
 from ..base.errors import ParameterError
 from ..base.names import unknown
 from ..base.tolerances import WALL_MOBILITY_MAX
@@ -171,7 +170,6 @@ def input_units(mechanism: Mechanism) -> dict[str, str]:
     return {name: unit for group in INPUT_GROUPS for name, unit in groups[group].items()}
 
 
-@checked()
 def input_names(mechanism: Mechanism) -> tuple[str, ...]:
     """Return the names of the inputs in the order of the interface."""
     return tuple(input_units(mechanism))

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import eigh, null_space
 
-from ..base.arguments import checked
 from ..base.tolerances import ZERO_FREQUENCY_RTOL, ZERO_MODE_RTOL
 from . import constraints
 from .arrays import Complex, Real
@@ -33,7 +32,6 @@ class Modes:
     M: Real
 
 
-@checked()
 def modes(system: System, shape: Equilibrium) -> Modes:
     """Return the modes about a static shape.
 

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.arguments import checked
 from ..base.errors import EquilibriumError, ParameterError, SimulationError
 from ..base.tolerances import (
     RELEASE_LEVER_RTOL,
@@ -110,7 +109,6 @@ def tangent_stiffness(
     return K + (D if Phi is None else Phi.congruence(D))
 
 
-@checked(displacement="m or rad")
 def equilibrium(
     system: System,
     displacement: float | None = None,

@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.arguments import checked
 from ..base.tolerances import STRESS_TIE_RTOL
 from ..mechanism.description import Mechanism
 from .arrays import Real
@@ -117,7 +116,6 @@ def section_positions(system: System) -> dict[str, Real]:
     }
 
 
-@checked()
 def static_stresses(
     system: System, shape: Equilibrium, inputs: Mapping[str, float] | None = None
 ) -> dict[str, Stress]:

@@ -17,7 +17,6 @@ from functools import cached_property
 from keyword import iskeyword
 from typing import Any
 
-from ..base.arguments import check_fields, checked
 from ..base.errors import MechanismError, ParameterError
 from ..base.names import proposal, unknown
 from ..base.tolerances import TOLERANCE_MAX, TOLERANCE_MIN, TOLERANCE_USED_MAX
@@ -44,7 +43,7 @@ from .flexure import (
     TAPER,
     FlexureModel,
 )
-from .parameters import Parameter
+from .parameters import Parameter, by_name
 from .parts import (
     GROUND,
     LAWS,
@@ -130,7 +129,6 @@ class Mechanism:
         printer.text(f"<Mechanism {self.name}: {self.title}>")
 
     def __post_init__(self) -> None:
-        check_fields(self)
         if not re.fullmatch(r"[A-Za-z_]\w*", self.name, re.ASCII) or iskeyword(self.name):
             raise MechanismError(
                 f"mechanism name {self.name!r}: use letters a to z, digits and _, not starting "
@@ -214,7 +212,6 @@ class Mechanism:
         nodes = max(order + NODES_EXTRA, NOTCH_NODES if kind.hinge else 0)
         return replace(MODELS[BEAM], order=order, nodes=nodes if kind.nodes is None else kind.nodes)
 
-    @checked()
     def values(self, changes: Mapping[str, float] | None = None) -> dict[str, float]:
         """Return the values of all parameters: the defaults, or the given changes.
 
@@ -225,7 +222,7 @@ class Mechanism:
         """
         parameters = {p.name: p for p in self.parameters}
         result = {p.name: p.value for p in parameters.values()}
-        for name, value in (changes or {}).items():
+        for name, value in by_name("changes", changes).items():
             if name not in parameters:
                 raise ParameterError(unknown(name, parameters))
             result[name] = parameters[name].check(value)

@@ -3,10 +3,13 @@
 import math
 import re
 import reprlib
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TypeVar
 
 from ..base.errors import MechanismError, ParameterError
 
+T = TypeVar("T")
 NAME = re.compile(r"[A-Za-z_]\w*(\[\d+\])?(\.[A-Za-z_]\w*(\[\d+\])?)*")
 
 
@@ -69,6 +72,24 @@ class Parameter:
         return number
 
 
+def by_name(argument: str, given: Mapping[str, T] | None) -> Mapping[str, T]:
+    """Return the values of an argument by name, none of them for None.
+
+    Raises
+    ------
+    ParameterError
+        If the argument is not a mapping.
+    """
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping):
+        raise ParameterError(
+            f"{argument} = {reprlib.repr(given)} must be a mapping from names to values, such as "
+            '{"stop.position": 0.001}'
+        )
+    return given
+
+
 def number(name: str, value: float, unit: str = "") -> float:
     """Return a number as a float, which may be infinite or NaN.
 
@@ -83,7 +104,7 @@ def number(name: str, value: float, unit: str = "") -> float:
         return float(value)
     except (TypeError, ValueError, OverflowError):
         of_unit = f" in {unit}" if unit else ""
-        raise ParameterError(f"{name} = {reprlib.repr(value)} must be a number{of_unit}") from None
+        raise ParameterError(f"{name} = {value!r} must be a number{of_unit}") from None
 
 
 def finite(name: str, value: float, unit: str = "") -> float:

@@ -13,7 +13,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ..base.arguments import checked
 from ..base.errors import PrbmError
 from ..base.progress import Progress
 from ..mechanism.description import Mechanism
@@ -26,7 +25,6 @@ class AnimationError(PrbmError, RuntimeError):
     """A film cannot be shown or written."""
 
 
-@checked(start="s", stop="s")
 def animate(
     result: Result | Columns,
     path: str | Path,

@@ -8,7 +8,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from ..base.arguments import checked
 from ..base.atomic import write
 from ..base.unit_text import length_unit, prefixed_unit, time_unit
 from ..drawing.style import IMPACT, PAST, REST, WALL, own_style, png
@@ -105,7 +104,6 @@ class _Plot:
 
 
 @own_style()
-@checked()
 def response(result: Result | Columns, mechanism: Mechanism | None = None) -> Figure:
     """Plot a result over time: motion, speeds of the impacts, energies.
 
@@ -179,7 +177,6 @@ def _motionless(plot: _Plot) -> Figure:
     return figure
 
 
-@checked()
 def save(figure: Figure, path: str | Path) -> Path:
     """Write a figure to a PNG file, completely or not at all; return its path.
 

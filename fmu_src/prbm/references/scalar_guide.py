@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from ..base.arguments import check_fields, checked
 from ..base.errors import SimulationError
 
 Real = NDArray[np.float64]
@@ -50,9 +49,6 @@ class ScalarGuide:
     stops: tuple[float, ...] = ()
     restitution: float = 0.6
     rest_speed: float = 1e-3
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     @classmethod
     def of(cls, values: Mapping[str, float], stops: Sequence[float] = ()) -> Self:
@@ -123,7 +119,6 @@ class Monolith:
         Largest step [s].
     """
 
-    @checked(x="m", v="m/s", substep="s")
     def __init__(
         self,
         guide: ScalarGuide,

@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any, Protocol
 
-from ..base.arguments import checked
 from ..base.errors import MechanismError, ParameterError, PrbmError
 from ..hybrid.configuration import Configuration
 from ..hybrid.outputs import Outputs
@@ -96,7 +95,6 @@ class Engine(Protocol):
         """Restore a state of :meth:`snapshot` of the same engine."""
 
 
-@checked(start_time="s", step="s")
 def simulation(
     mechanism: Mechanism,
     values: Mapping[str, float] | None = None,

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arguments import check, checked
 from ..base.errors import PrbmError
 from ..base.names import proposal
 from ..hybrid.records import Impact
@@ -74,7 +73,6 @@ class Result:
         ResultError
             If the name is unknown, or a needed column is missing.
         """
-        check("name", name, str)
         if name not in QUANTITIES:
             raise ResultError(f"unknown quantity {name!r}; {proposal(name, QUANTITIES)}")
         lacking = QUANTITIES[name].lacking(names(self.columns))
@@ -108,7 +106,6 @@ def column(columns: Columns, name: str) -> Columns:
     ResultError
         If the result has no column of that name.
     """
-    check("name", name, str)
     if name not in names(columns):
         raise ResultError(
             f"the result has no column {name!r}; record it, in FMPy with "
@@ -214,7 +211,6 @@ def moves(columns: Columns, mechanism: Mechanism, size: float) -> bool:
     return not motions or any(float(np.ptp(x)) > ZERO_MOTION_RTOL * size for x in motions)
 
 
-@checked()
 def rest_time(columns: Columns, stop: str = "stop") -> float | None:
     """Return the first recorded time of the last hold at a stop [s].
 

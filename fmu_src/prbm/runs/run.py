@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arguments import check, checked
 from ..base.errors import ParameterError, SimulationError
 from ..base.names import unknown
 from ..base.progress import Progress
 from ..hybrid.configuration import replaced_tolerance
 from ..hybrid.records import Impact
 from ..mechanism.description import Mechanism
-from ..mechanism.parameters import number
+from ..mechanism.parameters import by_name
 from .driving import Driver
 from .engine import Engine, simulation
 from .experiment import experiment
@@ -34,7 +33,6 @@ class SlowSimulationError(SimulationError):
     """A simulation takes more integration steps than permitted."""
 
 
-@checked(stop_time="s", step="s")
 def simulate(
     mechanism: Mechanism,
     changes: Mapping[str, float | str] | None = None,
@@ -42,7 +40,7 @@ def simulate(
     inputs: Mapping[str, InputSource] | None = None,
     stop_time: float | str | None = None,
     step: float | str | None = None,
-    tolerance: float | str | None = None,
+    tolerance: float | None = None,
     source: Source | None = None,
     progress: Progress | None = None,
     steps_max: float | None = None,
@@ -114,8 +112,10 @@ def simulate(
     >>> result["force.x"][[4, 5]].tolist()
     [0.0, 1.0]
     """
+    if not isinstance(mechanism, Mechanism):
+        raise TypeError(f"mechanism = {mechanism!r} must be a Mechanism, as prbm.load returns")
     values = in_si(mechanism, changes)
-    driver = Driver(signals(mechanism, inputs or {}, values))
+    driver = Driver(signals(mechanism, by_name("inputs", inputs), values))
     values = {**values, **driver.values(0.0)}
     duration, spacing = (
         None if x is None else in_unit(name, x, "s")
@@ -126,8 +126,6 @@ def simulate(
         duration = default.stop_time if duration is None else duration
         spacing = default.step if spacing is None else spacing
     times = communication_points(duration, spacing)
-    if steps_max is not None and not steps_max > 0.0:
-        raise ParameterError(f"steps_max = {steps_max:g} must be positive, or None")
     if tolerance is not None:
         tolerance = in_unit("tolerance", tolerance, "")
     motion = simulation(mechanism, values, tolerance=tolerance, engine=engine)
@@ -149,9 +147,7 @@ def simulate(
         outputs = motion.outputs()
         observe(motion)
         if source is not None:
-            given = source(t)
-            check(f"source({t:g} s)", given, Mapping[str, float])
-            motion.set(given)
+            motion.set(source(t))
         row = {"time": t, **motion.given, **driver.values(t), **outputs}
         if k == 0:
             columns = np.empty(len(times), row_type(row))
@@ -198,9 +194,10 @@ def _check_steps(motion: Engine, steps_max: float, fraction: float) -> None:
 
 def in_si(mechanism: Mechanism, changes: Mapping[str, float | str] | None) -> Mapping[str, float]:
     """Return changes with texts converted to numbers in SI."""
-    texts = {name: x for name, x in (changes or {}).items() if isinstance(x, str)}
+    given = by_name("changes", changes)
+    texts = {name: x for name, x in given.items() if isinstance(x, str)}
     if not texts:
-        return changes or {}  # type: ignore[return-value]
+        return given  # type: ignore[return-value]
     from ..files.settings import units_of  # imported here: pint takes half a second
 
     units = units_of(mechanism)
@@ -209,7 +206,7 @@ def in_si(mechanism: Mechanism, changes: Mapping[str, float | str] | None) -> Ma
             raise ParameterError(unknown(name, units))
     return {
         name: in_unit(name, x, units[name]) if isinstance(x, str) else x
-        for name, x in (changes or {}).items()
+        for name, x in given.items()
     }
 
 
@@ -219,10 +216,10 @@ def in_unit(name: str, value: Any, unit: str) -> float:
         from ..files.settings import quantity  # imported here: pint takes half a second
 
         return quantity(value, unit, f"{name} =")
-    try:
-        return number(name, value, unit)
-    except ParameterError as error:
-        raise ParameterError(f'{error}, or a text, "1 {unit}"' if unit else str(error)) from None
+    if isinstance(value, bool | bytes) or not hasattr(value, "__float__"):
+        remedy = f', in {unit}, or a text, "1 {unit}"' if unit else ""
+        raise ParameterError(f"{name} = {value!r}: must be a number{remedy}")
+    return float(value)
 
 
 def communication_points(stop_time: float, step: float) -> list[float]:

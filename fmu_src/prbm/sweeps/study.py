@@ -12,7 +12,7 @@ import multiprocessing
 import os
 import signal
 import sys
-from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -22,7 +22,6 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize, minimize_scalar
 
-from ..base.arguments import checked
 from ..base.errors import ParameterError, PrbmError
 from ..base.names import proposal
 from ..base.progress import Progress
@@ -180,7 +179,6 @@ class Study:
         )
 
 
-@checked(stop_time="s", step="s")
 def study(
     mechanism: Mechanism,
     vary: Mapping[str, Samples],
@@ -192,7 +190,7 @@ def study(
     inputs: Mapping[str, Source] | None = None,
     stop_time: float | str | None = None,
     step: float | str | None = None,
-    tolerance: float | str | None = None,
+    tolerance: float | None = None,
     workers: int | None = None,
     engine: str | None = None,
     progress: Progress | None = None,
@@ -241,7 +239,7 @@ def study(
     units = _units(mechanism)
     given = dict(in_si(mechanism, values))
     setup = Setup(
-        mechanism, _outputs(texts, units, mechanism.values()), given, dict(inputs or {}),
+        mechanism, _outputs(texts, units), given, dict(inputs or {}),
         _options(mechanism, given, stop_time, step, tolerance, engine),
     )  # fmt: skip
     first = {name: float(x[0]) for name, x in samples.items()}
@@ -271,7 +269,7 @@ def _options(
     values: Mapping[str, float],
     stop_time: float | str | None,
     step: float | str | None,
-    tolerance: float | str | None,
+    tolerance: float | None,
     engine: str | None,
 ) -> dict[str, Any]:
     """Return the further arguments of all simulations.
@@ -339,10 +337,8 @@ def _units(mechanism: Mechanism) -> dict[str, str]:
     return {variable.name: variable.unit for variable in every}
 
 
-def _outputs(
-    texts: Sequence[str], known: Mapping[str, str], constant: Container[str]
-) -> tuple[Output, ...]:
-    """Return checked outputs, which are among the known variables and not among the constant."""
+def _outputs(texts: Sequence[str], known: Mapping[str, str]) -> tuple[Output, ...]:
+    """Return checked outputs."""
     if not texts:
         raise ParameterError("no output is selected; name one, for instance settling")
     kept = []
@@ -356,8 +352,6 @@ def _outputs(
             raise ParameterError(
                 f"output {text}: the mechanism has no {lacking}, from which it is computed"
             )
-        if output.variable in constant:
-            raise ParameterError(f"output {text}: {output.variable} is a parameter; name an output")
         if output.reduction != QUANTITY and output.variable not in known:
             hint = proposal(output.variable, dict.fromkeys([*known, *QUANTITIES]))
             if hint.startswith("known") and len(known) > NAMES_LISTED_MAX:

@@ -28,7 +28,6 @@ from typing import TYPE_CHECKING, Any
 import fmpy  # type: ignore[import-untyped]
 
 from ..base.archives import check_unpacked_size
-from ..base.arguments import checked
 from ..base.errors import ParameterError, PrbmError
 from ..base.names import proposal
 from ..base.progress import Progress
@@ -64,7 +63,6 @@ class SweepError(PrbmError, RuntimeError):
     """The sweep cannot run, for a reason that does not depend on its table."""
 
 
-@checked(stop_time="s", step="s", timeout="s")
 def sweep(
     fmu: str | Path,
     table: "pd.DataFrame | str | Path",
@@ -176,7 +174,6 @@ def sweep(
     return results.read()
 
 
-@checked()
 def samples(
     distributions: Mapping[str, Any], n: int, seed: int = 0, method: str = "random"
 ) -> "pd.DataFrame":

@@ -14,7 +14,6 @@ from fmpy.simulation import (  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from ..base.arguments import check
 from ..base.errors import ParameterError
 from ..base.names import proposal
 from .outputs import Output
@@ -98,7 +97,6 @@ def _unit(n: int, d: int, seed: int, method: str) -> NDArray[np.float64]:
 
 def _quantiles(name: str, distribution: Any, u: NDArray[np.float64]) -> NDArray[np.float64]:
     if isinstance(distribution, tuple):
-        check(name, distribution, tuple[float, float])
         low, high = distribution
         x = np.asarray(low + (high - low) * u, dtype=float)
     elif hasattr(distribution, "ppf"):

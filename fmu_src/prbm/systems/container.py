@@ -18,7 +18,6 @@ from fmpy.model_description import (  # type: ignore[import-untyped]
     Unknown,
 )
 
-from ..base.arguments import checked
 from .components import CouplingError, Value, check_wire, described, start_value
 
 # Types of FMI 3.0 by their names in FMI 2.0.
@@ -26,7 +25,6 @@ NAMES3 = {"Real": "Float64", "Integer": "Int32"}
 KINDS = ("parameter", "input", "output")
 
 
-@checked(step="s", stop_time="s")
 def container(
     path: str | Path,
     fmus: Mapping[str, str | Path],

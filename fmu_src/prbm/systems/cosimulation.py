@@ -28,7 +28,6 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Self
 
-from ..base.arguments import checked
 from ..base.progress import Progress
 from ..runs.result import Columns, structured
 from ..runs.run import Source, communication_points
@@ -178,7 +177,6 @@ class System:
         If an FMU cannot be used, a name is unknown or a connection does not lead to an input.
     """
 
-    @checked()
     def __init__(
         self,
         fmus: Mapping[str, str | Path],
@@ -417,7 +415,6 @@ class System:
             instance.leave_events()
 
 
-@checked(stop_time="s", step="s")
 def simulate(
     fmus: Mapping[str, str | Path],
     connections: Mapping[str, str],

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from scipy.integrate import DOP853
 from scipy.optimize import brentq
 
-from ..base.arguments import checked
 from ..runs.result import Columns, structured
 from ..runs.run import communication_points
 from .components import MODEL_EXCHANGE, Component, CouplingError, Value, start_value
@@ -148,7 +147,6 @@ class OneSolver:
         Largest step [s].  A contact that begins and ends within one step is not detected.
     """
 
-    @checked(max_step="s")
     def __init__(
         self,
         model: Model,
@@ -236,7 +234,6 @@ class OneSolver:
         return float(min(roots))
 
 
-@checked(stop_time="s", step="s", max_step="s")
 def simulate(
     fmu: str | Path,
     partner: Partner,

@@ -13,7 +13,6 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from ..base.arguments import checked
 from ..runs.result import Columns
 from ..runs.run import communication_points
 from .components import CouplingError, Value, check_wire, described, start_value
@@ -35,7 +34,6 @@ KINDS = {"Real": "Real", "Float64": "Real", "Integer": "Integer", "Int32": "Inte
 """Types of SSP by the types of FMI 2.0 and 3.0."""
 
 
-@checked(stop_time="s")
 def package(
     path: str | Path,
     fmus: Mapping[str, str | Path],
@@ -164,7 +162,6 @@ def _number(kind: str, value: Value) -> str:
     return str(int(value)) if kind == "Integer" else repr(float(value))
 
 
-@checked(stop_time="s", step="s")
 def simulate(path: str | Path, stop_time: float, step: float) -> Columns:
     """Simulate a package with FMPy's master, from the start values in the package.
 

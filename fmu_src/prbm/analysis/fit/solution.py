@@ -8,7 +8,6 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.arguments import checked
 from ...base.progress import Progress
 from ...data.series import Series
 from ...data.uncertainty import Estimate, EvaluationError, serial_correlation, widening
@@ -193,7 +192,6 @@ class Fit:
         return "\n".join([*rows, *(f"  note: {note}" for note in self.notes)])
 
 
-@checked()
 def fit(
     mechanism: Mechanism,
     free: Sequence[Free | str],
@@ -334,7 +332,6 @@ def _best_start(
     return grid[best]
 
 
-@checked()
 def fitted_restitution(
     mechanism: Mechanism,
     series: Series,

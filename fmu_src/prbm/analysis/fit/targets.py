@@ -7,7 +7,6 @@ from typing import Protocol
 
 import numpy as np
 
-from ...base.arguments import check_fields
 from ...base.names import unknown
 from ...data.series import Series
 from ...data.uncertainty import Estimate, EvaluationError
@@ -76,7 +75,6 @@ class Frequency:
                 f"frequency = {self.frequency!r} has no uncertainty, the weight of a target: give "
                 "Frequency(Estimate(value, standard uncertainty)), both in Hz"
             )
-        check_fields(self)
         if not 0.0 < self.frequency.uncertainty < math.inf or self.frequency.value <= 0.0:
             raise EvaluationError(
                 f"frequency {self.frequency}: give a positive value and its standard uncertainty, "
@@ -140,7 +138,6 @@ class Response:
     engine: str | None = None
 
     def __post_init__(self) -> None:
-        check_fields(self)
         if self.uncertainty is not None and not 0.0 < self.uncertainty < math.inf:
             raise EvaluationError(
                 f"uncertainty = {self.uncertainty:g} of {self.output}: it must be positive; give "
@@ -205,7 +202,6 @@ class ForceDeflection:
     unit: str = field(default="N", init=False)
 
     def __post_init__(self) -> None:
-        check_fields(self)
         if len(self.displacement) != len(self.force) or not len(self.force):
             raise EvaluationError(
                 f"{len(self.displacement)} displacements for {len(self.force)} forces: give pairs"

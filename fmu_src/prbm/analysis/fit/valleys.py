@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.arguments import checked
 from ...base.progress import Progress
 from ...data.uncertainty import EvaluationError
 from ...mechanics.arrays import Real
@@ -47,7 +46,6 @@ class Valley:
         return "\n".join([head, *rows])
 
 
-@checked()
 def valley(
     found: Fit,
     along: str | None = None,
