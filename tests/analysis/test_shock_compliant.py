@@ -59,3 +59,21 @@ def test_the_command_prints_and_draws_the_forces(tmp_path, capsys):
     printed = capsys.readouterr().out
     assert "force at bump_left" in printed
     assert (tmp_path / "out" / "Accelerometer-shock.png").stat().st_size > 10_000
+
+
+def test_the_sweep_over_the_peak_has_a_column_of_the_force(tmp_path, capsys):
+    """The force grows with the peak; without hits it is zero."""
+    text = ACCELEROMETER.read_text("utf-8")
+    changed = 'restitution = 0.5\nlaw = "compliant"\nstiffness = "1e4 N/m"'
+    file = tmp_path / "compliant.toml"
+    file.write_text(text.replace("restitution = 0.5", changed), "utf-8")
+    line = (
+        f"shock {file} --duration 0.5ms --peaks 10 500 800 g --stop-time 0.6ms "
+        f"--out {tmp_path / 'out'}"
+    )
+    assert cli.main(shlex.split(line)) == cli.OK
+    assert "force [N]" in capsys.readouterr().out
+    table = (tmp_path / "out" / "Accelerometer-fragility.csv").read_text("utf-8").splitlines()
+    column = table[0].split(",").index("force [N]")
+    forces = [float(row.split(",")[column]) for row in table[1:]]
+    assert forces[0] == 0.0 < forces[1] < forces[2]

@@ -77,6 +77,31 @@ def test_parameters_and_outputs_of_a_compliant_stop_have_their_units(path):
 
 @pytest.mark.fmu
 @pytest.mark.native
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("stiffness", 0.0, "stop.stiffness = 0 N/m must be at least 1e-06 N/m"),
+        ("exponent", 0.5, "stop.exponent = 0.5 must be at least 1"),
+        ("restitution", 0.005, "stop.restitution = 0.005 must be at least 0.01"),
+        ("restitution", 1.5, "stop.restitution = 1.5 must be at most 1"),
+    ],
+)
+def test_invalid_parameters_of_a_compliant_stop_are_rejected_in_an_fmu(name, value, words, path):
+    """Native FMUs fail; FMPy continues with Python FMUs, whose outputs are not numbers."""
+    logged = []
+    try:
+        found = simulate_fmu(
+            path, start_values={f"stop.{name}": value}, stop_time=STEP, debug_logging=True,
+            logger=lambda *given: logged.append(str(given[-1])), output=["mass.x"],
+        )  # fmt: skip
+        assert np.isnan(found["mass.x"]).all()
+    except fmpy.fmi1.FMICallException:
+        pass
+    assert any(words in text for text in logged), logged
+
+
+@pytest.mark.fmu
+@pytest.mark.native
 def test_a_state_saved_in_contact_restores_in_an_fmu(path, tmp_path):
     description = read_model_description(path)
     if description.fmiVersion == "3.0":

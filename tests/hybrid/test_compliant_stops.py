@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from point_mass import MASS, point_mass
-from prbm.base.errors import MechanismError, ParameterError, SimulationError
+from prbm.base.errors import MechanismError, SimulationError
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.compliance import damping_factor
 from prbm.mechanics.contact_state import Phase
@@ -418,21 +418,6 @@ def test_rigid_stops_have_no_outputs_of_compliant_ones():
 
 
 # --- rejections -------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("keys", "message"),
-    [
-        ({"stiffness": 0.0}, "stop.stiffness = 0 N/m must be at least"),
-        ({"stiffness": math.inf}, "stop.stiffness = inf N/m must be a finite number"),
-        ({"exponent": 0.5}, "stop.exponent = 0.5 must be at least 1"),
-        ({"restitution": 0.005}, "stop.restitution = 0.005 must be at least 0.01"),
-        ({"restitution": 1.5}, "stop.restitution = 1.5 must be at most 1"),
-    ],
-)
-def test_invalid_values_are_rejected(keys, message):
-    with pytest.raises(ParameterError, match=message):
-        point_mass(**keys)
 
 
 @pytest.mark.parametrize(

@@ -44,10 +44,10 @@ def test_hits_in_model_exchange_are_those_of_co_simulation(friction):
     own = soft("PRBDM", 1e5, friction=friction, direction=20.0 if friction else 0.0)
     kernel, alone, phases = KernelSimulation(own, exchange=True), Simulation(own), set()
     start = energy_balance({name: kernel.get(name) for name in alone.outputs()})
-    for t, z in integrate(kernel, 0.25, h=4e-5):
+    for t, z in integrate(kernel, 0.225, h=4e-5):
         assert (z > 0.0).all(), (t, z)
         phases.add(kernel.touching(0))
-    alone.advance(0.25)
+    alone.advance(0.225)
     expected = {name: float(x) for name, x in alone.outputs().items()}
     assert expected["stop.impact_count"] > 1
     assert constants()["PHASE_RISING"] in phases or friction

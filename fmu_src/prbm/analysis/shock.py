@@ -156,6 +156,11 @@ class Shock:
         return min((x.safety for x in self.loadings if x.safety is not None), default=math.inf)
 
     @property
+    def force(self) -> float | None:
+        """Largest force at a compliant stop [N]; None without compliant stops."""
+        return max((x.force for x in self.hits if x.force is not None), default=None)
+
+    @property
     def peak_stress(self) -> float:
         """Largest stress [Pa]."""
         return max(x.peak for x in self.loadings)

@@ -137,13 +137,17 @@ def _sweep(
     rows = [
         [
             f"{peak / GRAVITY:.6g}", f"{factor * one.displacement:.4g}",
-            str(sum(hits.count for hits in one.hits)), f"{1e-6 * one.peak_stress:.4g}",
+            str(sum(hits.count for hits in one.hits)),
+            *([] if one.force is None else [f"{one.force:.4g}"]),
+            f"{1e-6 * one.peak_stress:.4g}",
             "-" if math.isinf(one.safety) else f"{one.safety:.3g}",
         ]
         for peak, one in zip(found.peaks, found.shocks, strict=True)
     ]  # fmt: skip
     print(f"{mechanism.name}: {pulse.kind} of {1e3 * pulse.duration:.4g} ms along {pulse.axis}")
-    print(aligned(("peak [g]", f"displacement [{unit}]", "hits", "stress [MPa]", "safety"), rows))
+    force = [] if found.shocks[0].force is None else ["force [N]"]
+    heads = ["peak [g]", f"displacement [{unit}]", "hits", *force, "stress [MPa]", "safety"]
+    print(aligned(heads, rows))
     if all(math.isinf(one.safety) for one in found.shocks):
         print("no safety factor without yield_strength: add it to the material")
     elif math.isnan(level):
@@ -152,9 +156,16 @@ def _sweep(
         print(f"yield                from a peak of {level / GRAVITY:.4g} g on")
     output.table(
         f"{mechanism.name}-fragility.csv",
-        ["peak [m/s2]", "displacement", "hits", "stress [Pa]", "safety factor [-]"],
+        ["peak [m/s2]", "displacement", "hits", *force, "stress [Pa]", "safety factor [-]"],
         [
-            [p, x.displacement, sum(h.count for h in x.hits), x.peak_stress, x.safety]
+            [
+                p,
+                x.displacement,
+                sum(h.count for h in x.hits),
+                *([] if x.force is None else [x.force]),
+                x.peak_stress,
+                x.safety,
+            ]
             for p, x in zip(found.peaks, found.shocks, strict=True)
         ],
     )

@@ -46,7 +46,7 @@ from .copies import (
 )
 from .outlines import plate
 from .tables import STRENGTHS, MaterialTable, Named, ParameterTable, RepeatTable, Table
-from .units import check_coherent, si_unit
+from .units import check_coherent, contact_stiffness
 from .values import (
     NAME_LENGTH_MAX,
     Acceleration,
@@ -248,11 +248,11 @@ class StopTable(Named):
     @classmethod
     def _unit_of_stiffness(cls, written: object, info: ValidationInfo) -> object:
         exponent = info.data.get("exponent")
-        if exponent not in (None, 1.0) and isinstance(written, str) and si_unit(written):
-            raise MechanismError(
-                f"its unit is N/m^{exponent}: write a number in this unit, without quotes"
-            )
-        return written
+        exponent = 1.0 if exponent is None else exponent
+        invalid = isinstance(exponent, float) and exponent < 1.0  # Reported for the exponent.
+        if invalid or not isinstance(written, str):
+            return written
+        return contact_stiffness(written, exponent)
 
 
 class FrictionTable(Named):

@@ -69,6 +69,8 @@ _POWER = r"[A-Za-zµμ°]+(?:\^?-?[0-9]+)?"
 _PRODUCT = rf"{_POWER}(?:(?:\s*[.*·⋅]\s*|\s+){_POWER})*"
 _UNIT = rf"{_PRODUCT}(?:\s*/\s*{_POWER})*"
 _PLAIN = re.compile(rf"([+-]?{_NUMBER})\s*((?:1?\s*/\s*)?{_UNIT})")
+_SYMBOL = r"[A-Za-zµμ]+"
+_STIFFNESS = re.compile(rf"([+-]?{_NUMBER})\s*({_SYMBOL})\s*/\s*({_SYMBOL})\^?([0-9]+\.?[0-9]*)?")
 _LITERAL = re.compile(rf"(?<![\w.\]])({_NUMBER})\s*({_UNIT})")
 _SUPERSCRIPTS = str.maketrans("¹²³⁴⁻", "1234-")
 
@@ -197,6 +199,50 @@ def si_unit(written: str) -> str:
     common = (unit for unit, known in COMMON.items() if plain[2] in known)
     near = (unit for unit in COHERENT if same_dimension(plain[2], unit))
     return next(chain(common, near), "")
+
+
+def contact_stiffness(written: str, exponent: float | str) -> float | str:
+    """Return a contact stiffness in N/m^exponent; expressions in parameters are not changed.
+
+    Raises
+    ------
+    MechanismError
+        If its unit is not a force over a length to the power of the exponent, or if the exponent is
+        an expression and the stiffness has a unit.
+
+    Examples
+    --------
+    >>> contact_stiffness("2 kN/m^1.5", 1.5), contact_stiffness("1 N/mm^2", 2.0)
+    (2000.0, 1000000.0)
+    """
+    text = _short(written)
+    plain = _STIFFNESS.fullmatch(text)
+    power = float(plain[4] or 1.0) if plain else None
+    measured = plain is not None or _PLAIN.fullmatch(text) is not None
+    if isinstance(exponent, str):
+        if measured:
+            raise MechanismError(
+                f"{written[:40]!r} has a unit, which depends on the exponent {exponent[:40]!r}: "
+                "write a number in N/m^exponent, without quotes"
+            )
+        return written
+    wrong = MechanismError(
+        f"{written[:40]!r} must be a force over a length to the power {exponent:g}: write it in "
+        f'N/m^{exponent:g}, for instance "1e9 N/m^{exponent:g}"'
+    )
+    if exponent == 1.0:
+        if power not in (None, 1.0):
+            raise wrong
+        return written  # Its unit is that of other stiffnesses.
+    if plain is None or power != exponent:
+        if measured or re.fullmatch(rf"[+-]?{_NUMBER}", text):
+            raise wrong
+        return written
+    try:
+        force, length = converted("1", plain[2], "N"), converted("1", plain[3], "m")
+    except MechanismError:
+        raise wrong from None
+    return _finite(float(plain[1]) * force / length**exponent)
 
 
 def check_coherent(unit: str) -> None:
