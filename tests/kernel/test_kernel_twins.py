@@ -30,7 +30,7 @@ from kernel_library import (
     prototypes,
     structures,
 )
-from many_parts import beams, elastic, links_and_beams, profiles, rich
+from many_parts import beams, elastic, five_nodes, late_beam, links_and_beams, profiles, rich
 from prbm.base import tolerances
 from prbm.base.errors import EquilibriumError, MechanismError, ParameterError, SimulationError
 from prbm.hybrid import runge_kutta
@@ -114,7 +114,7 @@ def spread(condition):
 NAMES = ("PRBDM", "PRBDM2R", "Rich", "Elastic", "Beams", "Mixed")
 OWN_MECHANISMS = {
     "Rich": rich, "Elastic": elastic, "Beams": beams, "Mixed": links_and_beams,
-    "Profiles": profiles,
+    "Profiles": profiles, "LateBeam": late_beam, "FiveNodes": five_nodes,
 }  # fmt: skip
 
 

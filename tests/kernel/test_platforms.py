@@ -171,7 +171,7 @@ def test_every_compiler_computes_the_same_bytes(model):
     assert output(NATIVE, model, 2, "cs") == host.output
 
 
-@pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R", TWO_STOPS])
+@pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R", "GuideBeam", TWO_STOPS])
 def test_a_compiler_without_vectors_computes_the_same_bytes(model):
     """Compilers other than GCC and Clang use the code without vectors."""
     job = Job(native(model, 2), "cs", POINTS)

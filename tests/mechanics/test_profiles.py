@@ -177,6 +177,12 @@ def test_a_profile_is_the_same_from_either_end(name):
 
 
 @pytest.mark.parametrize("name", KINDS)
+def test_a_beam_has_one_arm_for_each_node_of_its_panels(name):
+    system = cantilever(KINDS[name])
+    assert system.d - 1 == system.mechanism.node_count(KINDS[name])  # One is that of the body.
+
+
+@pytest.mark.parametrize("name", KINDS)
 def test_mass_centre_and_inertia_of_a_beam_that_rotates_about_a_pin_are_those_of_its_solid(name):
     """A notch has the rotary inertia of its sections; that of a taper is neglected."""
     system = cantilever(KINDS[name], ("pin", "clamp"))

@@ -57,6 +57,16 @@ def test_the_cost_grows_with_the_exponents_of_the_page(exponents):
 
 @pytest.mark.slow
 @pytest.mark.native
+def test_a_right_hand_side_on_beams_costs_at_most_twice_that_of_the_2r(scaling):
+    """The tolerance of a twentieth is for other compilers."""
+    needs("cc", "valgrind")
+    reference = scaling.instructions(scaling.mechanism("PRBDM2R"))
+    for nodes in (5, 6):
+        assert scaling.instructions(scaling.beams(3, nodes, False)) < 2.1 * reference
+
+
+@pytest.mark.slow
+@pytest.mark.native
 def test_the_folded_suspension_is_faster_than_real_time(native):
     """The suspension has eight 3R flexures that stretch, with 51 coordinates.
 

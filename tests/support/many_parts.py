@@ -209,6 +209,26 @@ def links_and_beams() -> Mechanism:
     return dataclasses.replace(links, flexure_types=kinds)
 
 
+def five_nodes() -> Mechanism:
+    """Return the guide on beams of five nodes."""
+    guide = mechanism("GuideBeam")
+    (leaf,) = guide.flexure_types
+    return dataclasses.replace(
+        guide, flexure_types=(dataclasses.replace(leaf, nodes=5, stress=True),)
+    )
+
+
+def late_beam() -> Mechanism:
+    """Return a mechanism whose last flexure, a beam, turns with the first body.
+
+    Its coordinates are not consecutive: those of another flexure and body are between.
+    """
+    mixed = links_and_beams()
+    one, two, three = mixed.flexures
+    last = Flexure("two", "leaf", two.end, two.start)
+    return dataclasses.replace(mixed, flexures=(one, three, last))
+
+
 def profiles(*, axial: bool = True) -> Mechanism:
     """Return a mechanism of a notch, a taper, an arc, and a notch with fillets, from either end."""
     links = elastic()

@@ -26,6 +26,7 @@ from .flexure import (
     CHAIN,
     CLAMP,
     ENDS,
+    FILLET_NODES,
     FREE,
     HINGE_ORDER_DEFAULT,
     LEAF,
@@ -41,6 +42,7 @@ from .flexure import (
     ORDER_MAX,
     PROFILES,
     TAPER,
+    THICK_NODES,
     FlexureModel,
 )
 from .parameters import Parameter, by_name
@@ -211,6 +213,13 @@ class Mechanism:
         order = order if kind.order is None else kind.order
         nodes = max(order + NODES_EXTRA, NOTCH_NODES if kind.hinge else 0)
         return replace(MODELS[BEAM], order=order, nodes=nodes if kind.nodes is None else kind.nodes)
+
+    def node_count(self, kind: FlexureType) -> int:
+        """Return the number of nodes in all panels of a beam: the thick parts and fillets, too."""
+        nodes = self.model(kind).nodes
+        if kind.profile != NOTCH:
+            return nodes
+        return nodes + 2 * THICK_NODES + (0 if kind.hinge else 2 * FILLET_NODES)
 
     def values(self, changes: Mapping[str, float] | None = None) -> dict[str, float]:
         """Return the values of all parameters: the defaults, or the given changes.

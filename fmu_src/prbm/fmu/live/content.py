@@ -11,7 +11,7 @@ from ...mechanics.assembly import assemble
 from ...mechanics.system import Outline, System
 from ...mechanism.description import Mechanism
 from ...mechanism.expressions import Quantity, affine
-from ...mechanism.flexure import FILLET_NODES, LEAF, NOTCH, PIN, THICK_NODES
+from ...mechanism.flexure import BEAM, LEAF, PIN
 from ...mechanism.parts import (
     Flexure,
     FlexureType,
@@ -221,8 +221,7 @@ def _flexures(mechanism: Mechanism, system: System) -> list[dict[str, Json]]:
             continue
         flexure = named[outline.name]
         kind = mechanism.type_of(flexure)
-        model = mechanism.model(kind)
-        beam, ends = bool(model.order), _ends(mechanism, flexure)
+        beam, ends = kind.model == BEAM, _ends(mechanism, flexure)
         guided = [end != PIN for end in flexure.ends]
         if not beam and _backwards(mechanism, system, flexure, outline):
             ends.reverse()
@@ -231,7 +230,7 @@ def _flexures(mechanism: Mechanism, system: System) -> list[dict[str, Json]]:
             {
                 "name": flexure.name,
                 "beam": beam,
-                "corners": _nodes(kind, model.nodes) if beam else len(outline.c),
+                "corners": mechanism.node_count(kind) if beam else len(outline.c),
                 "guided": guided,
                 "ends": ends,
                 "profile": _profile(kind),
@@ -247,13 +246,6 @@ def _profile(kind: FlexureType) -> dict[str, Json] | None:
         return None
     fields = ("thickness", "end_thickness", "notch_radius", "notch_depth", "waist_length")
     return {name: _field(kind, name) for name in fields if field_of(kind, name) is not None}
-
-
-def _nodes(kind: FlexureType, nodes: int) -> int:
-    """Return the number of nodes in all panels of a beam, see :mod:`prbm.mechanics.profile`."""
-    if kind.profile != NOTCH:
-        return nodes
-    return nodes + 2 * THICK_NODES + (0 if kind.hinge else 2 * FILLET_NODES)
 
 
 def _backwards(mechanism: Mechanism, system: System, flexure: Flexure, outline: Outline) -> bool:

@@ -142,6 +142,7 @@ PRBM void keep_links(System *system, const Step *step, const Segments *pieces, C
     FreeBody *body = body_of(system, step);
     int n = pieces->n;
     const double identity[4] = {1.0, 0.0, 0.0, 1.0};
+    body->order = 0;
     body->sections = n + 3;
     body->arm_count = 2;
     body->arms[0] = owners[0];
@@ -223,6 +224,7 @@ PRBM void keep_beam(System *system, const Step *step, const Beam *beam, Complex 
     FreeBody *body = body_of(system, step);
     const FlexureType *kind = kind_of(system->mechanism, step->flexure);
     int N = beam->nodes, terms = beam->order + 1, stride = kind->axial ? 2 : 1;
+    body->order = beam->order;
     body->sections = beam->cut_count;
     body->arm_count = N;
     body->angles[0] = ends[0];

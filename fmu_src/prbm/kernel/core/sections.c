@@ -181,7 +181,8 @@ static double strain_at(const double *strained, int j) {
 
 /* Torque of the springs in the direction from near to far: at pivot i of links, or the part of the
  * polynomial of a beam that its ends contribute. */
-static double torque_at(const FreeBody *body, bool beam, int i, const double *strained) {
+static double torque_at(const FreeBody *body, int i, const double *strained) {
+    bool beam = body->order > 0;
     int a = beam ? body->angles[0] : body->angles[i];
     int b = beam ? body->angles[1] : body->angles[i + 1];
     double torque = body->rates[beam ? 0 : i] * (strain_at(strained, b) - strain_at(strained, a));
@@ -189,26 +190,23 @@ static double torque_at(const FreeBody *body, bool beam, int i, const double *st
 }
 
 /* Bending moment between the ends at section k, positive from start to end. */
-static double bending_between(const FreeBody *body, bool beam, int order, int k,
-                              const double *strained) {
-    double sign = body->forwards ? 1.0 : -1.0;
-    if (!beam) {
-        return sign * torque_at(body, beam, k - 1, strained);
+static double bending_between(const FreeBody *body, int k, const double *strained) {
+    double sign = body->forwards ? 1.0 : -1.0, sum = 0.0;
+    if (body->order == 0) {
+        return sign * torque_at(body, k - 1, strained);
     }
     int cut = body->forwards ? k : body->sections - 1 - k;
-    double sum = 0.0;
-    for (int l = 1; l <= order; l++) {
-        double P = body->moments[cut * (order + 1) + l];
+    for (int l = 1; l <= body->order; l++) {
+        double P = body->moments[cut * (body->order + 1) + l];
         sum += P * strained[body->angles[2] + l - 1];
     }
-    return sign * torque_at(body, beam, 0, strained) + body->rates[0] * sum;
+    return sign * torque_at(body, 0, strained) + body->rates[0] * sum;
 }
 
 /* Bending moment at an end without the work of the loads, and its sign: side 0 is the near end. */
-static double end_bending(const FreeBody *body, bool beam, int side, const double *strained,
-                          double work) {
-    int last = beam ? 0 : body->sections - 3;
-    double torque = torque_at(body, beam, side == 0 ? 0 : last, strained);
+static double end_bending(const FreeBody *body, int side, const double *strained, double work) {
+    int last = body->order > 0 ? 0 : body->sections - 3;
+    double torque = torque_at(body, side == 0 ? 0 : last, strained);
     double moment = (side == 0 ? -torque : torque) - work;
     bool at_start = (side == 0) == body->forwards;
     return at_start ? -moment : moment;
@@ -246,11 +244,6 @@ static int flexure_of(const System *system, const FreeBody *body) {
     return (int)(body - system->free_bodies);
 }
 
-static const FlexureType *kind_of_body(const System *system, const FreeBody *body) {
-    const Mechanism *m = system->mechanism;
-    return kind_of(m, &m->flexures[flexure_of(system, body)]);
-}
-
 /* Store the stress of both faces at section k from normal force and bending moment. */
 static void store_faces(const FreeBody *body, int k, double tension, double bending, double *left,
                         double *right) {
@@ -262,16 +255,15 @@ static void store_faces(const FreeBody *body, int k, double tension, double bend
 
 PRBM void face_stresses(const System *system, const FreeBody *body, const SectionState *at,
                         double *left, double *right) {
-    int order = kind_of_body(system, body)->order, last = body->sections - 1;
-    bool beam = order > 0;
+    int last = body->sections - 1;
     Complex far = at->far[flexure_of(system, body)];
     for (int k = 0; k <= last; k++) {
         double bending;
         if (k == 0 || k == last) {
             double work = end_work(body, k != 0, at->e, complex_of(1.0, 0.0), at->loads, far);
-            bending = end_bending(body, beam, k != 0, at->strained, work);
+            bending = end_bending(body, k != 0, at->strained, work);
         } else {
-            bending = bending_between(body, beam, order, k, at->strained);
+            bending = bending_between(body, k, at->strained);
         }
         Complex tangent = tangent_at(body, k, at);
         Complex through = force_through(body, k, at->loads, far);
@@ -343,9 +335,7 @@ static double tangent_change(const FreeBody *body, int k, const SectionState *at
 
 PRBM void face_changes(const System *system, const FreeBody *body, const SectionState *at,
                        const SectionState *change, double *left, double *right) {
-    int order = kind_of_body(system, body)->order, last = body->sections - 1;
-    bool beam = order > 0;
-    int i = flexure_of(system, body);
+    int i = flexure_of(system, body), last = body->sections - 1;
     Complex far = at->far[i], dfar = change->far[i];
     for (int k = 0; k <= last; k++) {
         double bending;
@@ -353,9 +343,9 @@ PRBM void face_changes(const System *system, const FreeBody *body, const Section
             Complex none = {0.0, 0.0}, one = {1.0, 0.0};
             double work = end_work(body, k != 0, change->e, none, at->loads, far) +
                           end_work(body, k != 0, at->e, one, change->loads, dfar);
-            bending = end_bending(body, beam, k != 0, change->strained, work);
+            bending = end_bending(body, k != 0, change->strained, work);
         } else {
-            bending = bending_between(body, beam, order, k, change->strained);
+            bending = bending_between(body, k, change->strained);
         }
         Complex tangent = tangent_at(body, k, at);
         tangent = scaled(1.0 / modulus(tangent), tangent);

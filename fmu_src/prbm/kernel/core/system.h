@@ -37,6 +37,7 @@ enum { TURNED = -2 };
  * order from the near end to the far end. */
 typedef struct {
     bool forwards;          /* whether the near end is the start of the flexure */
+    int order;              /* of the polynomial of a beam; links: 0 */
     int first, count, stub; /* mass points; the last ones, of the stub beyond a closed loop */
     int sections, arm_count;
     double *position, *area, *modulus; /* (sections,) */
