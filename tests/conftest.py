@@ -12,7 +12,7 @@ from prbm.files.mechanism_file import shipped
 from prbm.fmu import python_fmu
 from prbm.mechanism.description import Mechanism
 from shared import once
-from support import GUIDES, mechanism
+from support import GUIDES, SUPPORT, mechanism
 
 collect_ignore = ["support"]  # Modules that tests import; they contain no tests.
 
@@ -27,6 +27,23 @@ class FmuCache(dict[Any, Path]):
     def __missing__(self, key: Hashable) -> Path:
         self[key] = self.build(key)
         return self[key]
+
+
+def further_mechanisms() -> dict[str, set[str]]:
+    """Return the mechanisms with which a test is slow, by the name of the test."""
+    lines = (SUPPORT / "further_mechanisms.txt").read_text("utf-8").splitlines()
+    pairs = (line.rsplit(": ", 1) for line in lines if not line.startswith("#"))
+    return {name: {*mechanisms.split()} for name, mechanisms in pairs}
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark tests with the further mechanisms of a function as slow."""
+    further = further_mechanisms()
+    for item in items:
+        name, _, parameters = item.nodeid.partition("[")
+        if further.get(name, set()) & {*parameters.rstrip("]").split("-")}:
+            item.add_marker(pytest.mark.slow)
 
 
 @pytest.fixture(scope="session")

@@ -10,11 +10,10 @@ from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 
 from native_host import Instance, Integrator
-from prbm.fmu import native_fmu, python_fmu
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.statics import free_displacement
-from support import mechanism
+from support import mechanism, own_fmu
 
 GUIDE = mechanism("GuideBeam")
 END, STEP = 0.06, 2e-3
@@ -110,10 +109,7 @@ def test_dimensions_of_a_notch_are_parameters_of_fmus(kind, tmp_path):
     """They have units and bounds; the motion with other dimensions is that of the engine."""
     path, values = tmp_path / "NotchedGuide.fmu", {"flexure.notch_radius": 2e-3}
     values["flexure.waist_length"] = 0.025
-    if kind == "python":
-        path.write_bytes(python_fmu.build(notched(), {}))
-    else:
-        path.write_bytes(native_fmu.build(notched(), {}, int(kind[-1])))
+    path.write_bytes(own_fmu(kind, notched()))
     assert not validate_fmu(str(path))
     variables = {v.name: v for v in read_model_description(str(path)).modelVariables}
     for name in values:
@@ -135,6 +131,6 @@ def test_dimensions_of_a_notch_are_parameters_of_fmus(kind, tmp_path):
 @pytest.mark.slow
 def test_an_fmu_rejects_a_notch_that_is_longer_than_its_flexure(tmp_path, capfd):
     path = tmp_path / "NotchedGuide.fmu"
-    path.write_bytes(native_fmu.build(notched(), {}, 3))
+    path.write_bytes(own_fmu("fmi3", notched()))
     with pytest.raises(FMICallException):
         simulate_fmu(str(path), stop_time=0.01, start_values={"flexure.waist_length": 0.05})

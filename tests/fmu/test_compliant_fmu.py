@@ -7,8 +7,8 @@ from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 
 from point_mass import point_mass
-from prbm.fmu import native_fmu, python_fmu
 from prbm.hybrid.simulation import Simulation
+from support import own_fmu
 
 END, STEP = 2e-3, 5e-5
 OUTPUTS = (
@@ -24,10 +24,7 @@ def mass():
 @pytest.fixture(scope="module", params=["python", "fmi2", "fmi3"])
 def path(request, tmp_path_factory):
     path = tmp_path_factory.mktemp("compliant") / "PointMass.fmu"
-    if request.param == "python":
-        path.write_bytes(python_fmu.build(mass(), {}))
-    else:
-        path.write_bytes(native_fmu.build(mass(), {}, int(request.param[-1])))
+    path.write_bytes(own_fmu(request.param, mass()))
     return str(path)
 
 
@@ -134,7 +131,7 @@ def test_model_exchange_with_a_compliant_stop_is_the_motion_of_the_engine(
 ):
     own = point_mass(stiffness=1e5, restitution=0.5, friction=friction, direction=25.0)
     path = tmp_path / "PointMass.fmu"
-    path.write_bytes(native_fmu.build(own, {}, version))
+    path.write_bytes(own_fmu(f"fmi{version}", own))
     found = simulate_fmu(
         str(path), fmi_type="ModelExchange", solver="CVode", stop_time=END, output_interval=STEP,
         relative_tolerance=1e-8, output=list(OUTPUTS), record_events=False,

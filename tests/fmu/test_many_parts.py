@@ -11,10 +11,9 @@ from fmpy.validation import validate_fmu
 
 from kernel_simulation import KernelSimulation
 from many_parts import anvil, beams, elastic
-from prbm.fmu import native_fmu, python_fmu
 from prbm.fmu.slave.resolved import mechanism_from, resolved
 from prbm.hybrid.simulation import Simulation
-from support import energy_balance
+from support import energy_balance, own_fmu
 
 END, STEP = 0.04, 1e-3
 BLOW = {"blow.y": -0.6}
@@ -27,10 +26,7 @@ OUTPUTS = (
 @pytest.fixture(scope="module", params=["python", "fmi2", "fmi3"])
 def fmu(request, tmp_path_factory):
     path = tmp_path_factory.mktemp("many") / "Anvil.fmu"
-    if request.param == "python":
-        path.write_bytes(python_fmu.build(anvil(), BLOW))
-    else:
-        path.write_bytes(native_fmu.build(anvil(), BLOW, int(request.param[-1])))
+    path.write_bytes(own_fmu(request.param, anvil(), BLOW))
     return path
 
 

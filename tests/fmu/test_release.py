@@ -8,10 +8,9 @@ from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 
 from prbm.files.mechanism_file import read_mechanism
-from prbm.fmu import native_fmu, python_fmu
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanism.parts import Release
-from support import SUPPORT
+from support import SUPPORT, own_fmu
 
 PIVOT = read_mechanism(SUPPORT / "pivot.toml")
 LEAF = replace(PIVOT.flexure_types[0], model="1R")  # The 3R has modes of several kHz.
@@ -33,10 +32,7 @@ END = 2e-3
 def test_the_start_of_an_fmu_is_a_parameter(flavour, start, tmp_path):
     release, other, unit = STARTS[start]
     model, name, path = replace(PIVOT, release=release), f"release.{start}", tmp_path / "Pivot.fmu"
-    if flavour == "python":
-        path.write_bytes(python_fmu.build(model, {}))
-    else:
-        path.write_bytes(native_fmu.build(model, {}, int(flavour[-1])))
+    path.write_bytes(own_fmu(flavour, model))
     assert validate_fmu(str(path)) == []
     variables = {v.name: v for v in read_model_description(str(path)).modelVariables}
     assert "release.displacement" not in variables

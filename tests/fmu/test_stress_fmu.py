@@ -8,8 +8,8 @@ from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 
 import prbm
-from prbm.fmu import native_fmu, python_fmu
 from prbm.hybrid.simulation import Simulation
+from support import own_fmu
 
 pytestmark = [pytest.mark.fmu, pytest.mark.native]
 
@@ -31,10 +31,7 @@ def guide():
 @pytest.fixture(scope="module", params=["python", "fmi2", "fmi3"])
 def fmu(request, tmp_path_factory):
     path = tmp_path_factory.mktemp("stress") / "Guide.fmu"
-    if request.param == "python":
-        path.write_bytes(python_fmu.build(guide(), THROWN))
-    else:
-        path.write_bytes(native_fmu.build(guide(), THROWN, int(request.param[-1])))
+    path.write_bytes(own_fmu(request.param, guide(), THROWN))
     return path
 
 

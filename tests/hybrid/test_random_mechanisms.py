@@ -150,7 +150,7 @@ def random_state(system, seed):
 
 
 @given(mechanisms(), SEEDS)
-@laws(40)
+@laws(25)
 def test_mass_matrix_and_quadratic_terms_follow_from_the_positions(mechanism, seed):
     """M = Re(T^H m T) + J, T = dz/dq, and the quadratic terms are Re(T^H m z'') at constant rates.
 
@@ -173,7 +173,7 @@ def test_mass_matrix_and_quadratic_terms_follow_from_the_positions(mechanism, se
 
 
 @given(mechanisms(), SEEDS)
-@laws(40)
+@laws(25)
 def test_rows_are_the_derivatives_of_their_scalars(mechanism, seed):
     """Values, gradients, rates and convective terms of loops, gaps, slides and friction points.
 
@@ -207,7 +207,7 @@ def test_rows_are_the_derivatives_of_their_scalars(mechanism, seed):
 
 
 @given(mechanisms(), SEEDS)
-@laws(30)
+@laws(20)
 def test_loops_gaps_and_positions_of_the_straight_shape_are_those_of_the_drawing(mechanism, seed):
     """Loops are closed, gaps equal the stops' positions, centres of mass are those of the file.
 
@@ -257,7 +257,7 @@ def potential(sim, q):
 
 @pytest.mark.slow
 @given(mechanisms(starting=True, damping=False, friction=False), SEEDS, st.booleans())
-@laws(30)
+@laws(20)
 def test_accelerations_satisfy_lagrange_equations(mechanism, seed, held):
     """T^H m z'' + J a = -dV/dq + R^T lam, and the constraints with rows R have no acceleration.
 
@@ -291,7 +291,7 @@ def test_accelerations_satisfy_lagrange_equations(mechanism, seed, held):
 
 @pytest.mark.slow
 @given(mechanisms(starting=True), SEEDS)
-@laws(30)
+@laws(20)
 def test_the_potential_energy_is_stationary_at_an_equilibrium(mechanism, seed):
     """dV/dq = rows^T lam under loads; frequencies follow from the second derivative."""
     given = {k: x / 4 for k, x in inputs(mechanism, seed).items() if not k.startswith("base")}
@@ -400,7 +400,7 @@ def check_momentum(mechanism, seed):
 
 
 @given(mechanisms(starting=True), SEEDS)
-@laws(25, shrink=False)
+@laws(15, shrink=False)
 def test_impacts_satisfy_the_balance_of_momentum_and_do_not_gain_energy(mechanism, seed):
     check_impacts(mechanism, seed)
 

@@ -152,14 +152,22 @@ def varied(guide, rng):
     return guide.values({k: v for k, v in values.items() if ".gamma" not in k or v < 0.9})
 
 
-def systems(name, count=5, seed=0):
+@functools.cache
+def variants(name, count, seed):
+    """Return parameters and the system of the package for each of them."""
+    rng = np.random.default_rng(seed)
+    guide, _ = both(name)
+    every = [varied(guide, rng) if k else guide.values() for k in range(count)]
+    return [(values, assembly.assemble(guide, values)) for values in every]
+
+
+def systems(name, count=4, seed=0):
     """Yield the system of the package, that of the kernel, and a generator of random numbers."""
     rng = np.random.default_rng(seed)
-    guide, ours = both(name)
-    for k in range(count):
-        values = varied(guide, rng) if k else guide.values()
+    _, ours = both(name)
+    for values, system in variants(name, count, seed):
         ours.assemble(values)
-        yield assembly.assemble(guide, values), ours, rng
+        yield system, ours, rng
 
 
 def random_state(system, rng, turn=0.3):

@@ -76,21 +76,15 @@ def test_sanitizers_find_nothing_in_ten_thousand_instances():
 
 @pytest.mark.parametrize(("fmi", "kind"), INTERFACES)
 def test_valgrind_finds_nothing(fmi, kind):
-    """A run to the first impact, a restored state, and a hundred instances."""
+    """A run to the first impact, a restored state, and a hundred instances.
+
+    A leak of one instance is found; the sanitizers create ten thousand.
+    """
     needs("valgrind")
     library = kernel_library("plain", ("-g",))
     job = Job(native("PRBDM2R", fmi), kind, POINTS[:61], library=library)
     for words in ((), ("interrupt", 30, "serialize"), ("cycles", 100, 0)):
         assert not run(job, *words, before=VALGRIND).errors
-
-
-@pytest.mark.parametrize(("fmi", "kind"), [(2, "cs"), (2, "me"), (3, "cs"), (3, "me")])
-def test_valgrind_finds_nothing_in_ten_thousand_instances(fmi, kind):
-    """Each is instantiated, initialized, advanced by a step and freed."""
-    needs("valgrind")
-    library = kernel_library("plain", ("-g",))
-    job = Job(native("PRBDM", fmi), kind, POINTS[:61], library=library)
-    assert not run(job, "cycles", 2500, 1, before=VALGRIND).errors
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
@@ -100,10 +94,9 @@ def test_arbitrary_calls_neither_crash_nor_leak(tmp_path, model, fmi):
     assert found.status == 0, found.output
 
 
-@pytest.mark.parametrize("seconds", [2, 8])
-def test_arbitrary_tables_neither_crash_nor_leak(tmp_path, seconds):
+def test_arbitrary_tables_neither_crash_nor_leak(tmp_path):
     """A part of the changed tables is accepted and simulated; otherwise little is tested."""
-    found = fuzz_tables(tmp_path, seconds=seconds, seed=0)
+    found = fuzz_tables(tmp_path, seconds=2, seed=0)
     assert found.status == 0, found.output[-8000:]
     tried, accepted, started = found.table_counts()
     assert accepted > tried / 20

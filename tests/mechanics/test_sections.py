@@ -127,7 +127,7 @@ def ends_of(system, name, e):
 
 @given(mechanisms(starting=True))
 @settings(
-    phases=[Phase.generate], max_examples=30, deadline=None, derandomize=True,
+    phases=[Phase.generate], max_examples=15, deadline=None, derandomize=True,
     suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow],
 )  # fmt: skip
 def test_forces_and_moments_on_each_flexure_and_on_the_ground_balance(mechanism):

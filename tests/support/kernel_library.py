@@ -25,7 +25,7 @@ from prbm.mechanism.description import Mechanism
 
 KERNEL = Path(prbm.kernel.__file__).parent
 FLAGS = (
-    "-std=c99", "-O1", "-fPIC", "-shared", "-ffp-contract=off", "-DPRBM=", f"-I{KERNEL}",
+    "-std=c99", "-O0", "-fPIC", "-shared", "-ffp-contract=off", "-DPRBM=", f"-I{KERNEL}",
     "-Wl,-Bsymbolic",  # Calls within the library use its own functions.
 )  # fmt: skip
 WORKING_MEMORY = 1 << 16  # Doubles.

@@ -12,7 +12,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from prbm.files.mechanism_file import read_mechanism, shipped
-from prbm.fmu import native_fmu
+from prbm.fmu import native_fmu, python_fmu
 from prbm.hybrid.records import Impact
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.assembly import assemble
@@ -150,6 +150,17 @@ def built(guide: Mechanism, fmi: int, platforms=("host",), clock=False) -> bytes
     reference = (lambda *_: ()) if guide.name in COSTLY_MODELS else native_fmu.reference
     with patch.object(native_fmu, "reference", reference):
         return native_fmu.build(guide, fmi=fmi, platforms=platforms, clock=clock)
+
+
+def own_fmu(kind: str, guide: Mechanism, changes=None) -> bytes:
+    """Return the FMU of a test's own mechanism, without reference results.
+
+    Their computation takes most of the time of a build; tests of shipped mechanisms check them.
+    """
+    if kind == "python":
+        return python_fmu.build(guide, changes)
+    with patch.object(native_fmu, "reference", lambda *_: ()):
+        return native_fmu.build(guide, changes, int(kind[-1]))
 
 
 def simulation(name: str, values=None, **options) -> Simulation:
