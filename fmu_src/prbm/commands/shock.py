@@ -10,7 +10,7 @@ from ..files.mechanism_file import load
 from ..files.settings import UserMistake, quantities, quantity, settings
 from ..mechanics.assembly import assemble
 from ..mechanism.description import Mechanism
-from ..runs.headline import instant, length
+from ..runs.headline import contact_line, instant, length
 from .output import Output, aligned
 
 FIRST_PEAK = 100 * GRAVITY  # First peak of a search for the level of failure [m/s^2].
@@ -27,8 +27,8 @@ def run_shock(options: argparse.Namespace) -> None:
         _check_record(options)
         name = f"base.acceleration.{options.axis}"
         found = shock(
-            mechanism, {name: f"csv({options.record})"}, values, stop_time=stop_time, fatigue=True,
-            progress=reporter(), engine=options.engine,
+            mechanism, {name: f"csv({options.record})"}, values, stop_time=stop_time,
+            fatigue=True, progress=reporter(), engine=options.engine,
         )  # fmt: skip
         _print(found, mechanism, f"record {options.record}")
     elif options.peaks or options.sweep:
@@ -38,7 +38,8 @@ def run_shock(options: argparse.Namespace) -> None:
         pulse = _pulse(options)
         found = shock(
             mechanism, {pulse.input: pulse.signal}, values, duration=pulse.duration,
-            stop_time=stop_time, fatigue=True, progress=reporter(), engine=options.engine,
+            stop_time=stop_time, fatigue=True, progress=reporter(),
+            engine=options.engine,
         )  # fmt: skip
         _print(found, mechanism, _text(pulse))
     columns = found.result.columns
@@ -98,11 +99,8 @@ def _print(found: Shock, mechanism: Mechanism, about: str) -> None:
     for hits in found.hits:
         how = f", at most {hits.speed:.4g} m/s and {hits.impulse:.4g} N s" if hits.count else ""
         print(f"impacts at {hits.stop:9} {hits.count}{how}")
-        if hits.force is not None and hits.indentation is not None and hits.duration is not None:
-            print(
-                f"force at {hits.stop:11} at most {hits.force:.4g} N, indentation "
-                f"{length(hits.indentation, size)}, contact {instant(hits.duration, end, 4)}"
-            )
+        if hits.force and hits.indentation is not None and hits.duration is not None:
+            print(contact_line(hits.stop, hits.force, hits.indentation, hits.duration))
     for one in found.loadings:
         safety = "" if one.safety is None else f", safety factor {one.safety:.3g} (yield)"
         damage = "" if one.damage is None else f", damage {one.damage:.3g}"
