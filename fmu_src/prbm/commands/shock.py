@@ -4,6 +4,7 @@ import argparse
 import math
 
 from ..analysis.shock import GRAVITY, Pulse, Shock, fragility, shock
+from ..analysis.strength import counts_cycles
 from ..base.progress import reporter
 from ..base.unit_text import length_unit
 from ..files.mechanism_file import load
@@ -12,6 +13,7 @@ from ..mechanics.assembly import assemble
 from ..mechanism.description import Mechanism
 from ..runs.headline import contact_line, instant, length
 from .output import Output, aligned
+from .stress import no_damage
 
 FIRST_PEAK = 100 * GRAVITY  # First peak of a search for the level of failure [m/s^2].
 
@@ -28,7 +30,7 @@ def run_shock(options: argparse.Namespace) -> None:
         name = f"base.acceleration.{options.axis}"
         found = shock(
             mechanism, {name: f"csv({options.record})"}, values, stop_time=stop_time,
-            fatigue=True, progress=reporter(), engine=options.engine,
+            fatigue=counts_cycles(), progress=reporter(), engine=options.engine,
         )  # fmt: skip
         _print(found, mechanism, f"record {options.record}")
     elif options.peaks or options.sweep:
@@ -38,7 +40,7 @@ def run_shock(options: argparse.Namespace) -> None:
         pulse = _pulse(options)
         found = shock(
             mechanism, {pulse.input: pulse.signal}, values, duration=pulse.duration,
-            stop_time=stop_time, fatigue=True, progress=reporter(),
+            stop_time=stop_time, fatigue=counts_cycles(), progress=reporter(),
             engine=options.engine,
         )  # fmt: skip
         _print(found, mechanism, _text(pulse))
@@ -108,6 +110,8 @@ def _print(found: Shock, mechanism: Mechanism, about: str) -> None:
             f"stress in {one.flexure:10} {1e-6 * one.peak:.4g} MPa at t = "
             f"{instant(one.time, end, 5)}{safety}{damage}"
         )
+    for line in no_damage(mechanism):
+        print(line)
     rest = "not yet" if math.isnan(found.rest) else f"at t = {instant(found.rest, end, 4)}"
     print(f"settled              {rest}")
 
