@@ -74,10 +74,10 @@ def contact_line(stop: str, force: float, indentation: float, duration: float) -
     'force at stop        at most 25.06 N, indentation 62 µm, contact 0.612 ms'
     """
     texts = []
-    for x, si in ((indentation, "m"), (duration, "s")):
+    for x, si, digits in ((force, "N", 4), (indentation, "m", 3), (duration, "s", 3)):
         factor, shown = prefixed_unit(x, si)
-        texts.append(f"{factor * x:.3g} {shown}")
-    return f"force at {stop:11} at most {force:.4g} N, indentation {texts[0]}, contact {texts[1]}"
+        texts.append(f"{factor * x:.{digits}g} {shown}")
+    return f"force at {stop:11} at most {texts[0]}, indentation {texts[1]}, contact {texts[2]}"
 
 
 def headline(
