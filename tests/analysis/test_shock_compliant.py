@@ -58,6 +58,9 @@ def test_the_command_prints_and_draws_the_forces(tmp_path, capsys):
     assert cli.main(shlex.split(line)) == cli.OK
     printed = capsys.readouterr().out
     assert "force at bump_left" in printed
+    line = f"simulate {file} --input 'base.acceleration.x=half-sine(500 g, 0.5 ms)'"
+    assert cli.main(shlex.split(f"{line} --stop-time 1ms")) == cli.OK
+    assert "force at bump_left" in capsys.readouterr().out
     assert (tmp_path / "out" / "Accelerometer-shock.png").stat().st_size > 10_000
 
 

@@ -3,6 +3,7 @@
 import csv
 import io
 import shlex
+import sys
 from pathlib import Path
 
 import pytest
@@ -75,6 +76,19 @@ def test_missing_strengths_have_a_remedy(capsys):
     printed = capsys.readouterr().out
     assert "add it to the material" in printed
     assert "fatigue_strength" in printed
+
+
+@pytest.mark.parametrize(
+    "command", ["stress {}", 'shock {} --peak "20 g" --duration 2ms --set stop.position=12mm']
+)
+def test_without_the_package_for_cycles_stress_is_printed_without_damage(
+    guide, command, capsys, monkeypatch
+):
+    monkeypatch.setitem(sys.modules, "rainflow", None)
+    assert run(command.format(guide) + " --stop-time 20ms") == cli.OK
+    text = capsys.readouterr().out
+    assert "no damage: the Python package rainflow is missing" in text
+    assert "yield" in text
 
 
 @pytest.mark.parametrize(

@@ -21,6 +21,7 @@ from ..mechanics.system import unit
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import Release
 from ..runs.experiment import STEPS, experiment
+from ..runs.marks import largest_latched
 from ..runs.quantities import settling
 from ..runs.result import Result
 from ..runs.run import simulate
@@ -247,16 +248,8 @@ def _hits(result: Result, stop: str) -> Hits:
     )  # fmt: skip
     if not next(s for s in result.mechanism.stops if s.name == stop).compliant:
         return found
-
-    def largest(output: str) -> float:
-        # The columns contain contacts that are not counted, and the one at the end of the run.
-        sampled = float(np.max(result.columns[f"{stop}.{output}"]))
-        return max(sampled, *(float(getattr(x, output)) for x in own), 0.0)
-
-    return replace(
-        found, force=largest("peak_force"), indentation=largest("indentation"),
-        duration=largest("contact_duration"),
-    )  # fmt: skip
+    force, indentation, duration = largest_latched(result, stop)
+    return replace(found, force=force, indentation=indentation, duration=duration)
 
 
 class Fragility(NamedTuple):

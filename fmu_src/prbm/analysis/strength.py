@@ -21,6 +21,7 @@ import math
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 
 import numpy as np
 
@@ -74,6 +75,11 @@ class Loading:
     position: float
     safety: float | None
     damage: float | None
+
+
+def counts_cycles() -> bool:
+    """Return whether the package that counts cycles is installed (extra ``fatigue``)."""
+    return find_spec("rainflow") is not None
 
 
 def cycles(series: Sequence[float] | Real) -> list[Cycle]:

@@ -254,8 +254,8 @@ def _shock(commands: Commands) -> None:
         commands, "shock", "shock:run_shock",
         "effect of a shock of the base: displacement, impacts, stress, level of failure",
         examples(
-            'prbm shock PRBDM2R --peak "20 g" --duration "2 ms"',
-            'prbm shock PRBDM2R --pulse sawtooth --duration "2 ms" --peaks 20 50 100 g',
+            'prbm shock NotchGuide --peak "20 g" --duration "2 ms" --set stop.position=1mm',
+            'prbm shock my_mechanism.toml --duration "2 ms" --peaks 20 50 100 g',
         ),
         details="The mechanism starts at rest in its equilibrium.",
     )  # fmt: skip

@@ -13,13 +13,45 @@ def contact(options: argparse.Namespace) -> None:
     """Print the stiffness of a contact and, with mass and speed, its first hit."""
     stiffness, exponent = _stiffness(options)
     unit = "N/m" if exponent == 1.0 else f"N/m^{exponent:g}"
-    rows = [("stiffness", f"{stiffness:.6g} {unit}"), ("exponent", f"{exponent:g}")]
+    rows = [
+        *_parts(options), ("stiffness", f"{stiffness:.6g} {unit}"), ("exponent", f"{exponent:g}"),
+    ]  # fmt: skip
     if (options.mass is None) != (options.speed is None):
         raise UserMistake("--mass and --speed: give both for a hit")
     if options.mass is not None:
         rows += _hit(options, stiffness, exponent)
     for name, text in rows:
         print(f"{name:17} {text}")
+    print("keys of the stop in a mechanism file:")
+    for line in _keys(stiffness, exponent, quantity(options.restitution, "", "--restitution")):
+        print(f"  {line}")
+
+
+def _keys(stiffness: float, exponent: float, restitution: float) -> list[str]:
+    """Return the lines of a compliant stop in a mechanism file."""
+    linear = exponent == 1.0
+    size = f'"{stiffness:.6g} N/m"' if linear else f"{stiffness:.6g}  # N/m^{exponent:g}"
+    return [
+        'law = "compliant"', f"stiffness = {size}", f"exponent = {exponent:g}",
+        f"restitution = {restitution:g}",
+    ]  # fmt: skip
+
+
+def _parts(options: argparse.Namespace) -> list[tuple[str, str]]:
+    """Return the rows with the given sizes and materials in SI, which show a wrong unit."""
+    if options.stiffness:
+        return []
+    modulus = quantity(options.youngs_modulus, "Pa", "--youngs-modulus")
+    if options.thickness:
+        area, thick = (
+            quantity(getattr(options, name), unit, f"--{name}")
+            for name, unit in (("area", "m2"), ("thickness", "m"))
+        )
+        return [("pad", f"{area:g} m2, {thick:g} m thick, {modulus:g} Pa")]
+    radius = quantity(options.radius, "m", "--radius")
+    wall = f"radius {options.wall_radius.strip()}" if options.wall_radius else "plane"
+    stiff = options.wall_modulus or f"{modulus:g} Pa"
+    return [("sphere", f"radius {radius:g} m, {modulus:g} Pa"), ("wall", f"{wall}, {stiff}")]
 
 
 def _stiffness(options: argparse.Namespace) -> tuple[float, float]:
@@ -49,6 +81,11 @@ def _stiffness(options: argparse.Namespace) -> tuple[float, float]:
         quantity(options.wall_poisson, "", "--wall-poisson") if options.wall_poisson else poisson
     )
     radius = quantity(options.radius, "m", "--radius")
+    if radius <= 0.0:
+        raise UserMistake(
+            f"--radius {options.radius.strip()} must be positive; a hollow has a negative "
+            "--wall-radius"
+        )
     wall = quantity(options.wall_radius, "m", "--wall-radius") if options.wall_radius else math.inf
     return hertz_stiffness(radius, wall, modulus, poisson, (other, ratio)), 1.5
 

@@ -4,14 +4,16 @@ import argparse
 import math
 
 from ..analysis.shock import Pulse, Shock, fragility, shock
+from ..analysis.strength import counts_cycles
 from ..base.progress import reporter
 from ..base.unit_text import GRAVITY, length_unit
 from ..files.mechanism_file import load
 from ..files.settings import UserMistake, quantities, quantity, settings
 from ..mechanics.assembly import assemble
 from ..mechanism.description import Mechanism
-from ..runs.headline import instant, length
+from ..runs.headline import contact_line, instant, length
 from .output import Output, aligned
+from .stress import no_damage
 
 FIRST_PEAK = 100 * GRAVITY  # First peak of a search for the level of failure [m/s^2].
 
@@ -27,8 +29,8 @@ def run_shock(options: argparse.Namespace) -> None:
         _check_record(options)
         name = f"base.acceleration.{options.axis}"
         found = shock(
-            mechanism, {name: f"csv({options.record})"}, values, stop_time=stop_time, fatigue=True,
-            progress=reporter(), engine=options.engine,
+            mechanism, {name: f"csv({options.record})"}, values, stop_time=stop_time,
+            fatigue=counts_cycles(), progress=reporter(), engine=options.engine,
         )  # fmt: skip
         _print(found, mechanism, f"record {options.record}")
     elif options.peaks or options.sweep:
@@ -38,7 +40,8 @@ def run_shock(options: argparse.Namespace) -> None:
         pulse = _pulse(options)
         found = shock(
             mechanism, {pulse.input: pulse.signal}, values, duration=pulse.duration,
-            stop_time=stop_time, fatigue=True, progress=reporter(), engine=options.engine,
+            stop_time=stop_time, fatigue=counts_cycles(), progress=reporter(),
+            engine=options.engine,
         )  # fmt: skip
         _print(found, mechanism, _text(pulse))
     columns = found.result.columns
@@ -98,11 +101,8 @@ def _print(found: Shock, mechanism: Mechanism, about: str) -> None:
     for hits in found.hits:
         how = f", at most {hits.speed:.4g} m/s and {hits.impulse:.4g} N s" if hits.count else ""
         print(f"impacts at {hits.stop:9} {hits.count}{how}")
-        if hits.force is not None and hits.indentation is not None and hits.duration is not None:
-            print(
-                f"force at {hits.stop:11} at most {hits.force:.4g} N, indentation "
-                f"{length(hits.indentation, size)}, contact {instant(hits.duration, end, 4)}"
-            )
+        if hits.force and hits.indentation is not None and hits.duration is not None:
+            print(contact_line(hits.stop, hits.force, hits.indentation, hits.duration))
     for one in found.loadings:
         safety = "" if one.safety is None else f", safety factor {one.safety:.3g} (yield)"
         damage = "" if one.damage is None else f", damage {one.damage:.3g}"
@@ -110,6 +110,8 @@ def _print(found: Shock, mechanism: Mechanism, about: str) -> None:
             f"stress in {one.flexure:10} {1e-6 * one.peak:.4g} MPa at t = "
             f"{instant(one.time, end, 5)}{safety}{damage}"
         )
+    for line in no_damage(mechanism):
+        print(line)
     rest = "not yet" if math.isnan(found.rest) else f"at t = {instant(found.rest, end, 4)}"
     print(f"settled              {rest}")
 

@@ -2,7 +2,7 @@
 
 import argparse
 
-from ..analysis.strength import Loading, loadings
+from ..analysis.strength import Loading, counts_cycles, loadings
 from ..analysis.stress_field import StressRecorder
 from ..base.progress import reporter
 from ..files.mechanism_file import load
@@ -15,6 +15,7 @@ from ..mechanism.parts import FlexureType
 from ..runs.headline import instant, length
 from ..runs.run import communication_points, simulate
 from .duration import given_inputs, span
+from .missing import missing_package
 from .output import Output, aligned
 from .systems import check_held, held_unit
 
@@ -94,11 +95,11 @@ def _moving(options: argparse.Namespace, mechanism: Mechanism) -> None:
         mechanism, values, inputs=given_inputs(options), stop_time=stop_time,
         step=step / ROWS_PER_STEP, progress=reporter(), engine=options.engine, observer=recorder,
     )  # fmt: skip
-    found = loadings(result.columns, mechanism, stress=recorder.field)
+    found = loadings(result.columns, mechanism, fatigue=counts_cycles(), stress=recorder.field)
     size = assemble(mechanism, mechanism.values()).length
     print(f"{mechanism.name}: largest stress in {stop_time:g} s")
     print(aligned(HEAD, [_row(one, stop_time, size) for one in found]))
-    for line in _missing(mechanism):
+    for line in [*_missing(mechanism), *no_damage(mechanism)]:
         print(line)
     output.table(
         f"{mechanism.name}-stress.csv",
@@ -130,3 +131,10 @@ def _missing(mechanism: Mechanism) -> list[str]:
             "the material"
         )
     return lines
+
+
+def no_damage(mechanism: Mechanism) -> list[str]:
+    """Return a line if the fatigue damage of a mechanism needs a package that is not installed."""
+    if counts_cycles() or not any(kind.fatigue_strength for kind in mechanism.flexure_types):
+        return []
+    return [f"no damage: {missing_package(ModuleNotFoundError(name='rainflow'))}"]

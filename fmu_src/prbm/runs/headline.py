@@ -4,16 +4,16 @@ import cmath
 import math
 from collections.abc import Mapping
 
-from ..base.unit_text import frequency_unit, length_unit, time_unit
+from ..base.unit_text import frequency_unit, length_unit, prefixed_unit, time_unit
 from ..mechanics.assembly import assemble
 from ..mechanics.statics import free_displacement
 from ..mechanics.stress import stressed
 from ..mechanics.system import System, unit
 from ..mechanism.description import Mechanism
 from ..mechanism.expressions import affine
-from .marks import marks
+from .marks import largest_latched, marks
 from .quantities import FREQUENCY, KINETIC, SETTLED_ENERGY_RTOL, settling
-from .result import Columns, column, moves, rest_time
+from .result import Columns, Result, column, moves, rest_time
 
 SECONDS_MIN = 0.1  # Times of shorter runs are printed in ms or µs [s].
 
@@ -58,13 +58,37 @@ def instant(t: float, span: float, digits: int) -> str:
     return f"{factor * t:.{digits}f} {unit}"
 
 
-def headline(columns: Columns, mechanism: Mechanism, values: Mapping[str, float]) -> list[str]:
+def contact_line(stop: str, force: float, indentation: float, duration: float) -> str:
+    """Return the line about the hardest hit at a compliant stop.
+
+    Parameters
+    ----------
+    stop : str
+        Name of the stop.
+    force, indentation, duration : float
+        Largest contact force [N], indentation [m] and duration of a contact [s].
+
+    Examples
+    --------
+    >>> contact_line("stop", 25.0612, 6.2e-5, 6.12e-4)
+    'force at stop        at most 25.06 N, indentation 62 µm, contact 0.612 ms'
+    """
+    texts = []
+    for x, si, digits in ((force, "N", 4), (indentation, "m", 3), (duration, "s", 3)):
+        factor, shown = prefixed_unit(x, si)
+        texts.append(f"{factor * x:.{digits}g} {shown}")
+    return f"force at {stop:11} at most {texts[0]}, indentation {texts[1]}, contact {texts[2]}"
+
+
+def headline(
+    result: Result | Columns, mechanism: Mechanism, values: Mapping[str, float]
+) -> list[str]:
     """Return a summary of a result, line by line.
 
     Parameters
     ----------
-    columns : structured array
-        Result of :func:`prbm.runs.run.simulate`, or of FMPy, with all outputs.
+    result : Result or structured array
+        Result of :func:`prbm.runs.run.simulate`, or columns of FMPy, with all outputs.
     mechanism : Mechanism
         The mechanism that was simulated.
     values : mapping
@@ -75,6 +99,7 @@ def headline(columns: Columns, mechanism: Mechanism, values: Mapping[str, float]
     ResultError
         If a column is missing.
     """
+    columns = result.columns if isinstance(result, Result) else result
     parameters = {p.name for p in mechanism.parameters}
     system = assemble(mechanism, {n: x for n, x in values.items() if n in parameters})
     time = column(columns, "time")
@@ -86,8 +111,8 @@ def headline(columns: Columns, mechanism: Mechanism, values: Mapping[str, float]
             "motion               nothing moves: release the mechanism away from its equilibrium, "
             "or apply an input"
         )
-    impacts = marks(columns, mechanism)
-    for i, stop in enumerate(s.name for s in mechanism.stops):
+    impacts = marks(result, mechanism)
+    for i, (stop, compliant) in enumerate((s.name, s.compliant) for s in mechanism.stops):
         count = int(column(columns, f"{stop}.impact_count")[-1])
         first = next((mark for mark in impacts if mark.stop == i), None)
         details = ""
@@ -95,6 +120,9 @@ def headline(columns: Columns, mechanism: Mechanism, values: Mapping[str, float]
             which = "the first" if first.count == 1 else f"number {first.count}"
             details = f", {which} at t = {instant(first.time, span, 5)} with {first.speed:.3f} m/s"
         lines.append(f"impacts at {stop:9} {count}{details}")
+        force, indentation, duration = largest_latched(result, stop) if compliant else (0.0,) * 3
+        if force > 0.0:
+            lines.append(contact_line(stop, force, indentation, duration))
         since = rest_time(columns, stop)
         if since is not None:
             lines.append(

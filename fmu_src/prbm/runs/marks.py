@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..mechanism.description import Mechanism
-from .result import Columns, Result, names
+from .result import Columns, Result, column, names
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,25 @@ class Mark:
     speed: float
     rebound: float
     count: int
+
+
+LARGEST = ("peak_force", "indentation", "contact_duration")
+
+
+def largest_latched(result: Result | Columns, stop: str) -> list[float]:
+    """Return the largest force [N], indentation [m] and duration [s] of contacts at a stop.
+
+    The stop is compliant.  The columns contain contacts that are not counted as impacts, and the
+    contact at the end; the records of the engine contain impacts between two rows.
+    """
+    columns = result.columns if isinstance(result, Result) else result
+    impacts = result.impacts if isinstance(result, Result) else ()
+    own = [impact.latched for impact in impacts if impact.stop == stop]
+    found = []
+    for output in LARGEST:
+        recorded = [float(getattr(latched, output)) for latched in own]
+        found.append(max(float(np.max(column(columns, f"{stop}.{output}"))), *recorded, 0.0))
+    return found
 
 
 def marks(result: Result | Columns, mechanism: Mechanism) -> tuple[Mark, ...]:

@@ -6,6 +6,8 @@ const ZERO_RTOL = 1e-6; // Smaller values, as a share of the largest one, are sh
 const ROUND_OFF = { m: 1e-13, "m/s": 1e-12, J: 1e-20, Pa: 1 }; // Values below them are shown as zero.
 const POINTS_MAX = 2000; // Corners of a drawn curve.
 const CURVES_MAX = 5; // Curves of a plot, each in its own colour.
+const SHARE_SHOWN = 0.98; // Share of the values after a rigid impact that the scale shows.
+const PEAK_FACTOR = 1.5; // Peaks that are larger than the others, by this factor, are cut off.
 const LIMIT_FACTOR = 3; // Limits that are farther from the values, by this factor, are not drawn.
 const FIXED_UNITS = { Pa: { factor: 1e-6, shown: "MPa" } }; // Other units get a prefix of SI.
 
@@ -44,6 +46,9 @@ function plotList(description, column) {
     const title = peaks.length > 0 ? "Contact force" : "Contact force at rest";
     plots.push({ title, unit: "N", series: forces });
   }
+  const rigid = new Set(
+    [...stops.keys()].filter((k) => !known.has(`${stops[k].name}.peak_force`)),
+  );
   const stresses = curves(flexures, "stress", "");
   if (stresses.length > 0) {
     plots.push({
@@ -51,10 +56,11 @@ function plotList(description, column) {
       unit: "Pa",
       series: stresses.slice(0, CURVES_MAX),
       limits: yieldStrengths(flexures),
+      rigid,
       note:
         "Largest stress of each flexure at each time." +
         (stresses.length > CURVES_MAX ? ` First ${CURVES_MAX} of ${stresses.length}.` : "") +
-        (stops.length > 0
+        (rigid.size > 0
           ? " After a rigid impact it depends on the flexure model: compare several."
           : ""),
     });
@@ -77,6 +83,24 @@ function plottedOutputs(description) {
   const column = { get: (name) => names.set(name, true) && 0 };
   plotList(description, column);
   return [...names.keys()].filter((name) => known.has(name));
+}
+
+// Return the largest value up to a row, or the value that a share of the later ones does not exceed
+// if it is larger.
+function mostly(run, columns, row) {
+  const later = run.count - row - 1;
+  const values = new Float64Array(columns.length * later);
+  let before = 0;
+  columns.forEach((column, k) => {
+    for (let i = 0; i <= row; i++) {
+      before = Math.max(before, run.at(i, column));
+    }
+    for (let i = 0; i < later; i++) {
+      values[k * later + i] = run.at(row + 1 + i, column);
+    }
+  });
+  values.sort();
+  return Math.max(before, values[Math.floor(SHARE_SHOWN * (values.length - 1))] ?? 0);
 }
 
 // Return the least and the largest value of a column, zero included.
@@ -115,6 +139,8 @@ class Plot {
     if (plot.note) {
       this.card.append(element("figcaption", { class: "hint" }, plot.note));
     }
+    this.cut = element("span", { class: "key cut" });
+    head.querySelector(".keys").append(this.cut);
     parent.append(this.card);
     this.seek = seek;
     this.listen();
@@ -176,6 +202,7 @@ class Plot {
       );
     });
     this.tiny = high === low ? Infinity : ZERO_RTOL * largest;
+    high = this.cutPeaks(run, high);
     const near = this.limits.map(({ value }) => value).filter((x) => x <= LIMIT_FACTOR * high);
     low = Math.min(low, ...walls);
     high = Math.max(high, ...walls, ...near);
@@ -191,6 +218,28 @@ class Plot {
     const tall = PLOT_HEIGHT - INSET.top - INSET.bottom;
     this.x = (time) => INSET.left + (inner * time) / this.stopTime;
     this.y = (value) => INSET.top + (tall * (this.high - value)) / (this.high - this.low);
+  }
+
+  // Return the largest value to show.  The peaks after a rigid impact depend on the flexure model:
+  // they are cut off if they are much larger than all values before it and most values after it.
+  // The head of the plot then has the largest one as a number.
+  cutPeaks(run, high) {
+    this.cut.textContent = "";
+    const impact = run.impacts.find(({ stop }) => this.plot.rigid?.has(stop));
+    if (!impact) {
+      return high;
+    }
+    if (this.measured !== run || this.rows !== run.count) {
+      const columns = this.plot.series.map(({ column }) => column);
+      [this.measured, this.rows] = [run, run.count];
+      this.most = mostly(run, columns, Math.floor(impact.time / run.step));
+    }
+    if (this.most <= 0 || high <= PEAK_FACTOR * this.most) {
+      return high;
+    }
+    const kind = FIXED_UNITS[this.plot.unit] ?? prefixed(high, this.plot.unit);
+    this.cut.textContent = `peaks to ${quantityText(high, kind, 3)} cut off`;
+    return this.most;
   }
 
   drawAxes(pen, width) {
@@ -255,6 +304,10 @@ class Plot {
   drawSeries(pen, run, now) {
     const every = Math.max(1, Math.floor(run.count / POINTS_MAX));
     const end = Math.min(run.count - 1, Math.floor(now / run.step));
+    pen.save();
+    pen.beginPath();
+    pen.rect(0, INSET.top - 2, this.canvas.clientWidth, PLOT_HEIGHT);
+    pen.clip();
     pen.lineWidth = 1.8;
     pen.lineJoin = "round";
     this.plot.series.forEach(({ column }, k) => {
@@ -270,7 +323,7 @@ class Plot {
       stroke(end, run.count - 1, 0.22);
       stroke(0, end, 1);
     });
-    pen.globalAlpha = 1;
+    pen.restore();
   }
 
   drawCursor(pen, run, now) {
@@ -285,7 +338,7 @@ class Plot {
     const texts = this.plot.series.map(({ column }, k) => {
       pen.fillStyle = this.colour(`s${k}`);
       pen.beginPath();
-      pen.arc(x, this.y(run.at(row, column)), 3.5, 0, 2 * Math.PI);
+      pen.arc(x, this.y(Math.min(run.at(row, column), this.high)), 3.5, 0, 2 * Math.PI);
       pen.fill();
       const value = run.at(row, column);
       return quantityText(Math.abs(value) > this.tiny ? value : 0, this.kind, 3);
