@@ -1,6 +1,7 @@
 """Display units, chosen so that a value has few digits before the decimal point."""
 
 GRAVITY = 9.80665  # Standard gravity, the unit g of an acceleration [m/s^2].
+PASCALS_MAX = 1e4  # Larger stresses are shown in MPa [Pa].
 
 
 def length_unit(size: float) -> tuple[float, str]:
@@ -52,7 +53,14 @@ def prefixed_unit(largest: float, unit: str) -> tuple[float, str]:
     --------
     >>> prefixed_unit(0.8, "m/s"), prefixed_unit(0.017, "J"), prefixed_unit(0.0, "J")
     ((1.0, 'm/s'), (1000.0, 'mJ'), (1.0, 'J'))
+
+    Stress and Young's moduli are in MPa:
+
+    >>> prefixed_unit(2.2e8, "Pa")
+    (1e-06, 'MPa')
     """
+    if unit == "Pa" and largest >= PASCALS_MAX:
+        return 1e-6, "MPa"
     if largest == 0.0:
         return 1.0, unit
     for factor, prefix in ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"), (1e12, "p")):

@@ -77,7 +77,7 @@ def curves(
                          label="within 5 %")  # fmt: skip
             axes.plot(x.factor * best, y.factor * value, "v", color=IMPACT, label="optimum")
             axes.legend(loc="best", fontsize=9, frameon=False)
-        axes.set_ylabel(y.label)
+        axes.set_ylabel(y.label.replace(" [", "\n["))
     every[0].set_title(title, fontsize=11, loc="left")
     every[-1].set_xlabel(x.label)
     figure.align_ylabels(every)
