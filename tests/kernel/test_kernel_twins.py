@@ -245,6 +245,19 @@ def test_stubs_and_messages_about_too_long_links_are_the_same():
                 assert_same(found[0], expected, scale=1.0)
 
 
+@twin(node_count=Mechanism.node_count)
+def test_numbers_of_nodes_of_beams_are_the_same():
+    found = set()
+    for name in ("Beams", "Profiles"):
+        guide, ours = both(name)
+        for i, kind in enumerate(guide.flexure_types):
+            if kind.model == flexure.BEAM:
+                own = ours.mechanism.types + i * ctypes.sizeof(structures()["FlexureType"])
+                assert kernel().node_count(own) == guide.node_count(kind)
+                found.add((kind.profile, kind.hinge))
+    assert {(flexure.LEAF, False), (flexure.NOTCH, False), (flexure.NOTCH, True)} <= found
+
+
 ENDS = [
     (start, end)
     for start in flexure.ENDS
