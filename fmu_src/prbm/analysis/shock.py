@@ -12,7 +12,7 @@ import numpy as np
 
 from ..base.errors import ParameterError
 from ..base.progress import Progress
-from ..base.unit_text import GRAVITY
+from ..base.unit_text import GRAVITY, length_unit
 from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble
 from ..mechanics.statics import free_displacement
@@ -237,6 +237,13 @@ def displacement(result: Result) -> Real:
     along: Real = u.real * columns[f"{release.body}.x"] + u.imag * columns[f"{release.body}.y"]
     moved: Real = along - along[0]
     return moved
+
+
+def displacement_unit(mechanism: Mechanism) -> tuple[float, str]:
+    """Return factor and name of the display unit of :func:`displacement`."""
+    if mechanism.release.turns:
+        return 180.0 / math.pi, "deg"
+    return length_unit(assemble(mechanism, mechanism.values()).length)
 
 
 def _hits(result: Result, stop: str) -> Hits:

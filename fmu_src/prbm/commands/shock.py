@@ -3,10 +3,10 @@
 import argparse
 import math
 
-from ..analysis.shock import Pulse, Shock, fragility, shock
+from ..analysis.shock import Pulse, Shock, displacement_unit, fragility, shock
 from ..analysis.strength import counts_cycles
 from ..base.progress import reporter
-from ..base.unit_text import GRAVITY, length_unit
+from ..base.unit_text import GRAVITY
 from ..files.mechanism_file import load
 from ..files.settings import UserMistake, quantities, quantity, settings
 from ..mechanics.assembly import assemble
@@ -134,8 +134,7 @@ def _sweep(
         engine=options.engine,
     )  # fmt: skip
     level = found.level
-    factor, unit = length_unit(assemble(mechanism, mechanism.values()).length)
-    factor, unit = (180 / math.pi, "deg") if mechanism.release.turns else (factor, unit)
+    factor, unit = displacement_unit(mechanism)
     rows = [
         [
             f"{peak / GRAVITY:.6g}", f"{factor * one.displacement:.4g}",

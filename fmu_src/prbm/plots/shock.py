@@ -6,11 +6,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..analysis.shock import Shock, displacement
-from ..base.unit_text import GRAVITY, length_unit, prefixed_unit, time_unit
+from ..analysis.shock import Shock, displacement, displacement_unit
+from ..base.unit_text import GRAVITY, prefixed_unit, time_unit
 from ..drawing.style import IMPACT, PAST, REST, WALL, own_style
 from ..mechanics.arrays import Real
-from ..mechanics.assembly import assemble
 from ..mechanics.system import unit
 from ..mechanism.parts import GROUND
 from .figures import PANEL_HEIGHT, PARALLEL_ATOL, WALL_MARGIN, WIDTH
@@ -57,17 +56,9 @@ def shock_figure(found: Shock, axis: str) -> Figure:
     return figure
 
 
-def _length(found: Shock) -> tuple[float, str]:
-    """Return factor and unit of displacements."""
-    mechanism = found.result.mechanism
-    if mechanism.release.turns:
-        return 180 / np.pi, "deg"
-    return length_unit(assemble(mechanism, mechanism.values()).length)
-
-
 def _draw_displacement(axes: Axes, found: Shock, time: Real) -> None:
     """Draw the displacement from the equilibrium, and the walls that limit it."""
-    factor, shown = _length(found)
+    factor, shown = displacement_unit(found.result.mechanism)
     moved, release = factor * displacement(found.result), found.result.mechanism.release
     axes.plot(time, moved, color=PAST)
     axes.set_ylabel(f"{release.body} [{shown}]")
@@ -121,7 +112,7 @@ def fragility_figure(peaks: Sequence[float], found: Sequence[Shock], level: floa
     level : float
         Least peak at which a flexure yields [m/s^2]; NaN if there is none.
     """
-    factor, shown = _length(found[0])
+    factor, shown = displacement_unit(found[0].result.mechanism)
     figure = Figure((WIDTH, 0.7 + 3 * PANEL_HEIGHT), dpi=120, layout="constrained")
     panels = list(figure.subplots(3, 1, sharex=True))
     x = np.array(peaks) / GRAVITY
