@@ -9,6 +9,7 @@ import pytest
 
 from point_mass import MASS, point_mass
 from prbm.base.errors import MechanismError, SimulationError
+from prbm.hybrid.compliant import switch
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.compliance import damping_factor
 from prbm.mechanics.contact_state import Phase
@@ -252,6 +253,14 @@ def test_a_free_contact_is_pressed_again_without_a_new_impact():
     assert out["stop.force"] > 0.0
     assert out["stop.impact_count"] == count
     assert energy_balance(out) == pytest.approx(start, abs=1e-10)
+
+
+def test_a_phase_that_ends_changes_although_round_off_in_the_rate_denies_it():
+    """Otherwise the same event would follow again and again."""
+    sim = pulled_off()
+    pressed = switch(sim.configuration, sim.front, 0)
+    assert pressed.contacts.touching[0].phase is Phase.PRESSED
+    assert switch(sim.configuration, pressed, 0).contacts == sim.contacts
 
 
 def test_a_contact_ends_when_its_gap_opens():

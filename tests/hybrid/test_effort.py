@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from kernel_simulation import KernelMistake, KernelSimulation
+from point_mass import MASS, point_mass
 from prbm.base import tolerances
 from prbm.base.errors import SimulationError
 from prbm.base.tolerances import TOLERANCE_USED_MAX
@@ -85,3 +86,13 @@ def test_the_effort_of_one_communication_step_is_limited(monkeypatch, engine):
     monkeypatch.undo()
     expected.advance(0.1)
     assert sim.outputs()["shuttle.x"] == pytest.approx(expected.outputs()["shuttle.x"], abs=1e-9)
+
+
+@each_engine
+def test_a_force_moves_a_mass_whose_springs_are_almost_without_stiffness(engine):
+    """Its power is 1e12 times the energy scale of the springs per second."""
+    sim = engine(point_mass(), {"push.x": 1.0})
+    sim.advance(2e-4)
+    out = sim.outputs()
+    assert out["mass.vx"] == pytest.approx(0.1 + 2e-4 / MASS, rel=1e-3)
+    assert out["energy.work"] == pytest.approx(0.1 * 2e-4 + 4e-8 / (2 * MASS), rel=1e-3)

@@ -124,6 +124,7 @@ INTERPOLATION_FACTOR = 10.0  # Of the tolerance: largest difference of two inter
 NODE_RATIO_MIN = 1 / 6  # Of a step: shortest previous step whose start is a node.
 STEP_MIN_ATOL = 1e-13  # s; shortest step.
 FIRST_STEP_FACTOR = 0.1  # Of the first step that the tolerance allows [Hairer, II.4].
+FIRST_STEP_MIN_ATOL = 1e-10  # s; shortest first step: energies of soft springs are small scales.
 FIRST_STEP_EXPONENT = 1 / 6  # Exponent of the tolerance in the first step size.
 FIRST_RATE_MIN = 1e-6  # 1/s: smallest relative rate of the state that the first step assumes.
 STEPS_MAX = 1e9  # Longest steps to one target time; more are a mistake of units.

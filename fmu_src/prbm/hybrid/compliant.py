@@ -123,14 +123,16 @@ def switch(configuration: Configuration, front: Front, stop: int) -> Front:
     """Return the front after the phase of the contact at a compliant stop has changed."""
     touching = front.contacts.touching[stop]
     assert touching is not None
-    if touching.phase is Phase.RISING:
-        _, rates = front.gaps_and_rates()
-        speed = max(touching.reference_speed, float(-rates[stop]))
-        front = front.with_contacts(
-            front.contacts.with_touching(stop, Touching(Phase.PRESSED, speed))
-        )
-    else:
+    _, rates = front.gaps_and_rates()
+    rate = float(-rates[stop])
+    if touching.phase is Phase.PRESSED and rate > 0.0:
         front = rephased(front)
+    else:
+        # At the end of a phase, the rate is that of the other phase only up to round-off.
+        phase = Phase.FREE if touching.phase is Phase.PRESSED else Phase.PRESSED
+        rises = touching.phase is Phase.RISING
+        speed = max(touching.reference_speed, rate) if rises else touching.reference_speed
+        front = front.with_contacts(front.contacts.with_touching(stop, Touching(phase, speed)))
     return contact_modes.settle(configuration, front)
 
 

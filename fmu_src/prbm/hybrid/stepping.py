@@ -20,6 +20,7 @@ from ..base.tolerances import (
     FIRST_RATE_MIN,
     FIRST_STEP_EXPONENT,
     FIRST_STEP_FACTOR,
+    FIRST_STEP_MIN_ATOL,
     INDENTATION_MIN_RTOL,
     PROJECTION_FACTOR,
     STEP_ERROR_FACTOR,
@@ -229,7 +230,7 @@ def first_step(configuration: Configuration, y: Real, k1: Real) -> float:
     size = math.sqrt(float(rate @ rate) / len(rate))
     accuracy = math.pow(configuration.tolerance, FIRST_STEP_EXPONENT)
     longest = FIRST_STEP_FACTOR * accuracy / max(size, FIRST_RATE_MIN)
-    return min(configuration.scales.step_max, longest)
+    return min(configuration.scales.step_max, max(longest, FIRST_STEP_MIN_ATOL))
 
 
 def compute_step(

@@ -221,11 +221,17 @@ PRBM bool touch(Simulation *sim, int stop, Problem *problem) {
 PRBM bool switch_phase(Simulation *sim, int stop, Problem *problem) {
     double gaps[STOPS_MAX], rates[STOPS_MAX];
     Touching touching = sim->state.touching[stop];
-    if (touching.phase == PHASE_RISING) {
-        gaps_and_rates(sim, gaps, rates);
-        set_phase(sim, stop, PHASE_PRESSED, greater(touching.reference_speed, -rates[stop]), 0.0);
-    } else if (!rephase(sim, problem)) {
-        return false;
+    gaps_and_rates(sim, gaps, rates);
+    if (touching.phase == PHASE_PRESSED && -rates[stop] > 0.0) {
+        if (!rephase(sim, problem)) {
+            return false;
+        }
+    } else {
+        /* At the end of a phase, the rate is that of the other phase only up to round-off. */
+        bool rises = touching.phase == PHASE_RISING;
+        double speed = touching.reference_speed;
+        set_phase(sim, stop, touching.phase == PHASE_PRESSED ? PHASE_FREE : PHASE_PRESSED,
+                  rises ? greater(speed, -rates[stop]) : speed, 0.0);
     }
     return settle(sim, NULL, 0, NULL, problem);
 }

@@ -42,7 +42,8 @@ static double first_step(const Simulation *sim) {
     const State *state = &sim->state;
     double size = error_norm(sim, state->k1, state->front, state->front);
     double allowed = FIRST_STEP_FACTOR * power(state->tolerance, FIRST_STEP_EXPONENT);
-    return lesser(longest_step(sim), allowed / greater(size, FIRST_RATE_MIN));
+    double wanted = allowed / greater(size, FIRST_RATE_MIN);
+    return lesser(longest_step(sim), greater(wanted, FIRST_STEP_MIN_ATOL));
 }
 
 /* A step size rounded to four binary digits, so that round-off in the errors does not change it. */
