@@ -8,7 +8,7 @@ from fmpy import simulate_fmu
 import scaling
 from c_importer import needs
 from prbm.mechanics.assembly import assemble
-from support import ROOT
+from support import ROOT, mechanism
 
 BENCHMARKS = ROOT / "benchmarks"
 
@@ -57,10 +57,10 @@ def test_the_cost_grows_with_the_exponents_of_the_page(exponents):
 
 @pytest.mark.slow
 @pytest.mark.native
-def test_a_right_hand_side_on_beams_costs_at_most_twice_that_of_the_2r(scaling):
+def test_a_right_hand_side_on_beams_costs_at_most_twice_that_of_the_2r():
     """The tolerance of a twentieth is for other compilers."""
     needs("cc", "valgrind")
-    reference = scaling.instructions(scaling.mechanism("PRBDM2R"))
+    reference = scaling.instructions(mechanism("PRBDM2R"))
     for nodes in (5, 6):
         assert scaling.instructions(scaling.beams(3, nodes, False)) < 2.1 * reference
 
