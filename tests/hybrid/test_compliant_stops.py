@@ -13,6 +13,7 @@ from prbm.hybrid.compliant import switch
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.compliance import damping_factor
 from prbm.mechanics.contact_state import Phase
+from prbm.runs.engine import simulation
 from support import energy_balance, mechanism
 
 SPEED = 0.1  # m/s
@@ -163,6 +164,21 @@ def test_friction_takes_its_share_of_an_oblique_elastic_hit(friction):
     assert ratio == pytest.approx(expected, rel=1e-4)
 
 
+@pytest.mark.parametrize("engine", ["kernel", "python"])
+@pytest.mark.parametrize(
+    ("stiffness", "e", "force"), [(1e4, 0.6, 0.1), (1e6, 0.1, 1.0), (1e6, 0.6, 1.0)]
+)
+def test_friction_holds_or_slides_after_each_reversal(engine, stiffness, e, force):
+    """The contact accelerates the body much more than its weak flexures do."""
+    own = point_mass(stiffness=stiffness, restitution=e, direction=10.0, friction=0.3)
+    sim = simulation(own, {"push.x": force}, engine=engine)
+    start = energy_balance(sim.outputs())
+    sim.advance(0.008)
+    out = sim.outputs()
+    assert out["stop.impact_count"] > 0
+    assert energy_balance(out) == pytest.approx(start, abs=1e-6 * out["energy.dissipated"])
+
+
 # --- rules of contacts ------------------------------------------------------------------------
 
 
@@ -225,6 +241,25 @@ def test_a_body_that_is_pushed_into_the_stop_raises_the_reference_speed_with_its
             assert touching.reference_speed >= 0.999 * top
         assert energy_balance(out) == pytest.approx(start, abs=1e-9)
     assert {Phase.RISING, Phase.PRESSED} <= phases
+
+
+@pytest.mark.parametrize("engine", ["kernel", "python"])
+@pytest.mark.parametrize(
+    ("acceleration", "stiffness", "speed", "e"),
+    [(1e5, 1e8, 1e-3, 0.05), (1e6, 1e9, 1e-2, 0.6), (1e8, 1e8, 1e-2, 0.6)],
+)
+def test_a_contact_rises_under_any_acceleration(engine, acceleration, stiffness, speed, e):
+    """The speed changes by more than its margin within the error of the time of an event."""
+    start, rate = 1e-8, math.sqrt(stiffness / MASS)
+    own = point_mass(stiffness=stiffness, restitution=e, displacement=-start, velocity=speed)
+    sim = simulation(own, engine=engine)
+    sim.advance(start / speed + 0.7 / rate)
+    before = energy_balance(sim.outputs())
+    sim.set({"push.x": MASS * acceleration})
+    sim.advance(sim.time + 4.0 / rate)
+    out = sim.outputs()
+    assert out["stop.peak_force"] > MASS * acceleration
+    assert energy_balance(out) == pytest.approx(before, abs=1e-6 * out["energy.work"])
 
 
 def pulled_off():

@@ -80,8 +80,8 @@ def test_the_motion_with_compliant_stops_is_that_of_the_engine(case):
             one.advance(k * end / 40)
         expected, found = (one.outputs() for one in both)
         assert found.keys() == expected.keys()
-        for name, x in expected.items():
-            assert found[name] == pytest.approx(x, rel=1e-6, abs=1e-9), (name, k)
+        rows = ([out[name] for name in expected] for out in (found, expected))
+        np.testing.assert_allclose(*rows, rtol=1e-6, atol=1e-9, err_msg=str([*expected]))
         if k == 20:
             for one in both:
                 one.set(changes)

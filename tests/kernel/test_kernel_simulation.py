@@ -218,6 +218,8 @@ def test_an_instance_takes_less_than_256_kib(model):
         {"release.displacement": -0.1},
         {"flexure.gamma1": 0.9},
         {"flexure.thickness": -1.0},
+        {"flexure.thickness": 0.1},
+        {"flexure.length": 1e-4},
     ],
 )
 def test_the_kernel_rejects_values_with_the_same_message_as_the_engine(values):
@@ -226,6 +228,33 @@ def test_the_kernel_rejects_values_with_the_same_message_as_the_engine(values):
     with pytest.raises(KernelMistake) as kernel:
         KernelSimulation(mechanism("PRBDM2R"), values)
     assert str(kernel.value) == str(engine.value)
+
+
+@pytest.mark.parametrize("name", ["thickness", "end_thickness"])
+def test_both_engines_reject_a_taper_with_an_end_as_thick_as_long(name):
+    guide = mechanism("PRBDM2R")
+    kind = replace(
+        guide.flexure_types[0], model="beam", profile="taper", end_thickness=2e-4, coefficients={}
+    )
+    taper, values = replace(guide, flexure_types=(kind,)), {f"flexure.{name}": 0.04}
+    words = (
+        rf"^flexure\.{name} = 0\.04 m is not less than the length of the flexure left_flexure, "
+        r"0\.04 m: check the units of both$"
+    )
+    for engine, error in ((Simulation, PrbmError), (KernelSimulation, KernelMistake)):
+        with pytest.raises(error, match=words):
+            engine(taper, values)
+        engine(taper, {f"flexure.{name}": 0.039, "release.displacement": 0.0})
+
+
+def test_the_blocks_beside_a_notch_may_be_thicker_than_its_flexure_is_long():
+    guide, ends = mechanism("NotchGuide"), []
+    kind = replace(guide.flexure_types[0], end_thickness=0.011, notch_depth=5e-3)
+    for engine in (Simulation, KernelSimulation):
+        sim = engine(replace(guide, flexure_types=(kind,)))
+        sim.advance(0.01)
+        ends.append(sim.outputs()["shuttle.x"])
+    assert ends[0] == pytest.approx(ends[1], abs=1e-12)
 
 
 def test_endless_chatter_is_an_error():

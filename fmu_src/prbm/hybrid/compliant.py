@@ -127,6 +127,10 @@ def switch(configuration: Configuration, front: Front, stop: int) -> Front:
     rate = float(-rates[stop])
     if touching.phase is Phase.PRESSED and rate > 0.0:
         front = rephased(front)
+        if front.contacts.touching[stop] == touching:
+            # The rate is below the reference speed only up to the error of the time of the event.
+            rising = replace(touching, phase=Phase.RISING)
+            front = front.with_contacts(front.contacts.with_touching(stop, rising))
     else:
         # At the end of a phase, the rate is that of the other phase only up to round-off.
         phase = Phase.FREE if touching.phase is Phase.PRESSED else Phase.PRESSED

@@ -91,4 +91,6 @@ def rest_forces(
     if P is None:
         return None
     limit = fixed + friction * np.append(P[:k], 0.0)[normal]
-    return RestForces((P * np.diag(W))[:k], P[k:], limit, (W @ P + u)[k:], np.diag(W)[k:])
+    sliding = (W @ P + u)[k:]
+    sliding[np.abs(sliding) <= tolerance] = 0.0  # Round-off of the forces at the contacts.
+    return RestForces((P * np.diag(W))[:k], P[k:], limit, sliding, np.diag(W)[k:])

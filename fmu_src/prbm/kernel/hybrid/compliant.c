@@ -226,6 +226,11 @@ PRBM bool switch_phase(Simulation *sim, int stop, Problem *problem) {
         if (!rephase(sim, problem)) {
             return false;
         }
+        const Touching *now = &sim->state.touching[stop];
+        if (now->phase == PHASE_PRESSED && now->reference_speed == touching.reference_speed) {
+            /* The rate is below the reference speed only up to the error of the event's time. */
+            set_phase(sim, stop, PHASE_RISING, touching.reference_speed, 0.0);
+        }
     } else {
         /* At the end of a phase, the rate is that of the other phase only up to round-off. */
         bool rises = touching.phase == PHASE_RISING;
@@ -430,7 +435,7 @@ static bool holding_force(Simulation *sim, int stop, double depth, double *force
 /* Compute the rest of a contact.  It is calm if it would pass its balance more slowly than
  * rest_speed.  A contact that is stuck does not move: it stays a force. */
 static bool rest_of_contact(Simulation *sim, int stop, double depth, double rate, Rest *rest,
-                      Problem *problem) {
+                            Problem *problem) {
     const ComplianceLaw *law = &sim->equations.laws[stop];
     double least = rest_speed_of(sim, stop), inverse_mass;
     bool stuck = false;

@@ -1,4 +1,5 @@
 /* Forces of all contacts at rest together: the twin of hybrid/rest.py. */
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -77,6 +78,7 @@ PRBM bool rest_forces(Simulation *sim, const double *q, const double *v,
     double *u = take(&sim->scratch, (size_t)size), *P = take(&sim->scratch, (size_t)size);
     double *friction = take(&sim->scratch, (size_t)m), *fixed = take(&sim->scratch, (size_t)m);
     int *normal = take_integers(&sim->scratch, m);
+    double tolerance = 0.0;
     bool ok = evaluate_equations(&sim->trial.equations, sim->state.front_time, q, v,
                                  extra_states(sim, sim->state.front), NULL,
                                  &sim->trial.evaluation, problem);
@@ -88,7 +90,7 @@ PRBM bool rest_forces(Simulation *sim, const double *q, const double *v,
         contact_mobility(size, n, rows, X, W);
         rest_accelerations(sim, rest, at.e, v, rows, u);
         rest_laws(sim, rest, at.e, friction, fixed, normal);
-        double tolerance = COMPLEMENTARITY_RTOL * largest(size, u);
+        tolerance = COMPLEMENTARITY_RTOL * largest(size, u);
         found->solved =
             coulomb(k, m, W, u, friction, fixed, normal, tolerance, P, &sim->scratch);
     }
@@ -101,7 +103,9 @@ PRBM bool rest_forces(Simulation *sim, const double *q, const double *v,
         found->friction[j] = P[i];
         found->limit[j] = fixed[j] + (normal[j] < 0 ? 0.0 : friction[j] * P[normal[j]]);
         found->mobility[j] = W[i * size + i];
-        found->slide[j] = dot(size, W + i * size, P) + u[i];
+        /* Slides up to the tolerance are round-off of the forces at the contacts. */
+        double slide = dot(size, W + i * size, P) + u[i];
+        found->slide[j] = fabs(slide) <= tolerance ? 0.0 : slide;
     }
     sim->scratch.used = mark;
     return ok;
