@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tomllib
 from dataclasses import fields
+from functools import cache
 from pathlib import Path
 
 import jsonschema
@@ -474,10 +475,15 @@ def test_line_ends_of_windows_and_old_macs_are_accepted(tmp_path, striker):
 # --- schema and reference ---------------------------------------------------------------------
 
 
+@cache
+def validator() -> jsonschema.protocols.Validator:
+    """Return a validator of mechanism files."""
+    return jsonschema.validators.validator_for(schema())(schema())
+
+
 def schema_errors(data: object) -> list[str]:
     """Return the messages of a validator of JSON schemas."""
-    validator = jsonschema.validators.validator_for(schema())
-    return [error.message for error in validator(schema()).iter_errors(data)]
+    return [error.message for error in validator().iter_errors(data)]
 
 
 def test_the_schema_is_a_valid_draft_7_schema_without_null():

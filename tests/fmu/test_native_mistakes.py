@@ -550,11 +550,12 @@ def test_null_names_tokens_and_locations_do_not_crash(native, fmi):
 
 @pytest.fixture
 def copied(native, tmp_path):
-    """Return a function that copies an FMU, replaces its tables and returns the folder."""
+    """Return a function that replaces the tables of a copy of an FMU and returns its folder."""
 
     def copy(fmi: int, tables: bytes | None) -> Path:
-        folder = tmp_path / f"copy{len([*tmp_path.iterdir()])}"
-        shutil.copytree(unpacked(native["PRBDM", fmi])[0], folder)
+        folder = tmp_path / f"copy{fmi}"
+        if not folder.exists():
+            shutil.copytree(unpacked(native["PRBDM", fmi])[0], folder)
         path = folder / "resources" / "mechanism.bin"
         path.unlink() if tables is None else path.write_bytes(tables)
         return folder

@@ -74,8 +74,8 @@ def explained(message: str, made_by: Mapping[str, str]) -> str:
 
     Examples
     --------
-    >>> explained("flexure right has zero length", {"right": "left.mirror"})
-    'left.mirror: flexure right has zero length'
+    >>> explained("flexure right has the length 0 m", {"right": "left.mirror"})
+    'left.mirror: flexure right has the length 0 m'
     """
     for subject in _NAME.findall(message)[:SUBJECT_WORDS]:
         for name in (subject, subject.rpartition(".")[0]):

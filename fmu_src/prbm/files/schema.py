@@ -32,7 +32,6 @@ from ..mechanism.flexure import (
     NOTCH_NODES,
     ORDER_DEFAULT,
     ORDER_MAX,
-    TAPER,
 )
 from ..mechanism.parts import FIELDS, GROUND, LENGTH_MAX, LENGTH_MIN
 from .copies import (
@@ -614,35 +613,14 @@ def _check_drawn(mechanism: Mechanism) -> None:
             )
     types = {kind.name: kind for kind in mechanism.flexure_types}
     for flexure in mechanism.flexures:
-        _check_slender(mechanism, flexure, types[flexure.type], values)
+        length = _distance(mechanism, flexure, values)
+        parts.check_slender(flexure, types[flexure.type], length, values)
     for joint in mechanism.joints:
         apart = _distance(mechanism, joint, values)
         if apart > LENGTH_MIN:
             raise MechanismError(
                 f"joint {joint.name}: {joint.start} and {joint.end} are drawn {apart:g} m apart; "
                 "draw them at the same position"
-            )
-
-
-def _check_slender(
-    mechanism: Mechanism,
-    flexure: parts.Flexure,
-    kind: parts.FlexureType,
-    values: Mapping[str, float],
-) -> None:
-    """Reject a flexure without length, or as thick as long, which is mostly a mistake of units."""
-    length = _distance(mechanism, flexure, values)
-    if length < LENGTH_MIN:
-        raise MechanismError(
-            f"flexure {flexure.name} from {flexure.start} to {flexure.end} has zero length: move "
-            "its ends apart"
-        )
-    for name in ("thickness", "end_thickness") if kind.profile == TAPER else ("thickness",):
-        thickness = parts.value(kind, name, values)
-        if thickness >= length:
-            raise MechanismError(
-                f"{kind.name}.{name} = {thickness:g} m is not less than the length of the flexure "
-                f"{flexure.name}, {length:g} m: check the units of both"
             )
 
 

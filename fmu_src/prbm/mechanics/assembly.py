@@ -54,8 +54,8 @@ def assemble(mechanism: Mechanism, values: Mapping[str, float]) -> System:
     MechanismError
         If a body is not connected to the ground, or loops depend on each other.
     ParameterError
-        If a value is missing, a flexure has no length, or the links of a flexure are longer than
-        the flexure.
+        If a value is missing, a flexure has no length or is as thick as long, or the links of a
+        flexure are longer than the flexure.
     """
     missing = [p.name for p in mechanism.parameters if p.name not in values]
     if missing:

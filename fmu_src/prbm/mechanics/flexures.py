@@ -10,7 +10,7 @@ from ..base.errors import ParameterError
 from ..mechanism.description import Mechanism
 from ..mechanism.expressions import affine
 from ..mechanism.flexure import NOTCH, PIN, TAPER, Segments, segments
-from ..mechanism.parts import LENGTH_MIN, Flexure, FlexureType, body_of, value
+from ..mechanism.parts import Flexure, FlexureType, body_of, check_slender, value
 from .arrays import Complex, Real
 from .beam import Beam, Material
 from .collection import ROD_POINTS, Collection
@@ -29,15 +29,11 @@ def add_flexure(parts: Collection, flexure: Flexure) -> None:
     Raises
     ------
     ParameterError
-        If the flexure has no length, its links or its notch are longer than the flexure, its notch
-        vanishes, or its ends are impossible for its curvature or rise.
+        If the flexure has no length or is as thick as long, its links or its notch are longer than
+        the flexure, its notch vanishes, or its ends are impossible for its curvature or rise.
     """
     kind = parts.mechanism.type_of(flexure)
-    if parts.length(flexure) < LENGTH_MIN:
-        raise ParameterError(
-            f"flexure {flexure.name} from {flexure.start} to {flexure.end} has the length "
-            f"{parts.length(flexure):g} m: move its ends apart"
-        )
+    check_slender(flexure, kind, parts.length(flexure), parts.values)
     if parts.mechanism.model(kind).order:
         _add_beam(parts, flexure, _beam(parts, flexure, kind), kind)
     else:

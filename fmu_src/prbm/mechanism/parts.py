@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
 
+from ..base.errors import ParameterError
 from .expressions import Quantity, affine
 from .flexure import CLAMP, LEAF, NOTCH, TAPER
 
@@ -502,6 +503,39 @@ def value(part: Part, name: str, values: Mapping[str, float]) -> float:
     if isinstance(quantity, str):
         return affine(quantity)(values)
     return values[f"{part.name}.{name}"]
+
+
+def check_slender(
+    flexure: Flexure, kind: FlexureType, length: float, values: Mapping[str, float]
+) -> None:
+    """Reject a flexure without length, or as thick as long, which is mostly a mistake of units.
+
+    Parameters
+    ----------
+    flexure, kind : Flexure, FlexureType
+        The flexure and its type.
+    length : float
+        Distance of its ends as drawn [m].
+    values : mapping
+        Values of all parameters.
+
+    Raises
+    ------
+    ParameterError
+        If the length is below :data:`LENGTH_MIN`, or the thickness is not below the length.
+    """
+    if not length >= LENGTH_MIN:
+        raise ParameterError(
+            f"flexure {flexure.name} from {flexure.start} to {flexure.end} has the length "
+            f"{length:g} m: move its ends apart"
+        )
+    for name in ("thickness", "end_thickness") if kind.profile == TAPER else ("thickness",):
+        thickness = value(kind, name, values)
+        if not thickness < length:
+            raise ParameterError(
+                f"{kind.name}.{name} = {thickness:g} m is not less than the length of the flexure "
+                f"{flexure.name}, {length:g} m: check the units of both"
+            )
 
 
 def body_of(reference: str) -> str:

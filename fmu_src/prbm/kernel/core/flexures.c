@@ -311,14 +311,34 @@ static bool walk_beam(System *system, const Step *step, Scratch *scratch, Proble
     return true;
 }
 
-PRBM bool walk_flexure(System *system, const Step *step, Scratch *scratch, Problem *problem) {
-    const Flexure *flexure = step->flexure;
-    double L = length_of(system, flexure);
+/* Reject a flexure without length, or as thick as long. */
+static bool check_slender(const System *system, const Flexure *flexure, const FlexureType *kind,
+                          Problem *problem) {
+    const char *names[2] = {"thickness", "end_thickness"};
+    double L = length_of(system, flexure), thickness[2];
+    thickness[0] = evaluate(kind->thickness, system->values);
+    thickness[1] = dimension(system, kind, DIMENSION_END_THICKNESS);
     if (!(L >= LENGTH_MIN)) {
         return fail(problem, "flexure %s has the length %g m: move its ends apart", flexure->name,
                     L);
     }
-    if (kind_of(system->mechanism, flexure)->order == 0) {
+    for (int i = 0; i < (kind->profile == PROFILE_TAPER ? 2 : 1); i++) {
+        if (!(thickness[i] < L)) {
+            return fail(problem,
+                        "%s.%s = %g m is not less than the length of the flexure %s, %g m: check "
+                        "the units of both",
+                        kind->name, names[i], thickness[i], flexure->name, L);
+        }
+    }
+    return true;
+}
+
+PRBM bool walk_flexure(System *system, const Step *step, Scratch *scratch, Problem *problem) {
+    const FlexureType *kind = kind_of(system->mechanism, step->flexure);
+    if (!check_slender(system, step->flexure, kind, problem)) {
+        return false;
+    }
+    if (kind->order == 0) {
         return walk_links(system, step, scratch, problem);
     }
     return walk_beam(system, step, scratch, problem);

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.errors import ParameterError, PrbmError
+from ...base.errors import PrbmError
 from ...mechanics.arrays import Complex
 from ...mechanics.inputs import check_input, input_names
 from ...mechanics.system import unit
@@ -25,10 +25,9 @@ from ...mechanism.parts import (
     Point,
     Stop,
     body_of,
+    check_slender,
     value,
 )
-
-FLEXURE_LENGTH_MIN = 1e-9  # m
 
 REMEDY = "install it with: python -m pip install 'prbm-impact[fe]', or: pip install exudyn"
 
@@ -194,10 +193,7 @@ class ElementModel:
             self._at(self.mechanism.point(p, flexure.name)) for p in (flexure.start, flexure.end)
         )
         L = abs(end - start)
-        if L < FLEXURE_LENGTH_MIN:
-            raise ParameterError(
-                f"flexure {flexure.name} has the length {L:g} m: move its ends apart"
-            )
+        check_slender(flexure, kind, L, self.values)
         along = (end - start) / L
         h, b, E, rho = (
             value(kind, name, self.values)
