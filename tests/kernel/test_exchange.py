@@ -97,7 +97,7 @@ def test_directional_derivatives_with_stretches_and_walls_on_bodies_equal_differ
 
 
 @pytest.mark.parametrize(
-    "guide", [elastic(), beams(), profiles()], ids=["links", "beams", "profiles"]
+    "guide", [elastic(), beams(), profiles()], ids=["Elastic", "Beams", "Profiles"]
 )
 def test_directional_derivatives_of_a_mechanism_with_all_kinds_of_parts_equal_differences(guide):
     inputs = dict.fromkeys(input_names(guide), 0.1) | {"pull.moment": 1e-3, "push.moment": -1e-3}

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 from ..base.errors import SimulationError
 from ..base.tolerances import PEAK_REACH_FACTOR, PEAK_REFINEMENT_FACTOR, PEAK_REFINEMENTS
@@ -38,10 +39,8 @@ def latched_until(
         return front
     latched, equations = list(front.latched), front.equations
     for i in equations.pressed:
-        depth, force = (
-            _largest(value, arc.start, end)
-            for value in (_along(equations, arc, i, part) for part in (_depth, _force))
-        )
+        contact = _along(equations, arc, i)
+        depth, force = (_largest(contact, k, arc.start, end) for k in (0, 1))
         check_depth(configuration, i, depth, end)
         latched[i] = replace(
             latched[i],
@@ -66,30 +65,26 @@ def check_depth(configuration: Configuration, stop: int, depth: float, time: flo
         )
 
 
-def _depth(equations: Equations, stop: int, gap: float, rate: float) -> float:
-    return -gap
+def _along(equations: Equations, arc: Arc, stop: int) -> Callable[[float], tuple[float, float]]:
+    """Return indentation and force of a pressed stop as a function of time in a step."""
 
-
-def _force(equations: Equations, stop: int, gap: float, rate: float) -> float:
-    return equations.compliant.force(stop, -gap, -rate)
-
-
-def _along(
-    equations: Equations, arc: Arc, stop: int, part: Callable[[Equations, int, float, float], float]
-) -> Callable[[float], float]:
-    """Return the force or the indentation of a pressed stop as a function of time in a step."""
-
-    def value(t: float) -> float:
+    @cache
+    def contact(t: float) -> tuple[float, float]:
         y, n = arc.at(t), equations.n
         e, v, extras = equations.system.directions(y[:n]), y[n : 2 * n], y[2 * n + 2 :]
         gap = float(equations.gaps(t, e, extras)[stop])
-        return part(equations, stop, gap, float(equations.gap_rates(t, e, v, extras)[stop]))
+        rate = float(equations.gap_rates(t, e, v, extras)[stop])
+        return -gap, equations.compliant.force(stop, -gap, -rate)
 
-    return value
+    return contact
 
 
-def _largest(value: Callable[[float], float], start: float, end: float) -> float:
+def _largest(
+    contact: Callable[[float], tuple[float, float]], which: int, start: float, end: float
+) -> float:
     """Return the largest value between two times, by parabolas through ever closer points.
+
+    The value is the indentation (0) or the force (1).
 
     A step resolves the vibration of a contact.  If the parabola through both ends and the middle
     has no maximum in the step or close to it, the largest value is that of an end.
@@ -97,10 +92,10 @@ def _largest(value: Callable[[float], float], start: float, end: float) -> float
     t, distance, result = 0.5 * (start + end), 0.5 * (end - start), -math.inf
     for _ in range(PEAK_REFINEMENTS):
         middle = min(max(t, start + distance), end - distance)
-        before, at, after = (value(middle + s * distance) for s in (-1, 0, 1))
+        before, at, after = (contact(middle + s * distance)[which] for s in (-1, 0, 1))
         result, bend = max(result, before, at, after), before - 2.0 * at + after
         if not bend < 0.0 or abs(before - after) > -2.0 * PEAK_REACH_FACTOR * bend:
             return result
         t = min(max(middle + 0.5 * distance * (before - after) / bend, start), end)
         distance *= PEAK_REFINEMENT_FACTOR
-    return max(result, value(t))
+    return max(result, contact(t)[which])

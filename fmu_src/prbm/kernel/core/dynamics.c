@@ -63,7 +63,6 @@ SIZED bool rates_of_length(int even, const Equations *q, const double *y, const 
     int n = q->system->n;
     pad_of(even, n, y, result->at.angle);
     pad_second(even, n, y, result->at.speed);
-    result->at.extra = y + 2 * n + 2;
     if (!motion_of_length(even, q, near, result)) {
         return false;
     }
@@ -82,16 +81,10 @@ static bool rates_of_motion(const Equations *q, const double *y, const Reference
     }
 }
 
-PRBM bool rate_at_time(const Equations *equations, const double *y, const Reference *near,
-                       Evaluation *result, double *dy, Problem *problem) {
-    const Equations *q = equations;
+/* Add to the rates of the energies all but the losses of the springs, and compute the rates of the
+ * states of compliant stops. */
+static void add_powers(const Equations *q, const Evaluation *result, const double *v, double *dy) {
     int n = q->system->n;
-    const double *v = y + n;
-    if (!rates_of_motion(q, y, near, result, dy)) {
-        return fail(problem, "%s", SINGULAR);
-    }
-    dy[2 * n] = result->spring_loss;
-    dy[2 * n + 1] = 0.0;
     if (q->mass_damping != 0.0) {
         dy[2 * n] += 2.0 * q->mass_damping * kinetic_energy_of(q, result, v);
     }
@@ -102,12 +95,27 @@ PRBM bool rate_at_time(const Equations *equations, const double *y, const Refere
         dy[2 * n + 1] = input_power(q, result, v);
         compliant_rates(q, result, dy);
     }
+}
+
+PRBM bool rate_at_time(const Equations *equations, const double *y, const Reference *near,
+                       Evaluation *result, double *dy, Problem *problem) {
+    const Equations *q = equations;
+    int n = q->system->n;
+    if (!rates_of_motion(q, y, near, result, dy)) {
+        return fail(problem, "%s", SINGULAR);
+    }
+    dy[2 * n] = result->spring_loss;
+    dy[2 * n + 1] = 0.0;
+    if (q->more_powers) {
+        add_powers(q, result, y + n, dy);
+    }
     return true;
 }
 
 PRBM bool rate(const Equations *equations, double t, const double *y, const Reference *near,
                Evaluation *result, double *dy, Problem *problem) {
     result->at.time = t;
+    result->at.extra = y + 2 * equations->system->n + 2;
     return rate_at_time(equations, y, near, result, dy, problem);
 }
 

@@ -8,8 +8,8 @@
  * t. */
 PRBM bool rate(const Equations *equations, double t, const double *y, const Reference *near,
                Evaluation *result, double *dy, Problem *problem);
-/* Compute the rates as rate does, at the time stored in the result.  Rates depend on the time only
- * if the walls of held stops move. */
+/* Compute the rates as rate does, with the time and the states of compliant stops stored in
+ * the result.  Rates depend on the time only if walls move. */
 PRBM bool rate_at_time(const Equations *equations, const double *y, const Reference *near,
                        Evaluation *result, double *dy, Problem *problem);
 /* The displacement of a wall by the force of its compliant stop, or its rate.  extra: the states of

@@ -208,6 +208,7 @@ static void set_loads(Equations *q) {
         q->walls_give = q->walls_give || gives;
     }
     q->driven = q->driven || q->walls_move || m->compliant_count > 0;
+    q->more_powers = q->driven || q->slipping_count > 0 || q->mass_damping != 0.0;
     q->contacts_or_walls = q->walls_move || q->slipping_count > 0 || q->pressed_count > 0;
 }
 

@@ -52,6 +52,7 @@ typedef struct {
     bool walls_move;
     bool walls_give;        /* whether forces of compliant stops may move their walls */
     bool driven;            /* inputs or walls do work, or stops are compliant */
+    bool more_powers;       /* whether more than the losses of springs changes the energies */
     bool contacts_or_walls; /* whether contacts slip or are pressed, or walls move */
     Parts B_conjugate;      /* (r, wide) */
     Parts w_parts;          /* (wide,) */

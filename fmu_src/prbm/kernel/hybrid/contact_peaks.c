@@ -129,7 +129,8 @@ PRBM bool latch_present(Simulation *sim, const Evaluation *at, bool smooth, Prob
     for (int k = 0; ok && k < sim->equations.pressed_count; k++) {
         int i = sim->equations.pressed[k];
         Latched *latched = &sim->state.latched[i];
-        double *stored = sim->state.dents + DENT_NUMBERS * (sim->configuration.mechanism->stops[i].extra / EXTRA_STATES);
+        int order = sim->configuration.mechanism->stops[i].extra / EXTRA_STATES;
+        double *stored = sim->state.dents + DENT_NUMBERS * order;
         Dent last, now = dent_now(sim, i, gaps[i], -rates[i], at);
         memcpy(&last, stored, sizeof last);
         double h = now.time - last.time;

@@ -46,23 +46,25 @@ static void output_stops(const Simulation *sim, double *out) {
     const System *system = system_of(sim);
     const Complex *e = sim->present.e;
     const double *v = sim->present.y + system->n;
-    const double *extra = extra_states(sim, sim->present.y), none[EXTRA_STATES] = {0.0};
+    const double *extra = extra_states(sim, sim->present.y);
     Rows gaps = gap_rows(system);
     for (int i = 0; i < system->s; i++) {
         const Stop *stop = &system->mechanism->stops[i];
-        const double *given = stop->compliant ? extra + stop->extra : none;
         double *values = out + PER_STOP * i;
         WallMotion wall = wall_motion(&sim->state.walls[i], sim->state.time);
         double value = row_value(&gaps, i, e) + gaps.c[i], rate = row_rate(&gaps, i, e, v);
-        values[STOP_GAP] = value + wall.x + given[EXTRA_GIVE];
-        values[STOP_GAP_RATE] = rate + wall.v + given[EXTRA_GIVE_RATE];
-        values[STOP_POINT_DISPLACEMENT] =
-            -value - field_value(sim, stop->position);
+        values[STOP_GAP] = value + wall.x;
+        values[STOP_GAP_RATE] = rate + wall.v;
+        if (stop->compliant) {
+            values[STOP_GAP] += extra[stop->extra + EXTRA_GIVE];
+            values[STOP_GAP_RATE] += extra[stop->extra + EXTRA_GIVE_RATE];
+        }
+        values[STOP_POINT_DISPLACEMENT] = -value - field_value(sim, stop->position);
         values[STOP_POINT_VELOCITY] = -rate;
     }
 }
 
-static void output_compliant(Simulation *sim, double *out, double *latched) {
+RARE void output_compliant(Simulation *sim, double *out, double *latched) {
     for (int i = 0; i < system_of(sim)->s; i++) {
         if (!sim->configuration.mechanism->stops[i].compliant) {
             continue;
@@ -120,7 +122,9 @@ static void output_places(Simulation *sim) {
     output_probes(sim, out + slots->probes);
     output_stops(sim, out + slots->stops);
     output_latched(sim, out + slots->latched);
-    output_compliant(sim, out + slots->compliant, out + slots->latched);
+    if (system->mechanism->compliant_count > 0) {
+        output_compliant(sim, out + slots->compliant, out + slots->latched);
+    }
     output_links(sim, out + slots->links, out + slots->stretches);
     out[slots->energies + ENERGY_DISSIPATED] = sim->present.y[2 * system->n];
     out[slots->energies + ENERGY_WORK] = sim->present.y[2 * system->n + 1];
@@ -191,7 +195,7 @@ static void output_energies(Simulation *sim) {
         deflection[j] = sim->present.y[j] - system->q0[j];
     }
     out[ENERGY_ELASTIC] = elastic_energy(n, system->K, deflection);
-    for (int i = 0; i < system->s; i++) {
+    for (int i = 0; system->mechanism->compliant_count > 0 && i < system->s; i++) {
         if (sim->state.touching[i].phase != PHASE_NONE) {
             double distance = gap(&sim->equations, i, sim->state.time, sim->present.e,
                                   extra_states(sim, sim->present.y));
