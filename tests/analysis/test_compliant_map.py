@@ -9,6 +9,7 @@ import compliant_hits as hits
 from prbm.analysis.impact_map import algebraic, compliant, with_flexures
 from prbm.base.errors import ParameterError
 from prbm.commands import command_line as cli
+from prbm.files.mechanism_file import shipped
 from prbm.mechanism.parts import COMPLIANT
 from support import mechanism
 
@@ -95,3 +96,27 @@ def test_the_command_prints_a_map_for_each_stiffness(tmp_path, capsys):
     assert "2R, 1e+06 N/m" in printed
     assert "2R, 1e+07 N/m" in printed
     assert len((tmp_path / "PRBDM2R-impact-map.csv").read_text().splitlines()) == 5
+
+
+@pytest.mark.parametrize(
+    ("exponent", "texts", "labels"),
+    [
+        (1.5, "1e9 2e9 N/m^1.5", ("1e+09 N/m^1.5", "2e+09 N/m^1.5")),
+        (1.5, "'2 kN/m^1.5' 1e6N/m^1.5", ("2000 N/m^1.5", "1e+06 N/m^1.5")),
+        (2, "1e9 '3 N/mm2'", ()),
+        (2, "'3 N/mm2'", ("3e+06 N/m^2",)),
+    ],
+)
+def test_the_unit_of_the_stiffness_has_the_present_exponent(
+    exponent, texts, labels, tmp_path, capsys
+):
+    file = tmp_path / "guide.toml"
+    law = 'law = "compliant"\nstiffness = 1e9\nexponent = 1.5\n'
+    text = shipped()["PRBDM"].read_text("utf-8").replace("[[stops]]\n", "[[stops]]\n" + law)
+    file.write_text(text, "utf-8")
+    line = f"impact-map {file} --method compliant --wall-positions 0 --offsets 0 --speed 0.3 "
+    status = cli.main(shlex.split(f"{line} --set stop.exponent={exponent} --stiffness {texts}"))
+    written = capsys.readouterr()
+    assert status == (cli.OK if labels else cli.MISTAKE)
+    assert all(label in written.out for label in labels)
+    assert labels or "write a unit after every number" in written.err

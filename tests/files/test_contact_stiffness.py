@@ -12,9 +12,9 @@ from prbm.base.errors import PrbmError
 from prbm.commands import command_line as cli
 from prbm.hybrid.simulation import Simulation
 from prbm.kernel.simulation import KernelSimulation
-from support import ROOT
+from support import SUPPORT
 
-ACCELEROMETER = ROOT / "examples" / "shock" / "accelerometer.toml"
+ACCELEROMETER = SUPPORT / "accelerometer_1r.toml"
 VALUES = [  # Key of the stop, value in TOML and in Python, words of the message: value, remedy.
     ("stiffness", "0", 0.0, "0 N/m must be at least 1e-06 N/m"),
     ("stiffness", '"-5 N/m"', -5.0, "-5 N/m must be at least 1e-06 N/m"),

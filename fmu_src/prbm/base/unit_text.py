@@ -18,6 +18,17 @@ def length_unit(size: float) -> tuple[float, str]:
     return 1e9, "nm"
 
 
+def stiffness_unit(exponent: float) -> str:
+    """Return the SI unit of a contact stiffness, force over indentation^exponent.
+
+    Examples
+    --------
+    >>> stiffness_unit(1.0), stiffness_unit(1.5)
+    ('N/m', 'N/m^1.5')
+    """
+    return "N/m" if exponent == 1.0 else f"N/m^{exponent:g}"
+
+
 def frequency_unit(frequency: float) -> tuple[float, str]:
     """Return factor and name of the display unit of a frequency [Hz].
 

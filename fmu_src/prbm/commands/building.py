@@ -365,7 +365,8 @@ def _fmu(plan: BuildPlan, flavour: Flavour, mechanism: Mechanism) -> bytes:
 
 
 def _progress(name: str) -> Callable[[str], None]:
-    return lambda step: print(f"{name}: {step} ...", flush=True)
+    """Return a callback that prints a stage with an ellipsis, and a sentence as it is."""
+    return lambda text: print(f"{name}: {text}{'' if text.endswith('.') else ' ...'}", flush=True)
 
 
 def _simulate(fmus: Sequence[Path]) -> int:

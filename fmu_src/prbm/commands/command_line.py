@@ -162,7 +162,7 @@ def _contact(commands: Commands) -> None:
         ("--wall-poisson", "Poisson's ratio of the wall (default: that of the sphere)"),
         ("--thickness", "thickness of a pad [m], instead of a radius"),
         ("--area", "area of the pad [m2]"),
-        ("--stiffness", "contact stiffness, instead of a radius or a thickness"),
+        ("--stiffness", "contact stiffness [N/m^exponent], instead of a radius or a thickness"),
         ("--mass", "mass that hits the stop [kg]"),
         ("--speed", "its speed [m/s]"),
     ):
@@ -341,8 +341,8 @@ def _impact_map(commands: Commands) -> None:
     )  # fmt: skip
     add(
         "--stiffness", nargs="+", metavar="K",
-        help="contact stiffnesses of the method compliant [N/m]; one map each (default: that of "
-        "the stop)",
+        help="contact stiffnesses of the method compliant [N/m^exponent]; one map each (default: "
+        "that of the stop)",
     )  # fmt: skip
     add("--speed", metavar="V", help="closing speed, for an exponent other than 1 [m/s]")
     add("--heights", nargs="+", dest="wall_positions", help=argparse.SUPPRESS)  # former name

@@ -4,37 +4,30 @@ import argparse
 import math
 
 from ..analysis.contact_hit import first_hit, hertz_stiffness, plate_stiffness
-from ..files.settings import UserMistake, quantity
+from ..base.unit_text import stiffness_unit
+from ..files.settings import UserMistake, quantity, stiffness
 
 STRONG_DAMPING = 0.3  # Restitution below which the damping makes the largest force.
 
 
 def contact(options: argparse.Namespace) -> None:
     """Print the stiffness of a contact and, with mass and speed, its first hit."""
-    stiffness, exponent = _stiffness(options)
-    unit = "N/m" if exponent == 1.0 else f"N/m^{exponent:g}"
-    rows = [
-        *_parts(options), ("stiffness", f"{stiffness:.6g} {unit}"), ("exponent", f"{exponent:g}"),
-    ]  # fmt: skip
+    k, exponent = _stiffness(options)
+    size = f"{k:.6g} {stiffness_unit(exponent)}"
+    rows = [*_parts(options), ("stiffness", size), ("exponent", f"{exponent:g}")]
     if (options.mass is None) != (options.speed is None):
         raise UserMistake("--mass and --speed: give both for a hit")
     if options.mass is not None:
-        rows += _hit(options, stiffness, exponent)
+        rows += _hit(options, k, exponent)
     for name, text in rows:
         print(f"{name:17} {text}")
     print("keys of the stop in a mechanism file:")
-    for line in _keys(stiffness, exponent, quantity(options.restitution, "", "--restitution")):
-        print(f"  {line}")
-
-
-def _keys(stiffness: float, exponent: float, restitution: float) -> list[str]:
-    """Return the lines of a compliant stop in a mechanism file."""
-    linear = exponent == 1.0
-    size = f'"{stiffness:.6g} N/m"' if linear else f"{stiffness:.6g}  # N/m^{exponent:g}"
-    return [
-        'law = "compliant"', f"stiffness = {size}", f"exponent = {exponent:g}",
+    restitution = quantity(options.restitution, "", "--restitution")
+    for line in (
+        'law = "compliant"', f'stiffness = "{size}"', f"exponent = {exponent:g}",
         f"restitution = {restitution:g}",
-    ]  # fmt: skip
+    ):  # fmt: skip
+        print(f"  {line}")
 
 
 def _parts(options: argparse.Namespace) -> list[tuple[str, str]]:
@@ -63,8 +56,7 @@ def _stiffness(options: argparse.Namespace) -> tuple[float, float]:
         )
     if options.stiffness:
         exponent = quantity(options.exponent, "", "--exponent")
-        unit = "N/m" if exponent == 1.0 else ""
-        return quantity(options.stiffness, unit, "--stiffness"), exponent
+        return stiffness(options.stiffness, exponent, "--stiffness"), exponent
     if not options.youngs_modulus:
         raise UserMistake("--youngs-modulus is missing: give Young's modulus of the body")
     modulus = quantity(options.youngs_modulus, "Pa", "--youngs-modulus")

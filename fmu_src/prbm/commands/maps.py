@@ -10,8 +10,16 @@ from ..analysis import adequacy, impact_map
 from ..analysis.impact_map import ImpactMap
 from ..analysis.touching import lever, stop_index
 from ..base.progress import Progress, reporter
+from ..base.unit_text import stiffness_unit
 from ..files.mechanism_file import load
-from ..files.settings import UserMistake, quantities, quantity, settings
+from ..files.settings import (
+    UserMistake,
+    quantities,
+    quantity,
+    settings,
+    stiffness,
+    with_shared_unit,
+)
 from ..mechanics.assembly import assemble
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import value
@@ -68,8 +76,7 @@ def _points(
     options: argparse.Namespace, mechanism: Mechanism, values: Mapping[str, float]
 ) -> tuple[list[float], list[float]]:
     """Return wall positions and offsets in increasing order [m], from options or by default."""
-    known = {name for name in values if name in mechanism.values()}
-    system = assemble(mechanism, mechanism.values({name: values[name] for name in known}))
+    system = assemble(mechanism, _of(mechanism, values))
     release = mechanism.release
     amount = abs(value(release, release.start, system.values))
     scales = {
@@ -131,7 +138,7 @@ def _jobs(
         for label, model in models.items():
             method = partial(METHODS[name], model, positions, offsets, values, stop=options.stop)
             if name == "compliant":
-                yield from _compliant(options, mechanism, method, label)
+                yield from _compliant(options, mechanism, values, method, label)
                 continue
             if name == "elements":
                 yield partial(_compute, method, "finite elements", elements=options.elements)
@@ -142,7 +149,11 @@ def _jobs(
 
 
 def _compliant(
-    options: argparse.Namespace, mechanism: Mechanism, method: Method, label: str
+    options: argparse.Namespace,
+    mechanism: Mechanism,
+    values: Mapping[str, float],
+    method: Method,
+    label: str,
 ) -> Iterator[Job]:
     """Yield a function for the map of each contact stiffness."""
     stop = mechanism.stops[stop_index(mechanism, options.stop)]
@@ -150,11 +161,17 @@ def _compliant(
     if not options.stiffness:
         yield partial(_compute, method, f"{label}, compliant", speed=speed)
         return
-    linear = stop.exponent in (None, 1.0)
-    unit = "N/m" if linear else ""
-    for k in quantities(options.stiffness, unit, "--stiffness"):
-        name = f"{label}, {k:.4g} N/m" + ("" if linear else f"^{stop.exponent}")
+    exponent = value(stop, "exponent", _of(mechanism, values)) if stop.compliant else 1.0
+    for text in with_shared_unit(options.stiffness, "--stiffness"):
+        k = stiffness(text, exponent, "--stiffness")
+        name = f"{label}, {k:.4g} {stiffness_unit(exponent)}"
         yield partial(_compute, method, name, stiffness=k, speed=speed)
+
+
+def _of(mechanism: Mechanism, values: Mapping[str, float]) -> dict[str, float]:
+    """Return the values of all parameters of a mechanism, from those of parameters and inputs."""
+    known = {name for name in values if name in mechanism.values()}
+    return mechanism.values({name: values[name] for name in known})
 
 
 def _compute(method: Method, label: str, progress: Progress, **more: object) -> ImpactMap:

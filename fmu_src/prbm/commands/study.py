@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 EXAMPLE = '--vary "stop.position=-4:2 mm:25"'
+NUMBER = re.compile(r"[+-]?[\d.]+([eE][+-]?\d+)?")
 ROWS_PRINTED_MAX = 45  # Longer tables are only written.
 DIGITS = 5  # Significant digits of printed numbers.
 
@@ -93,10 +94,10 @@ def _ends(low: str, high: str, unit: str, option: str) -> tuple[float, float]:
     >>> _ends("-4", "2 mm", "m", "--vary")
     (-0.004, 0.002)
     """
-    if has_unit(high) and not has_unit(low):
-        written = re.sub(r"^[+-]?[\d.]+([eE][+-]?\d+)?", "", high).strip()
-        low = f"{low} {written}"
-    return quantity(low, unit, option), quantity(high, unit, option)
+    upper = quantity(high, unit, option)  # First: a message about its unit quotes it as written.
+    if has_unit(high) and NUMBER.fullmatch(low):
+        low = low + NUMBER.sub("", high, count=1)
+    return quantity(low, unit, option), upper
 
 
 def _text(x: float, unit: str) -> str:

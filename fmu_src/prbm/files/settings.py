@@ -8,7 +8,7 @@ from ..base.errors import MechanismError, ParameterError, PrbmError
 from ..base.names import unknown
 from ..mechanics.inputs import input_units
 from ..mechanism.description import Mechanism
-from .units import number
+from .units import contact_stiffness, number
 
 PERCENT = re.compile(r"(.*\d)\s*%")
 UNIT_ALONE = re.compile(r"[A-Za-zµμ°][^=]*|1/.*")
@@ -80,6 +80,22 @@ def quantities(texts: Sequence[str], unit: str, option: str) -> list[float]:
     >>> quantities(["-10mm", "0", "1 cm"], "m", "--heights")
     [-0.01, 0.0, 0.01]
     """
+    return [quantity(text, unit, option) for text in with_shared_unit(texts, option)]
+
+
+def with_shared_unit(texts: Sequence[str], option: str) -> list[str]:
+    """Return quantities as texts, in which a unit alone at the end is added to all numbers before.
+
+    Raises
+    ------
+    UserMistake
+        If only some of the numbers other than 0 have a unit.
+
+    Examples
+    --------
+    >>> with_shared_unit(["1", "2", "kN/mm^1.5"], "--stiffness")
+    ['1 kN/mm^1.5', '2 kN/mm^1.5']
+    """
     given = [text.strip() for text in texts]
     if len(given) > 1 and UNIT_ALONE.fullmatch(given[-1]):
         last = given.pop()
@@ -90,7 +106,30 @@ def quantities(texts: Sequence[str], unit: str, option: str) -> list[float]:
             f"{option} {' '.join(texts)}: {bare[0]} has no unit and others have one; write a unit "
             f"after every number, or one at the end for all"
         )
-    return [quantity(text, unit, option) for text in given]
+    return given
+
+
+def stiffness(text: str, exponent: float, option: str) -> float:
+    """Read a contact stiffness in N/m^exponent, in SI if it has no unit.
+
+    Raises
+    ------
+    UserMistake
+        If the text is not a finite number, or its unit is not a force over a length to the power of
+        the exponent.
+
+    Examples
+    --------
+    >>> stiffness("2 kN/m^1.5", 1.5, "--stiffness")
+    2000.0
+    """
+    if exponent == 1.0:
+        return quantity(text, "N/m", option)
+    try:
+        read = contact_stiffness(text, exponent) if has_unit(text) else text
+    except MechanismError as error:
+        raise UserMistake(f"{option}: {error}") from None
+    return quantity(read, "", option) if isinstance(read, str) else read
 
 
 def without_exponent(text: str) -> str:

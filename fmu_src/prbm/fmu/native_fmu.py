@@ -136,7 +136,7 @@ def live(
     default : Experiment
         The default experiment.
     progress : callable
-        Called with a description of the stage, and with the reason if there is no such part.
+        Called with a description of the stage, and with a sentence if there is no such part.
 
     Returns
     -------
@@ -146,7 +146,7 @@ def live(
     try:
         module = browser_module(progress)
     except NoCompilerError as error:
-        progress(f"the documentation has no simulation: {error}")
+        progress(f"the documentation has no simulation: {error}.")
         return None
     return simulated_part(mechanism, changes, default, module)
 

@@ -520,7 +520,7 @@ def _cached(job: Job, progress: Callable[[str], None]) -> bytes:
             content = _compile(job, progress)
             progress(
                 f"the folder {cache_folder()} cannot be written, or other users can write to it: "
-                "the library is not kept; the next export compiles again"
+                "the library is not kept; the next export compiles again."
             )
         else:
             entry = folder / name
@@ -544,7 +544,7 @@ def _store(entry: Path, job: Job, progress: Callable[[str], None]) -> bytes:
             try:
                 write(entry, MAGIC + hashlib.sha256(content).digest() + content)
             except OSError:
-                progress(f"cannot write to {entry.parent}: the next export compiles again")
+                progress(f"cannot write to {entry.parent}: the next export compiles again.")
     return content
 
 
