@@ -27,9 +27,9 @@ def accelerometer():
 @pytest.mark.parametrize("kind", PULSES)
 def test_velocity_of_a_pulse_is_the_integral_of_its_acceleration(kind):
     pulse = Pulse(kind, 300.0, 2e-3)
-    t = (np.arange(200_000) + 0.5) * 2e-3 / 200_000
+    t = (np.arange(20_000) + 0.5) * 2e-3 / 20_000
     values = [pulse.signal.value(float(x), float(x)) for x in t]
-    assert sum(values) * 1e-8 == pytest.approx(pulse.velocity, rel=1e-4)
+    assert sum(values) * 1e-7 == pytest.approx(pulse.velocity, rel=1e-4)
     assert max(values) == pytest.approx(300.0, rel=1e-4)
     assert pulse.signal.value(2.5e-3, 2.5e-3) == 0.0
 
@@ -42,7 +42,7 @@ def test_a_drop_changes_the_velocity_by_that_of_the_fall(kind):
 
 def oscillation(omega, zeta, pulse, t):
     """Return x(t) of x'' + 2 zeta omega x' + omega^2 x = -omega^2 a(t), by superposition."""
-    tau = np.linspace(0.0, pulse.duration, 20_001)
+    tau = np.linspace(0.0, pulse.duration, 2_001)
     a = np.array([pulse.signal.value(float(x), float(min(x, 0.999 * pulse.duration))) for x in tau])
     damped = omega * math.sqrt(1 - zeta**2)
     since = t - tau
@@ -81,12 +81,15 @@ def test_the_mechanism_starts_at_rest_in_its_equilibrium():
 def test_bump_stops_limit_the_displacement_and_are_hit():
     pulse = Pulse("half-sine", 500 * 9.80665, 0.5e-3)
     found = shock(accelerometer(), {pulse.input: pulse.signal}, duration=pulse.duration)
-    assert found.displacement == pytest.approx(-4e-6, rel=1e-3)
     right, left = found.hits
+    assert -4e-6 - left.indentation <= found.displacement < -4e-6
     assert (right.count, left.count > 0) == (0, True)
     assert 0.0 < left.speed < 0.2
     assert left.impulse > 0.0
     assert found.safety == pytest.approx(7e8 / found.peak_stress)
+    page = (ROOT / "docs" / "strength.md").read_text("utf-8").replace("\n", " ")
+    assert f"with a safety factor of {found.safety:.0f}" in page
+    assert f"with {1e3 * left.force:.1f} mN" in page
 
 
 def weak_springs():
@@ -150,6 +153,12 @@ def run(line: str) -> int:
         ("--duration 1ms --sweep peak", "has no yield_strength: add it to the material"),
         ("--record r.csv --sweep peak", "--record excludes --sweep"),
         ('--duration 0 --peak "1 g"', "duration = 0 s"),
+        (
+            '--duration 1ms --peak "1 g" --set gravity.x=0 --set stop.position=-5mm',
+            "the wall stop is penetrated by 0.005 m in the equilibrium without stops, from which a "
+            "shock starts: stop.position = -0.005 m, the hit point is at 0 m; move the stop, or "
+            "change gravity",
+        ),
     ],
 )
 def test_mistakes_are_rejected(options, words, capsys):

@@ -11,19 +11,19 @@ from prbm.analysis.contact_hit import first_hit
 from prbm.analysis.shock import Pulse, shock
 from prbm.base.unit_text import GRAVITY
 from prbm.commands import command_line as cli
-from prbm.mechanism.parts import COMPLIANT
-from support import ROOT
+from support import ROOT, SUPPORT
 
 ACCELEROMETER = ROOT / "examples" / "shock" / "accelerometer.toml"
+SMALL = SUPPORT / "accelerometer_1r.toml"
 PULSE = Pulse("half-sine", 500 * GRAVITY, 0.5e-3)
 STIFFNESS = 1e4  # N/m
 MASS = 2330.0 * 25e-6 * (500e-6 * 200e-6 - 180e-6 * 20e-6)  # Of the proof mass [kg].
 
 
 def found_shock():
-    """Return the shock of the accelerometer with compliant bump stops."""
+    """Return the shock of the accelerometer with bump stops of constant stiffness."""
     one = prbm.load(str(ACCELEROMETER))
-    stops = tuple(replace(s, law=COMPLIANT, stiffness=STIFFNESS) for s in one.stops)
+    stops = tuple(replace(s, stiffness=STIFFNESS, exponent=1.0) for s in one.stops)
     one = replace(one, stops=stops)
     return shock(one, {PULSE.input: PULSE.signal}, duration=PULSE.duration, stop_time=1e-3)
 
@@ -44,16 +44,22 @@ def test_hits_have_force_indentation_and_duration():
 
 
 def test_rigid_stops_have_no_force():
-    one = prbm.load(str(ACCELEROMETER))
+    one = prbm.load(str(SMALL))
     found = shock(one, {PULSE.input: PULSE.signal}, duration=PULSE.duration, stop_time=1e-3)
     assert all(hits.force is None for hits in found.hits)
 
 
-def test_the_command_prints_and_draws_the_forces(tmp_path, capsys):
-    text = ACCELEROMETER.read_text("utf-8")
+@pytest.fixture
+def file(tmp_path):
+    """Return the file of the small accelerometer with compliant bump stops."""
+    text = SMALL.read_text("utf-8")
     changed = 'restitution = 0.5\nlaw = "compliant"\nstiffness = "1e4 N/m"'
-    file = tmp_path / "compliant.toml"
-    file.write_text(text.replace("restitution = 0.5", changed), "utf-8")
+    path = tmp_path / "compliant.toml"
+    path.write_text(text.replace("restitution = 0.5", changed), "utf-8")
+    return path
+
+
+def test_the_command_prints_and_draws_the_forces(file, tmp_path, capsys):
     line = f'shock {file} --peak "500 g" --duration 0.5ms --stop-time 1ms --out {tmp_path / "out"}'
     assert cli.main(shlex.split(line)) == cli.OK
     printed = capsys.readouterr().out
@@ -64,12 +70,8 @@ def test_the_command_prints_and_draws_the_forces(tmp_path, capsys):
     assert (tmp_path / "out" / "Accelerometer-shock.png").stat().st_size > 10_000
 
 
-def test_the_sweep_over_the_peak_has_a_column_of_the_force(tmp_path, capsys):
+def test_the_sweep_over_the_peak_has_a_column_of_the_force(file, tmp_path, capsys):
     """The force grows with the peak; without hits it is zero."""
-    text = ACCELEROMETER.read_text("utf-8")
-    changed = 'restitution = 0.5\nlaw = "compliant"\nstiffness = "1e4 N/m"'
-    file = tmp_path / "compliant.toml"
-    file.write_text(text.replace("restitution = 0.5", changed), "utf-8")
     line = (
         f"shock {file} --duration 0.5ms --peaks 10 500 800 g --stop-time 0.6ms "
         f"--out {tmp_path / 'out'}"

@@ -13,6 +13,7 @@ import numpy as np
 from ..base.errors import ParameterError
 from ..base.progress import Progress
 from ..base.unit_text import GRAVITY, length_unit
+from ..hybrid.release import PenetrationError
 from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble
 from ..mechanics.statics import free_displacement
@@ -209,9 +210,19 @@ def shock(
         Whether to compute the damage.
     progress, engine
         As for :func:`prbm.simulate`.
+
+    Raises
+    ------
+    ParameterError
+        If a rigid wall is penetrated in the equilibrium.
     """
     resting = at_rest(mechanism, values)
-    default = experiment(resting, values, engine)
+    try:
+        default = experiment(resting, values, engine)
+    except PenetrationError as error:
+        start = "in the equilibrium without stops, from which a shock starts"
+        remedy = "move the stop, or change gravity"
+        raise ParameterError(error.message(start, remedy)) from None
     end = duration + default.stop_time if stop_time is None else stop_time
     step = min([end / STEPS, *([duration / PULSE_STEPS] if duration else [])])
     result = simulate(

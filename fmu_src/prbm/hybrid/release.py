@@ -16,6 +16,33 @@ from .front import Front, Latched
 from .impacts import impact
 
 
+class PenetrationError(ParameterError):
+    """A rigid wall is penetrated at release.
+
+    Parameters
+    ----------
+    stop : str
+        Name of the stop.
+    depth, wall : float
+        Penetration, and position of the wall [m].
+    """
+
+    def __init__(self, stop: str, depth: float, wall: float) -> None:
+        super().__init__(stop, depth, wall)
+        self.stop, self.depth, self.wall = stop, depth, wall
+
+    def __str__(self) -> str:
+        return self.message("at release", "move the stop or release further back")
+
+    def message(self, start: str, remedy: str) -> str:
+        """Return the message with the name of the start and a remedy."""
+        return (
+            f"the wall {self.stop} is penetrated by {self.depth:.6g} m {start}: "
+            f"{self.stop}.position = {self.wall:.6g} m, the hit point is at "
+            f"{self.wall + self.depth:.6g} m; {remedy}"
+        )
+
+
 def released(configuration: Configuration, inputs: Inputs, time: float) -> Front:
     """Return the front at the release.
 
@@ -67,15 +94,10 @@ def check_walls(configuration: Configuration, front: Front) -> None:
 
     Raises
     ------
-    ParameterError
+    PenetrationError
         If a gap is negative by more than ``RELEASE_PENETRATION_ATOL``.
     """
     gaps, _ = front.gaps_and_rates()
     for i, stop in enumerate(configuration.mechanism.stops):
         if gaps[i] < -RELEASE_PENETRATION_ATOL and not stop.compliant:
-            wall = front.inputs.walls[i].position
-            raise ParameterError(
-                f"the wall {stop.name} is penetrated by {-gaps[i]:.6g} m at release: "
-                f"{stop.name}.position = {wall:.6g} m, the hit point is at "
-                f"{wall - gaps[i]:.6g} m; move the stop or release further back"
-            )
+            raise PenetrationError(stop.name, -gaps[i], front.inputs.walls[i].position)

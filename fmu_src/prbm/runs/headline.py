@@ -159,7 +159,7 @@ def _settled(columns: Columns, span: float) -> str:
         column(columns, name)  # Raises an error if it is missing.
     when = settling(columns)
     if math.isnan(when):
-        return "settled              not yet, or too late in the simulation to be certain"
+        return "settled              not yet, or too late to be certain: simulate longer"
     share = f"{100 * SETTLED_ENERGY_RTOL:g} %"
     return (
         f"settled              at t = {instant(when, span, 3)}: the kinetic energy stays below "
