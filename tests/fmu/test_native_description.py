@@ -26,7 +26,7 @@ from prbm.fmu import reference_results as reference
 from prbm.fmu.native_fmu import described
 from prbm.interface.structure import dependencies
 from prbm.kernel.sources import TABLES, UNIT, amalgamation, kernel
-from support import GUIDES, SHIPPED, case, each_shipped
+from support import GUIDES, SHIPPED, case, each_shipped, own_fmu
 
 SCHEMAS = Path(fmpy.__file__).parent / "schema"
 FLAVOURS = [
@@ -268,7 +268,7 @@ def test_the_token_depends_on_the_content(native, mechanisms):
         or read_model_description(str(path)).instantiationToken
         for path in built
     }
-    changed = native_fmu.build(mechanisms["PRBDM"], {"stop.restitution": 0.5}, fmi=2)
+    changed = own_fmu("fmi2", mechanisms["PRBDM"], {"stop.restitution": 0.5})
     tokens.add(read_model_description(io.BytesIO(changed)).guid)
     assert len(tokens) == 5
     for fmu in built:
@@ -278,7 +278,7 @@ def test_the_token_depends_on_the_content(native, mechanisms):
 
 
 def test_changed_start_values_are_in_the_model_description(mechanisms):
-    changed = native_fmu.build(mechanisms["PRBDM"], {"stop.restitution": 0.1 + 0.2}, fmi=3)
+    changed = own_fmu("fmi3", mechanisms["PRBDM"], {"stop.restitution": 0.1 + 0.2})
     listed = {v.name: v for v in read_model_description(io.BytesIO(changed)).modelVariables}
     assert float(listed["stop.restitution"].start) == 0.1 + 0.2
 
@@ -320,7 +320,7 @@ def test_clocks_without_a_stop_are_rejected(tmp_path):
     assert free.stops == ()
     with pytest.raises(MechanismError, match="PRBDM has no stop"):
         native_fmu.build(free, fmi=3, clock=True)
-    assert validate_fmu(_written(tmp_path, native_fmu.build(free, fmi=3))) == []
+    assert validate_fmu(_written(tmp_path, own_fmu("fmi3", free))) == []
 
 
 def _written(folder: Path, content: bytes) -> str:

@@ -11,8 +11,8 @@ from lxml import etree
 from many_parts import anvil
 from prbm.fmu.start import interface
 from prbm.fmu.terminals import INFLOW, OUTFLOW, SIGNAL, terminals
-from prbm.hybrid.simulation import Simulation
 from prbm.interface.variables import Variable
+from prbm.kernel.simulation import KernelSimulation
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.parts import Body, Probe
 from support import case, each_shipped, mechanism
@@ -60,7 +60,7 @@ def work(chosen: Mechanism, flange: dict[str, tuple[str, str]], force: float) ->
     """Return the work of a constant force at a flange, and ``energy.work``, after 10 ms."""
     (position, _), (flow, kind) = flange.values()
     assert kind == INFLOW
-    simulation = Simulation(chosen, {flow: force})
+    simulation = KernelSimulation(chosen, {flow: force})
     start = simulation.outputs()[position]
     simulation.advance(0.01)
     outputs = simulation.outputs()
@@ -97,7 +97,7 @@ def test_the_flows_of_a_wall_times_its_velocity_are_the_work_taken_from_the_mech
     assert kinds["displacement"] == kinds["velocity"] == kinds["mobility"] == SIGNAL
     assert kinds["force"] == kinds["impulse_sum"] == OUTFLOW
     force, impulses = members["force"][0], members["impulse_sum"][0]
-    simulation = Simulation(chosen, {members["velocity"][0]: speed})
+    simulation = KernelSimulation(chosen, {members["velocity"][0]: speed})
     pushed, last, step = 0.0, 0.0, 1e-4
     times = [step * k for k in range(3001)]
     for t, end in pairwise(times):

@@ -21,6 +21,7 @@ from .shapes import Shapes
 from .style import area, own_style, png
 
 STEEL, BODY, WALL, GHOST = "#1f4e79", "#9dc3e6", "#595959", "#d0d0d0"
+BACKGROUND = "#ffffff"  # As of the PNG: lines are dark and would vanish in tools with a dark theme.
 PIXELS = 256
 DPI = 128
 POINTS = 72.0 * PIXELS / DPI  # Width and height of the icon [pt], the unit of lines and dots.
@@ -107,15 +108,16 @@ def icon(mechanism: Mechanism, sample: Mapping[str, float]) -> bytes:
 
 
 def vector_icon(mechanism: Mechanism, sample: Mapping[str, float]) -> bytes:
-    """Return the icon as SVG, with the parts of the PNG; equal arguments give equal bytes.
+    """Return the icon as SVG, with the background and the parts of the PNG.
 
-    The arguments are those of :func:`icon`.
+    Equal arguments give equal bytes.  The arguments are those of :func:`icon`.
     """
     drawn = parts(mechanism, sample)
     place = placement(drawn, POINTS, POINTS, (1.0 - 2.0 * FRAME) / (1.0 + 2.0 * MARGIN))
     box = {"viewBox": f"0 0 {POINTS:g} {POINTS:g}", "width": str(PIXELS), "height": str(PIXELS)}
     root = Element("svg", {"xmlns": SVG, **box, "role": "img", "fill": "none"})
     SubElement(root, "title").text = printable(mechanism.title)
+    SubElement(root, "rect", {"width": "100%", "height": "100%", "fill": BACKGROUND})
     for part in drawn:
         for tag, attributes in elements(part, place):
             SubElement(root, tag, attributes | _presentation(part))

@@ -11,7 +11,7 @@ from ..interface.variables import Variable
 from ..mechanics.inputs import Wall
 from ..mechanism.description import Mechanism
 from ..mechanism.flexure import BEAM, MODELS
-from ..mechanism.parts import FlexureType
+from ..mechanism.parts import COMPLIANT, LAWS, RIGID, FlexureType
 from ..runs.experiment import Experiment
 from .live.page import LivePart
 from .mathml import block, formula, inline, matrix, row
@@ -43,12 +43,13 @@ th { background: var(--code); } td.number { text-align: right; white-space: nowr
 td:first-child { white-space: nowrap; } caption { text-align: left; font-weight: 600;
   padding: .8rem 0 .3rem; } figure { margin: 1rem 0; }
 math[display=block] { margin: .9rem 0; text-align: left; display: block math; font-size: 1.08em;
-  overflow-x: auto; overflow-y: hidden; max-width: 62rem; }
+  overflow-x: auto; overflow-y: hidden; max-width: 62rem; padding: .2em 0; }
 mtd { padding: .15em .6em; }
 .matrix { margin: 0 .3em; --c: linear-gradient(currentColor, currentColor); background:
   var(--c) 0 0/6px 1.5px, var(--c) 0 100%/6px 1.5px, var(--c) 100% 0/6px 1.5px,
   var(--c) 100% 100%/6px 1.5px; background-repeat: no-repeat;
   border-left: 1.5px solid currentColor; border-right: 1.5px solid currentColor; }
+@media (max-width: 36rem) { .table td:last-child { min-width: 15rem; } }
 figure svg { color: var(--anchor); max-width: 100%; height: auto; }
 """
 
@@ -72,6 +73,10 @@ SOURCES = (
     "W. J. Stronge, Rigid body collisions with friction, Proc. R. Soc. A 431 (1990) 169 "
     "(restitution with friction).",
 )
+COMPLIANT_SOURCE = (
+    "Y. Gonthier, J. McPhee, C. Lange, J.-C. Piedboeuf, Multibody System Dynamics 11 (2004) 209 "
+    "(compliant stops)."
+)
 
 
 def escape(text: str) -> str:
@@ -89,7 +94,7 @@ def page(mechanism: Mechanism, variables: tuple[Variable, ...], experiment: Expe
         _walls(mechanism),
         _variables(variables),
         _limits(mechanism, variables, INPUTS_OF_STEPS),
-        _list("Sources", (escape(source) for source in SOURCES), ordered=True),
+        _sources(mechanism),
         _licenses(),
     )
 
@@ -133,7 +138,7 @@ def native_page(
         _walls(mechanism),
         _variables(variables),
         _limits(mechanism, variables, INPUTS_OF_BOTH),
-        _list("Sources", (escape(source) for source in SOURCES), ordered=True),
+        _sources(mechanism),
         _native_licenses(platforms, live is not None),
         live=live,
     )
@@ -158,7 +163,7 @@ def explorer_page(mechanism: Mechanism, variables: tuple[Variable, ...], live: L
         _walls(mechanism),
         _variables(variables),
         _limits(mechanism, variables, INPUTS_OF_STEPS),
-        _list("Sources", (escape(source) for source in SOURCES), ordered=True),
+        _sources(mechanism),
         live=live,
     )
 
@@ -188,6 +193,17 @@ def _list(title: str, items: Iterable[str], *, ordered: bool = False) -> str:
     return f"<h2>{title}</h2>\n<{tag}>\n{lines}\n</{tag}>"
 
 
+def _sources(mechanism: Mechanism) -> str:
+    more = [COMPLIANT_SOURCE] if COMPLIANT in _laws(mechanism) else []
+    return _list("Sources", map(escape, [*SOURCES, *more]), ordered=True)
+
+
+def _laws(mechanism: Mechanism) -> list[str]:
+    """Return the laws of the stops, the rigid one first; without stops the rigid one."""
+    found = {stop.law for stop in mechanism.stops} or {RIGID}
+    return [law for law in LAWS if law in found]
+
+
 def _flexures(mechanism: Mechanism) -> str:
     """Return a sentence for each kind of flexure models."""
     beams = {kind.model == BEAM for kind in mechanism.flexure_types}
@@ -199,6 +215,16 @@ def _flexures(mechanism: Mechanism) -> str:
     return " ".join(sentences[beam] for beam in sorted(beams))
 
 
+def _impacts(mechanism: Mechanism) -> str:
+    """Return a sentence for each kind of stops."""
+    sentences = {
+        RIGID: "Impacts follow the laws of rigid bodies.",
+        COMPLIANT: "Compliant stops are indented, and their contact force brakes and returns the "
+        "body.",
+    }
+    return " ".join(sentences[law] for law in _laws(mechanism))
+
+
 def _summary(mechanism: Mechanism, flavour: str, live: LivePart | None = None) -> str:
     drawing = escape(mechanism.drawing.strip("\n"))
     figure = f"<figure><pre>{drawing}</pre></figure>" if drawing else ""
@@ -206,8 +232,8 @@ def _summary(mechanism: Mechanism, flavour: str, live: LivePart | None = None) -
         f"<h1>{escape(mechanism.name)}</h1>\n"
         f"<p><strong>{escape(mechanism.title)}.</strong> "
         f"{escape(mechanism.description.strip())}</p>\n{live.markup if live else ''}\n{figure}\n"
-        f"<p>{_flexures(mechanism)} Impacts follow the laws of rigid bodies. They are located to "
-        "10<sup>-12</sup> s inside a communication step. Decaying bounces end in "
+        f"<p>{_flexures(mechanism)} {_impacts(mechanism)} Events are located to "
+        "10<sup>-12</sup>&#160;s inside a communication step. Decaying bounces end in "
         "resting contact, which releases when the contact force reaches zero.</p>\n"
         f"<p>{flavour}, generated by {GENERATION_TOOL}.</p>"
     )
@@ -277,6 +303,30 @@ def _stretches(mechanism: Mechanism) -> bool:
     return any(kind.axial for kind in mechanism.flexure_types)
 
 
+STOP_LAWS = {
+    RIGID: "<p>At an impact on a rigid stop,</p>\n"
+    + formula(
+        "M (v^+ - v^-) + Phi_q^T Lambda = G^T P",
+        "Phi_q v^+ = 0",
+        "dot(g)^+ = -restitution dot(g)^-",
+        "P >= 0",
+    )
+    + "\n<p>With friction at the stop, the coefficient of restitution is energetic (Stronge), so "
+    "that no impact gains energy. Without friction it equals Newton's coefficient.</p>\n",
+    COMPLIANT: f"<p>A compliant stop with the indentation {inline('d = -g')} has the contact "
+    "force</p>\n"
+    + formula(
+        "F = max(0, k d^n (1 + alpha dot(d)/v_0))",
+        "(1 + alpha)/(1 - epsilon alpha) = exp((1 + epsilon) alpha)",
+    )
+    + f"\n<p>with {inline('k')} the <code>stiffness</code>, {inline('n')} the "
+    f"<code>exponent</code>, {inline('epsilon')} the <code>restitution</code> of a point mass, and "
+    f"{inline('v_0')} the largest closing speed of the contact so far, at least "
+    "<code>rest_speed</code>. With friction at the stop, F is the normal force. A contact that "
+    "has settled holds like a rigid stop.</p>\n",
+}
+
+
 def _equations(mechanism: Mechanism) -> str:
     flexures = "".join(_flexure_row(mechanism, kind) for kind in mechanism.flexure_types)
     beams = _beams(mechanism)
@@ -288,12 +338,8 @@ def _equations(mechanism: Mechanism) -> str:
     )
     mass = formula("M = Re(bar(e)_i H_{ij} e_j) + diag(J)", "C = -Im(bar(e)_i H_{ij} e_j)")
     loads = "Q = springs + gravity + damping (2 zeta omega_1 M v + beta K v) + friction + inputs"
-    impact = formula(
-        "M (v^+ - v^-) + Phi_q^T Lambda = G^T P",
-        "Phi_q v^+ = 0",
-        "dot(g)^+ = -restitution dot(g)^-",
-        "P >= 0",
-    )
+    laws = _laws(mechanism)
+    loads += " + G^T F" if COMPLIANT in laws else ""
     return (
         "<h2>Equations</h2>\n"
         f"<p>{BEAMS if beams else ''}With the absolute angles {inline('q')} of the links "
@@ -304,10 +350,7 @@ def _equations(mechanism: Mechanism) -> str:
         f"{inline('Phi(q) = 0')} are the loop constraints; positions and velocities are "
         "projected onto them. The gap "
         f"{inline('g')} has the rate {inline('dot(g) = G v + w')}, with {inline('w')} the velocity "
-        f"of the wall. At an impact,</p>\n{impact}\n"
-        "<p>With friction at the stop, the coefficient of restitution is energetic "
-        "(Stronge), so that no impact gains energy. Without friction it equals Newton's "
-        "coefficient.</p>\n"
+        f"of the wall.</p>\n{''.join(STOP_LAWS[law] for law in laws)}"
         '<div class="table"><table><caption>Flexure models</caption><thead><tr><th>type</th>'
         "<th>model</th><th>coefficients (published)</th><th>source</th></tr></thead><tbody>"
         f"{flexures}</tbody></table></div>\n"
@@ -372,6 +415,7 @@ INPUTS_OF_BOTH = (
     "should be the rate of the displacement."
 )
 
+IMPACT_LIMIT = "A rigid impact has an impulse, but no duration and no peak force."
 STOP_LIMITS = (
     "An impact below <code>rest_speed</code> ends in resting contact if the body is "
     "pressed against the stop. Bouncing then ends earlier by at most "
@@ -444,22 +488,26 @@ def _drawn_wall() -> str:
 
 def _limits(mechanism: Mechanism, variables: tuple[Variable, ...], inputs: str) -> str:
     models = {kind.model for kind in mechanism.flexure_types}
-    impact = "A rigid impact has an impulse, but no duration and no peak force."
+    laws = _laws(mechanism)
+    impact = [IMPACT_LIMIT] if RIGID in laws else []
     planar = (
         "The motion is planar. Flexures are slender, of uniform section and of linear elastic "
         "material; they neither yield nor touch each other."
     )
-    rigid = [
-        f"{impact} The duration of a real impact (0.1 ms) is comparable to the period of the axial "
+    duration = (
+        "The duration of a real impact (0.1 ms) is comparable to the period of the axial "
         "vibrations of the flexures (0.5 ms in the steel structure of source 1). This model has no "
-        "axial vibrations, because its flexures do not stretch.",
+        "axial vibrations, because its flexures do not stretch."
+    )
+    rigid = [
+        " ".join([*impact, duration]),
         planar,
         "Flexures that do not stretch keep a body on parallel, straight flexures from turning, so "
         "that the place of a hit has no effect there. With flexures that stretch, a rigid impact "
         "off the centre of mass loses more energy of the fundamental mode. The loss of a real "
         "impact depends on the duration of the contact.",
     ]
-    items = [impact, planar] if _stretches(mechanism) else rigid
+    items = [*impact, planar] if _stretches(mechanism) else rigid
     for name in sorted(models):
         if MODELS[name].coefficients:
             items.append(
@@ -482,7 +530,7 @@ def _limits(mechanism: Mechanism, variables: tuple[Variable, ...], inputs: str) 
             "single impacts cannot be predicted after a few bounces."
         )
     if mechanism.stops:
-        items += STOP_LIMITS
+        items += STOP_LIMITS if RIGID in laws else STOP_LIMITS[1:]
     items.append(inputs)
     return _list("Limits", items)
 

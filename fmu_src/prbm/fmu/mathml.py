@@ -9,8 +9,11 @@ import html
 import re
 from collections.abc import Sequence
 
-GREEK = {"zeta": "ζ", "omega": "ω", "beta": "β", "lambda": "λ", "Lambda": "Λ", "Phi": "Φ"}
-FUNCTIONS = {"Re", "Im", "exp", "diag"}
+GREEK = {
+    "alpha": "\u03b1", "beta": "β", "epsilon": "ε", "zeta": "ζ", "lambda": "λ", "omega": "ω",
+    "Lambda": "Λ", "Phi": "Φ",
+}  # fmt: skip
+FUNCTIONS = {"Re", "Im", "exp", "diag", "max"}
 WORDS = {
     "position", "displacement", "restitution", "springs", "gravity", "damping", "friction",
     "inputs", "force",
