@@ -75,6 +75,7 @@ def test_changed_values_act_as_in_the_native_library():
     [
         ("stop.restitution", "2", "stop.restitution = 2 must be at most 1"),
         ("flexure.thickness", "-1", "flexure.thickness"),
+        ("flexure.thickness", "0.05", "flexure.thickness = 0.05 m is not less than the length"),
         ("stop.position", "NaN", "stop.position"),
         ("shuttle.mass", "Infinity", "shuttle.mass"),
         ("stop.position", "-0.03", "stop"),
@@ -89,6 +90,7 @@ def test_invalid_values_give_the_message_of_the_kernel(name, value, words):
 @pytest.mark.parametrize(
     "chosen",
     [*map(mechanism, ("PRBDM2R", "Bistable", "NotchGuide", "CurvedBistable")), beam_guide()],
+    ids=lambda chosen: chosen.name,
 )
 def test_drawings_equal_those_of_the_python_package(chosen):
     found = simulated(chosen, ["energy.kinetic"], steps=40, drawing=True)

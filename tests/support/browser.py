@@ -1,6 +1,7 @@
 """Chromium without a window, for the tests of pages."""
 
 import json
+import os
 import shutil
 import time
 from collections.abc import Iterator
@@ -10,7 +11,7 @@ from typing import Any
 
 import pytest
 
-SECONDS_MAX = 120.0
+SECONDS_MAX, RULES_SECONDS_MAX = 120.0, 300.0
 WIDE, NARROW = (1360, 900), (390, 800)
 
 
@@ -62,6 +63,22 @@ class Browser:
     def run(self, script: str, *arguments: object) -> Any:
         """Run a script in the page and return its result."""
         return self.driver.execute_script(script, *arguments)
+
+    def check_accessibility(self) -> None:
+        """Assert that axe-core finds nothing serious, and that the page does not scroll sideways.
+
+        Skip the test if the environment variable AXE does not name the script of axe-core.
+        """
+        script = os.environ.get("AXE")
+        if script is None:
+            pytest.skip("the environment variable AXE does not name the file axe.min.js")
+        self.driver.set_script_timeout(RULES_SECONDS_MAX)
+        self.run(Path(script).read_text(encoding="utf-8"))
+        found = self.driver.execute_async_script("axe.run().then(arguments[0])")
+        serious = [v for v in found["violations"] if v["impact"] in ("serious", "critical")]
+        assert [(v["id"], [n["target"] for n in v["nodes"]]) for v in serious] == []
+        width = self.run("return document.documentElement.scrollWidth - window.innerWidth")
+        assert width <= 0
 
     def wait(self, ready: Any) -> dict[str, str]:
         """Wait until the data of the root element satisfy a condition; return them."""

@@ -1,6 +1,7 @@
 // The live page: a simulation for the present parameters, its film, plots, tables and link.
 
 const RUN_AGE_MIN = 120; // Milliseconds that a run gets before a drag replaces it.
+const RUN_TIME_UNNOTICED = 500; // Milliseconds after which the page shows how much is computed.
 const PLOT_PERIOD = 50; // Milliseconds between two drawings of the plots while the film runs.
 
 class Page {
@@ -57,6 +58,7 @@ class Page {
       (handles.length ? `Drag ${handles.join(" or ")}; arrow keys move a focused handle. ` : "") +
       "Drag over a plot to move in time.";
     byId("impact-card").hidden = description.stops.length === 0;
+    byId("links").hidden = description.flexures.every((flexure) => flexure.beam);
     this.listen();
   }
 
@@ -280,6 +282,7 @@ class Page {
 
   showNumbers(now) {
     const { run, description } = this;
+    const time = performance.now();
     this.plots.forEach((plot) =>
       plot.draw(run, now, plot.plot.walls ? this.wallLines() : [], description.stopTime),
     );
@@ -288,7 +291,10 @@ class Page {
       this.listed = key;
       const pairs = headline(description, run, this.column);
       showHeadline(byId("headline"), pairs);
-      byId("brief").textContent = brief(pairs);
+      const slow = !run.finished && time - this.started > RUN_TIME_UNNOTICED;
+      const share = Math.floor((100 * run.count) / run.steps);
+      byId("brief").textContent =
+        (slow ? `Computing, ${share}\u202f% done \u00b7 ` : "") + brief(pairs);
       showImpacts(byId("impacts"), description, run, (time) => this.film.seek(time));
     }
   }
@@ -403,5 +409,8 @@ async function open() {
 open().catch((error) => {
   document.documentElement.dataset.state = "error";
   byId("live").hidden = true;
+  const remedy = "open the page in a current version of Chrome, Edge, Firefox or Safari";
+  const text = `The simulation does not run in this browser (${error.message}): ${remedy}.`;
+  byId("live").before(element("p", { class: "message", role: "alert" }, text));
   console.error(error);
 });

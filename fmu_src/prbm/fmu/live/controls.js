@@ -76,7 +76,11 @@ class Controls {
     const row = { quantity, node, number, slider, reset };
     this.rows.set(quantity.name, row);
     number.addEventListener("change", () =>
-      this.change(quantity.name, parsed(number.value) / quantity.factor, true),
+      this.change(
+        quantity.name,
+        parsed(withoutUnit(number.value, quantity)) / quantity.factor,
+        true,
+      ),
     );
     slider.addEventListener("input", () =>
       this.change(quantity.name, fromSlider(quantity, Number(slider.value)), false),
@@ -141,6 +145,14 @@ function labelled(name) {
 function heading(name) {
   const text = words(name);
   return text.charAt(0).toUpperCase() + text.slice(1);
+}
+
+// Return the text of a field without the unit of its quantity.
+function withoutUnit(text, { shown }) {
+  const clean = text.trim();
+  const units = [shown, unitText(shown)].filter((unit) => unit !== "" && unit !== "1");
+  const unit = units.find((name) => clean.endsWith(name));
+  return unit ? clean.slice(0, -unit.length) : clean;
 }
 
 // Return a number from a text; NaN if it is none.

@@ -27,6 +27,7 @@ class Run {
     this.count = 0; // Rows that have been computed.
     this.impacts = [];
     this.impactCount = 0;
+    this.lost = 0; // Energy lost in all impacts [J].
     this.error = null;
     this.keep();
   }
@@ -51,6 +52,7 @@ class Run {
     try {
       const impacts = this.simulation.advance(this.count * this.step);
       this.impactCount += impacts.length;
+      this.lost += impacts.reduce((sum, impact) => sum + impact.lost, 0);
       if (this.impacts.length < IMPACTS_KEPT_MAX) {
         this.impacts.push(...impacts);
       }

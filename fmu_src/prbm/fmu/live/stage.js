@@ -8,6 +8,8 @@ const HATCHES_MIN = 4; // Strokes of a hatching.
 const HANDLE_OFFSET = [14, 15]; // Pixels of a handle behind its wall and beyond the end of the wall.
 const BOUND_SHAPES = 60; // Shapes of a run that determine the size of the drawing.
 const KEY_STEPS = 100; // Key strokes from one end of a slider to the other.
+const ARROWS = { ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowLeft: [-1, 0], ArrowDown: [0, -1] };
+const ACROSS_RTOL = 0.1; // A smaller share of a key's direction is across the path of a handle.
 
 class Stage {
   // Parameters: the SVG element, the description of the page, and the functions
@@ -83,19 +85,23 @@ class Stage {
       drawn("title", {}, `${name}: drag, or use the arrow keys`),
     );
     this.layers.handles.append(node);
-    node.addEventListener("keydown", (event) => this.keyed(event, name, quantity));
+    node.addEventListener("keydown", (event) => this.keyed(event, node, quantity));
     node.addEventListener("pointerdown", (event) => this.dragged(event, node, name));
     return node;
   }
 
-  keyed(event, name, quantity) {
-    const sign = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key];
-    if (sign === undefined) {
+  // Move a handle in the direction of an arrow key.  A key across its path changes the value: up and
+  // right increase it.
+  keyed(event, node, { name, slider }) {
+    const arrow = ARROWS[event.key];
+    if (arrow === undefined) {
       return;
     }
     event.preventDefault();
-    const step =
-      ((quantity.slider.high - quantity.slider.low) / KEY_STEPS) * (event.shiftKey ? 5 : 1);
+    const [x, y] = [0, 1].map((axis) => arrow[axis] * node.along[axis]);
+    const across = Math.abs(x + y) < ACROSS_RTOL * norm(node.along);
+    const sign = Math.sign(across ? arrow[0] + arrow[1] : x + y);
+    const step = ((slider.high - slider.low) / KEY_STEPS) * (event.shiftKey ? 5 : 1);
     this.actions.drag(name, rounded(this.actions.value(name) + sign * step, step / 10), true);
   }
 
@@ -355,9 +361,11 @@ class Stage {
       "transform",
       `translate(${x.toFixed(2)},${y.toFixed(2)}) rotate(${angle.toFixed(2)})`,
     );
-    handle.setAttribute("aria-valuemin", digits(quantity.slider.low));
-    handle.setAttribute("aria-valuemax", digits(quantity.slider.high));
-    handle.setAttribute("aria-valuenow", digits(value));
+    // Numbers in the shown unit, without exponents, which are not valid here.
+    const number = (x) => (x * quantity.factor).toFixed(6);
+    handle.setAttribute("aria-valuemin", number(quantity.slider.low));
+    handle.setAttribute("aria-valuemax", number(quantity.slider.high));
+    handle.setAttribute("aria-valuenow", number(value));
     handle.setAttribute("aria-valuetext", quantityText(value, quantity));
   }
 }

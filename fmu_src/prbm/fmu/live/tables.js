@@ -24,27 +24,48 @@ function headline(description, run, column) {
   if (stops.length === 0) {
     return [["Simulated", timeText(run.time, run.time)], ...stress];
   }
-  const { impacts, impactCount } = run;
-  const [first, last] = [impacts[0], impacts.at(-1)];
+  const last = (output) => stops.map(({ name }) => run.last(column.get(`${name}.${output}`)));
+  const count = last("impact_count").reduce((sum, n) => sum + n, 0); // Includes unfinished contacts.
+  const latest = Math.max(...last("impact_time"));
+  const [first] = run.impacts;
+  const unfinished = count ? "in contact" : "none";
   const speed = { factor: 1, shown: "m/s" };
   const resting = stops.filter((stop) => run.last(column.get(`${stop.name}.contact`)) > 0.5);
-  const lost = impacts.reduce((sum, impact) => sum + impact.lost, 0);
   const state = resting.length
     ? `at rest on ${resting.map((stop) => words(stop.name)).join(", ")}`
     : "moving";
   return [
-    ["Impacts", `${impactCount}`],
+    ["Impacts", `${count}`],
     [
       "First impact",
       first
         ? `${quantityText(first.approach, speed, 4)} at ${timeText(first.time, first.time)}`
-        : "none",
+        : unfinished,
     ],
-    ["Last impact", last ? timeText(last.time, last.time) : "none"],
-    ["Lost in impacts", quantityText(lost, prefixed(lost, "J"), 3)],
+    ["Last impact", count ? timeText(latest, latest) : "none"],
+    ["Lost in impacts", quantityText(run.lost, prefixed(run.lost, "J"), 3)],
     ["At the end", state],
+    ...peakForce(description, run, column),
     ...stress,
   ];
+}
+
+// Return the entry of the headline about the largest contact force so far; empty without compliant
+// stops.  The columns contain contacts that are not counted as impacts, and the contact at the end;
+// the impacts contain those between two rows.
+function peakForce({ stops }, run, column) {
+  const peaks = stops
+    .map(({ name }) => column.get(`${name}.peak_force`))
+    .filter((output) => output !== undefined);
+  if (peaks.length === 0) {
+    return [];
+  }
+  const inRows = peaks.map((output) => range(run, output)[1]);
+  const largest = run.impacts.reduce(
+    (most, impact) => Math.max(most, impact.peakForce),
+    Math.max(...inRows),
+  );
+  return [["Peak force", quantityText(largest, prefixed(largest, "N"), 4)]];
 }
 
 // Return the entry of the headline about the largest stress so far, and the safety factor that is
@@ -88,6 +109,17 @@ function showHeadline(parent, pairs) {
   );
 }
 
+// Move between rows with the arrow keys; the Enter key calls show().
+function chooseRow(event, line, show) {
+  const neighbours = { ArrowDown: line.nextElementSibling, ArrowUp: line.previousElementSibling };
+  if (event.key in neighbours) {
+    event.preventDefault();
+    neighbours[event.key]?.focus();
+  } else if (event.key === "Enter") {
+    show();
+  }
+}
+
 // Fill the table of impacts.  seek(time) is called for the time of a row.
 function showImpacts(table, description, run, seek) {
   const several = description.stops.length > 1;
@@ -106,7 +138,8 @@ function showImpacts(table, description, run, seek) {
   });
   const titles = columns.map(([title], k) => {
     const unit = unitText(units[k].shown);
-    return element("th", { scope: "col" }, unit ? `${title} [${unit}]` : title);
+    const shown = unit ? [" ", element("span", { class: "title-unit" }, `[${unit}]`)] : [];
+    return element("th", { scope: "col" }, title, ...shown);
   });
   const body = rows.map((row, i) => {
     const cells = columns.map(([, unit, value], k) => {
@@ -117,13 +150,18 @@ function showImpacts(table, description, run, seek) {
         unit ? digits(x * units[k].factor, 5).replace("-", "\u2212") : String(x),
       );
     });
-    const line = element("tr", { "data-time": row.time }, ...cells);
-    line.addEventListener("click", () => seek(row.time));
+    const line = element("tr", { "data-time": row.time, tabindex: i === 0 ? 0 : -1 }, ...cells);
+    const show = () => seek(row.time);
+    line.addEventListener("click", show);
+    line.addEventListener("keydown", (event) => chooseRow(event, line, show));
     return line;
   });
-  const none = element("tr", {}, element("td", { colspan: columns.length }, "No impact."));
+  const wide = (text) => element("tr", {}, element("td", { colspan: columns.length }, text));
+  if (run.impactCount > rows.length) {
+    body.push(wide(`The first ${rows.length} of ${run.impactCount} impacts.`));
+  }
   table.replaceChildren(
     element("thead", {}, element("tr", {}, ...titles)),
-    element("tbody", {}, ...(body.length ? body : [none])),
+    element("tbody", {}, ...(body.length ? body : [wide("No impact.")])),
   );
 }
