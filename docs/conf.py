@@ -33,7 +33,7 @@ html_theme = "furo"
 html_title = "prbm-impact"
 html_math_renderer = "mathml"
 html_show_sourcelink = html_copy_source = False
-html_show_sphinx = False
+html_show_sphinx = html_show_copyright = False
 html_favicon = str(HERE / "website" / "static" / "logo.svg")
 html_css_files = ["live.css", "site.css"]
 html_js_files = ["site.js"]

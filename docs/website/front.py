@@ -13,7 +13,7 @@ from sources import HEADING, HIDDEN, Sources, readers
 TEXT = Path(__file__).with_name("front.md")
 INDEX = PurePosixPath("docs/index.md")
 ENTRIES = 4  # Links of an entrance.
-FIRST = ("Installation and first run <README.md>", "gallery/index.md")
+FIRST = ("README.md", "gallery/index.md")
 FOR_ALL = ("examples/README.md", "api/index.md", "docs/glossary.md", "All pages <docs/index.md>")
 ELSEWHERE = ("README.md", "examples/README.md", "docs/glossary.md")  # Not in the lists of readers.
 

@@ -9,7 +9,9 @@ import links
 
 ROOT_PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")
 FOLDERS = ("docs", "examples")
+TITLES = {"README.md": "Installation and first run"}  # The front page has the name of the package.
 LANGUAGES = {".py": "python", ".toml": "toml", ".c": "c", ".h": "c", ".sh": "sh", ".json": "json"}
+TITLE = re.compile(r"^# .+$", re.MULTILINE)
 HEADING = re.compile(r"^## (.+)$", re.MULTILINE)
 HIDDEN = "```{toctree}\n:hidden:\n"
 
@@ -101,6 +103,8 @@ class Sources:
         if page.suffix != ".md":
             return text
         text = links.for_site(self.root, page, text)
+        if title := TITLES.get(str(page)):
+            text = TITLE.sub(f"# {title}", text, count=1)
         return text + self._contents(page) if page.name == "README.md" else text
 
     def _contents(self, page: PurePosixPath) -> str:

@@ -7,6 +7,7 @@ from pathlib import PurePosixPath
 
 import pytest
 
+import front
 import links
 import prbm
 import sources
@@ -75,6 +76,15 @@ def test_every_page_has_one_place_in_the_contents():
     assert {f"{path.name}" for path in (ROOT / "docs").glob("*.md")} - {*listed} == {
         "index.md", "glossary.md"
     }  # fmt: skip
+
+
+def test_the_pages_of_the_site_have_different_titles(tmp_path):
+    """Links to the previous and the next page show titles."""
+    made = sources.Sources(ROOT, tmp_path)
+    made.write()
+    texts = [(tmp_path / page).read_text("utf-8") for page in made.pages if page.suffix == ".md"]
+    titles = [front.title(text) for text in (*texts, front.TEXT.read_text("utf-8"))]
+    assert len({*titles}) == len(titles)
 
 
 def named(name: str) -> object:
