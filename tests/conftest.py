@@ -15,6 +15,7 @@ from shared import once
 from support import GUIDES, SUPPORT, mechanism
 
 collect_ignore = ["support"]  # Modules that tests import; they contain no tests.
+LONGEST = "tests/project/test_wheel_with_libraries.py"  # It takes minutes and is started first.
 
 
 class FmuCache(dict[Any, Path]):
@@ -38,12 +39,13 @@ def further_mechanisms() -> dict[str, set[str]]:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark tests with the further mechanisms of a function as slow."""
+    """Mark tests with the further mechanisms of a function as slow; put the longest tests first."""
     further = further_mechanisms()
     for item in items:
         name, _, parameters = item.nodeid.partition("[")
         if further.get(name, set()) & {*parameters.rstrip("]").split("-")}:
             item.add_marker(pytest.mark.slow)
+    items.sort(key=lambda item: not item.nodeid.startswith(LONGEST))
 
 
 @pytest.fixture(scope="session")

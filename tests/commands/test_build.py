@@ -131,6 +131,23 @@ def test_without_a_compiler_only_the_python_fmus_are_built(tmp_path, monkeypatch
     assert printed.err.count("\n") == 1
 
 
+@pytest.mark.native
+def test_the_reason_for_a_page_without_simulation_is_a_sentence(tmp_path, monkeypatch, capsys):
+    found = compiler.importlib.util.find_spec
+    monkeypatch.setattr(
+        compiler.importlib.util,
+        "find_spec",
+        lambda name: None if name == "ziglang" else found(name),
+    )
+    monkeypatch.setattr(compiler, "prebuilt", lambda *arguments: None)
+    assert cli.main(["--model", "PRBDM", "--fmi", "3", "--out", str(tmp_path)]) == cli.OK
+    *stages, written = capsys.readouterr().out.splitlines()
+    (reason,) = [line for line in stages if not line.endswith(" ...")]
+    assert reason.startswith("fmi3/PRBDM: the documentation has no simulation: a page that")
+    assert reason.endswith(": install it with 'python -m pip install ziglang'.")
+    assert written.endswith(" kB)")
+
+
 @pytest.mark.usefixtures("_no_compiler")
 @pytest.mark.parametrize("options", ["--flavour native", "--fmi 2", "--clock", "--platform host"])
 def test_selecting_native_fmus_without_a_compiler_fails(options, tmp_path, monkeypatch, capsys):

@@ -1,5 +1,7 @@
 """FMUs of a mechanism with a compliant stop: Python FMUs equal the engine."""
 
+from dataclasses import replace
+
 import fmpy
 import numpy as np
 import pytest
@@ -7,8 +9,13 @@ from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 
 from point_mass import point_mass
+from prbm.fmu import mathml
+from prbm.fmu.documentation import page
+from prbm.fmu.python_fmu import interface
 from prbm.hybrid.simulation import Simulation
-from support import own_fmu
+from prbm.mechanism.parts import LAWS
+from prbm.runs.experiment import Experiment
+from support import mechanism, own_fmu
 
 END, STEP = 2e-3, 5e-5
 OUTPUTS = (
@@ -36,7 +43,6 @@ def test_fmus_with_a_compliant_stop_simulate_like_the_engine(path, events):
     description = read_model_description(path)
     if events and description.fmiVersion != "3.0":
         pytest.skip("FMI 3.0 only")
-    assert not validate_fmu(path)
     python = description.coSimulation.needsExecutionTool
     assert (description.modelExchange is None) == bool(python)
     found = simulate_fmu(
@@ -62,7 +68,9 @@ def test_fmus_with_a_compliant_stop_simulate_like_the_engine(path, events):
 @pytest.mark.fmu
 @pytest.mark.native
 def test_parameters_and_outputs_of_a_compliant_stop_have_their_units(path):
-    found = {v.name: v for v in read_model_description(path).modelVariables}
+    description = read_model_description(path)
+    assert not validate_fmu(path)
+    found = {v.name: v for v in description.modelVariables}
     units = {name: found[f"stop.{name}"].unit for name in (
         "stiffness", "restitution", "force", "peak_force", "indentation", "contact_duration"
     )}  # fmt: skip
@@ -148,3 +156,23 @@ def test_model_exchange_with_a_compliant_stop_is_the_motion_of_the_engine(
                 name,
             )
     assert expected["stop.impact_count"] == 1
+
+
+@pytest.mark.parametrize("laws", [("rigid", "rigid"), ("compliant", "compliant"), LAWS])
+def test_the_documentation_states_the_laws_of_the_stops(laws):
+    model = mechanism("Bistable")
+    stops = [
+        replace(stop, law=law, stiffness=1e5 if law == "compliant" else None)
+        for stop, law in zip(model.stops, laws, strict=True)
+    ]
+    chosen = replace(model, stops=tuple(stops))
+    text = page(chosen, interface(chosen, {}), Experiment(1.0))
+    for statement in ("At an impact on a rigid stop,", mathml.row("P >= 0"), "A rigid impact has"):
+        assert (statement in text) == ("rigid" in laws)
+    for statement in (
+        mathml.row("F = max(0, k d^n (1 + alpha dot(d)/v_0))"),
+        mathml.row("(1 + alpha)/(1 - epsilon alpha) = exp((1 + epsilon) alpha)"),
+        mathml.row("+ G^T F").removeprefix("<mrow>"),
+        "(compliant stops)",
+    ):
+        assert (statement in text) == ("compliant" in laws)

@@ -4,7 +4,6 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-import lief
 import numpy as np
 import pytest
 
@@ -25,6 +24,8 @@ from c_importer import (
 )
 
 pytestmark = [pytest.mark.native, pytest.mark.slow]
+
+# Functions import lief, because this takes half a second in each process that collects tests.
 
 POINTS = 1e-3 * np.arange(301)
 SYSTEMS = {
@@ -70,6 +71,8 @@ def functions_of_the_standards() -> set[str]:
 
 def dependencies(library) -> set[str]:
     """Return the names of the libraries that a library needs."""
+    import lief
+
     if isinstance(library, lief.MachO.Binary):
         own = lief.MachO.LoadCommand.TYPE.ID_DYLIB
         return {item.name for item in library.libraries if item.command != own}
@@ -80,6 +83,8 @@ def dependencies(library) -> set[str]:
 
 def exported(library) -> set[str]:
     """Return the names that a library exports."""
+    import lief
+
     if isinstance(library, lief.PE.Binary):
         return {entry.name for entry in library.get_export().entries}
     names = {symbol.name for symbol in library.exported_symbols}
@@ -91,6 +96,8 @@ def exported(library) -> set[str]:
 
 @pytest.mark.parametrize("platform", PLATFORMS)
 def test_a_library_is_for_its_platform_and_exports_only_functions_of_fmi(library, platform):
+    import lief
+
     machine, _, system = platform.partition("-")
     found = lief.parse(str(library(3, platform)))
     assert exported(found) == functions_of_the_standards()
@@ -104,6 +111,8 @@ def test_a_library_is_for_its_platform_and_exports_only_functions_of_fmi(library
 
 @pytest.mark.parametrize("machine", MACHINES)
 def test_the_linux_library_runs_with_glibc_2_17(library, machine):
+    import lief
+
     found = lief.parse(str(library(3, f"{machine}-linux")))
     versions = [
         symbol.name
@@ -119,6 +128,8 @@ def test_the_linux_library_runs_with_glibc_2_17(library, machine):
 @pytest.mark.parametrize("machine", MACHINES)
 def test_the_macos_library_is_a_dylib_for_macos_11(library, machine):
     """On ARM64 the library needs a signature; the anonymous one of the linker is sufficient."""
+    import lief
+
     found = lief.parse(str(library(3, f"{machine}-darwin")))
     assert found.header.file_type == lief.MachO.Header.FILE_TYPE.DYLIB
     assert tuple(found.build_version.minos[:2]) <= OLDEST_MACOS

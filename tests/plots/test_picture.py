@@ -362,6 +362,8 @@ def test_the_svg_icon_has_the_parts_of_the_png_at_the_same_places(name: str) -> 
     assert len(found) == len(chosen.bodies)
     with Image.open(BytesIO(icon(chosen, sample))) as image:
         pixels = np.array(image.convert("RGB"))
+    assert ElementTree.fromstring(drawing).find(f"{{{SVG}}}rect").get("fill") == "#ffffff"
+    assert (pixels[0, 0] == 255).all()
     color = [int(BODY[k : k + 2], 16) for k in (1, 3, 5)]
     for corners_of_body in found:
         assert corners_of_body.min() > 0.0

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from fmpy import simulate_fmu
 
-from prbm.kernel.compiler import BROWSER, LIVE, PLATFORMS, PRODUCTS
+from prbm.kernel.compiler import BROWSER, LIVE, PLATFORMS, PRODUCTS, cache_folder
 
 ROOT = Path(__file__).parents[2]
 
@@ -19,8 +19,15 @@ pytestmark = [pytest.mark.slow, pytest.mark.native]
 
 
 def built(folder: Path) -> Path:
-    """Build the wheel with an empty cache of libraries; return its path."""
+    """Build the wheel with an empty cache of libraries; return its path.
+
+    The caches of all builds share the folder in which ziglang keeps the libraries of the systems.
+    """
     pytest.importorskip("ziglang")
+    kept, cache = cache_folder() / "zig", folder / "cache" / cache_folder().name
+    for path in (kept, cache):
+        path.mkdir(parents=True, exist_ok=True, mode=0o700)
+    (cache / "zig").symlink_to(kept)
     subprocess.run(
         [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", folder / "dist"],
         cwd=ROOT, check=True, capture_output=True,

@@ -170,7 +170,7 @@ def test_the_missing_term_does_not_cancel_in_a_four_bar_linkage_with_unequal_lin
 # --- Impacts detected between steps -----------------------------------------------------------
 
 
-@pytest.mark.parametrize("step", [2**-11, 2**-13, 2**-15])
+@pytest.mark.parametrize("step", [2**-11, 2**-13, pytest.param(2**-15, marks=pytest.mark.slow)])
 def test_an_impact_is_detected_up_to_a_step_late(step):
     """The 1R guide is one equation, theta'^2 = 2 (E - V)/(m r^2), solved by quadrature.
 

@@ -19,6 +19,7 @@ import fmpy
 import numpy as np
 import pytest
 from fmpy import read_model_description
+from fmpy.model_description import ModelDescription
 
 import prbm.kernel
 from many_parts import anvil
@@ -133,6 +134,11 @@ def importer(host: Host = NATIVE, flags: tuple[str, ...] = ()) -> Path:
     return once(name, lambda path: compile_c(path, sources, [*flags, *system], host.target))
 
 
+@cache
+def _description(folder: Path) -> ModelDescription:
+    return read_model_description(str(folder))
+
+
 @dataclass(frozen=True)
 class Job:
     """A simulation of an unpacked FMU by the importer.
@@ -177,7 +183,7 @@ class Job:
 
     def text(self) -> str:
         """Return the text of the job file."""
-        found = read_model_description(str(self.folder))
+        found = _description(self.folder)
         variables = {v.name: v for v in found.modelVariables if v.type in TYPES}
         version = int(found.fmiVersion[0])
         interface = found.modelExchange if self.kind == "me" else found.coSimulation
@@ -217,7 +223,7 @@ class Job:
 
     def names(self) -> list[str]:
         """Return the names of the recorded variables: the columns after the time."""
-        found = read_model_description(str(self.folder))
+        found = _description(self.folder)
         return [*self.records] or [v.name for v in found.modelVariables if v.type in TYPES]
 
     def on(self, host: Host) -> "Job":
@@ -311,12 +317,16 @@ def described(model: str) -> Mechanism:
 
 @cache
 def host_fmu(model: str, fmi: int) -> Path:
-    """Return the path of the native FMU of a mechanism for this machine."""
+    """Return the path of the native FMU of a mechanism for this machine.
+
+    One process builds both versions, because they have the same reference results.
+    """
 
     def make(folder: Path) -> None:
-        write(folder / f"{model}.fmu", built(described(model), fmi))
+        for version in (2, 3):
+            write(folder / f"fmi{version}" / f"{model}.fmu", built(described(model), version))
 
-    return once(f"fmi{fmi}-{model}", make) / f"{model}.fmu"
+    return once(f"native-{model}", make) / f"fmi{fmi}" / f"{model}.fmu"
 
 
 @cache

@@ -1,6 +1,7 @@
 """An importer of native FMUs for the tests: one interface to FMPy's classes for both versions."""
 
 from collections.abc import Callable, Iterable, Mapping
+from copy import copy
 from ctypes import byref, c_double
 from functools import cache
 from pathlib import Path
@@ -30,6 +31,9 @@ TYPES = {REAL: "Float64", INTEGER: "Int32", BOOLEAN: "Boolean"}
 INTERFACES = ((2, "cs"), (2, "me"), (3, "cs"), (3, "events"), (3, "me"))
 """Version and interface; events: co-simulation with event mode and early return."""
 
+VERSIONS = {2: (FMU2Slave, FMU2Model), 3: (FMU3Slave, FMU3Model)}
+"""FMPy's classes of both versions, for co-simulation and for model exchange."""
+
 _folders: list[TemporaryDirectory[str]] = []
 _listeners: dict[int, list[tuple[int, str, str]]] = {}
 
@@ -41,6 +45,17 @@ def unpacked(fmu: Path) -> tuple[Path, ModelDescription]:
     _folders.append(folder)
     extract(str(fmu), folder.name)
     return Path(folder.name), read_model_description(folder.name)
+
+
+@cache
+def _loaded(version: int, exchanges: bool, folder: Path, identifier: str) -> Any:
+    """Return FMPy's object of a library, which stays loaded until the process ends.
+
+    FMPy takes much longer to find the types of all functions than to load the library.
+    """
+    return VERSIONS[version][exchanges](
+        guid=None, unzipDirectory=str(folder), modelIdentifier=identifier
+    )
 
 
 def _log2(listener: int, _: bytes, status: int, category: bytes, text: bytes) -> None:
@@ -114,23 +129,13 @@ class Instance:
         self.references = {name: v.valueReference for name, v in self.variables.items()}
         self.log: list[tuple[int, str, str]] = []
         self.time, self.substep = 0.0, substep
-        self.fmu = self._loaded(name, guid)
-        try:
-            self._instantiate(logging, options)
-        except BaseException:
-            self.fmu.freeLibrary()
-            raise
-
-    def _loaded(self, name: str, guid: str | None) -> Any:
-        two = {False: FMU2Slave, True: FMU2Model}
-        three = {False: FMU3Slave, True: FMU3Model}
         interface = self.description.coSimulation or self.description.modelExchange
-        return {2: two, 3: three}[self.version][self.exchanges](
-            guid=self.description.guid if guid is None else guid,
-            unzipDirectory=str(self.folder),
-            modelIdentifier=interface.modelIdentifier,
-            instanceName=name,
-        )
+        library = _loaded(self.version, self.exchanges, self.folder, interface.modelIdentifier)
+        self.fmu = copy(library)
+        self.fmu.instanceName = name
+        self.fmu.guid = self.description.guid if guid is None else guid
+        self.fmu.freeLibrary = lambda: None
+        self._instantiate(logging, options)
 
     def _instantiate(self, logging: bool, options: Mapping[str, Any]) -> None:
         if self.version == 2:

@@ -11,6 +11,7 @@ signature to the last brace, without blank lines and comments.
 import ast
 import re
 from collections.abc import Iterable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -60,6 +61,12 @@ class Sizes(NamedTuple):
     functions: list[Size]
 
 
+@cache
+def _parsed(text: str) -> ast.Module:
+    return ast.parse(text)
+
+
+@cache
 def measured(root: Path = ROOT, folders: Iterable[str] = FOLDERS) -> Sizes:
     """Return the sizes of files, classes and functions in the Python and C files of folders."""
     sizes = Sizes([], [], [])
@@ -79,7 +86,7 @@ def measured(root: Path = ROOT, folders: Iterable[str] = FOLDERS) -> Sizes:
 
 def python_classes(text: str, place: str) -> Iterator[Size]:
     """Yield the classes of a Python file and the number of methods of each."""
-    for node in ast.walk(ast.parse(text)):
+    for node in ast.walk(_parsed(text)):
         if isinstance(node, ast.ClassDef):
             count = sum(isinstance(x, ast.FunctionDef | ast.AsyncFunctionDef) for x in node.body)
             yield Size(count, node.name, f"{place}:{node.lineno}")
@@ -87,7 +94,7 @@ def python_classes(text: str, place: str) -> Iterator[Size]:
 
 def python_functions(text: str, place: str) -> Iterator[Size]:
     """Yield the functions and methods of a Python file with the lengths of their bodies."""
-    for node in ast.walk(ast.parse(text)):
+    for node in ast.walk(_parsed(text)):
         if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             continue
         body = node.body

@@ -5,6 +5,7 @@ import json
 import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from importlib.resources import files as package_files
 from importlib.resources.abc import Traversable
 
@@ -136,7 +137,8 @@ def _sources(
             yield f"pythonfmu/{entry.name}", entry.read_bytes()
 
 
-def shipped_modules() -> dict[str, bytes]:
+@cache
+def shipped_modules() -> Mapping[str, bytes]:
     """Return the slave and all modules that it imports, directly or indirectly, by path."""
     found: dict[str, bytes] = {}
     waiting = [SLAVE]
