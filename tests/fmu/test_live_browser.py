@@ -371,8 +371,15 @@ def test_texts_with_markup_are_shown_as_text(browser, tmp_path):
     assert HOSTILE in browser.run("return document.getElementById('fields').textContent")
 
 
+# Thick flexures without damping: about ten thousand impacts in the default run.
+THOUSANDS_OF_IMPACTS = (
+    "flexure.thickness=0.03&damping.zeta=0&damping.beta=0&stop.restitution=0.999"
+    "&solver.tolerance=1e-12"
+)
+
+
 def test_a_slow_run_shows_its_progress_and_can_be_replaced(browser, guide):
-    browser.view(guide, "#flexure.thickness=0.02")
+    browser.view(guide, f"#{THOUSANDS_OF_IMPACTS}")
     browser.wait(lambda data: browser.find("#brief").text.startswith("Computing, "))
     data = browser.wait(lambda data: data["state"] == "running")
     assert "impacts" not in data
