@@ -244,14 +244,15 @@ def test_files_are_written_completely_or_not_at_all(tmp_path, monkeypatch, failu
     assert [*tmp_path.iterdir()] == [path]
 
 
-def test_no_file_is_written_if_one_mechanism_fails(tmp_path, monkeypatch, capsys):
+def test_no_file_is_written_if_one_mechanism_fails(tmp_path, monkeypatch, capfd):
     """The 2R guide, the second mechanism, has no equilibrium under a weight that buckles it."""
     monkeypatch.chdir(tmp_path)
     options = ["--set", "gravity.x=0", "--set", "gravity.y=-100"]
     assert cli.main([*GUIDES, *options]) == cli.MISTAKE
-    printed = capsys.readouterr()
+    printed = capfd.readouterr()
     assert "python/PRBDM: packing" in printed.out
     assert "PRBDM2R: release.displacement = -0.018 m cannot be reached" in printed.err
+    assert printed.err.count("\n") == 1
     assert [*tmp_path.iterdir()] == []
 
 
@@ -269,7 +270,7 @@ def test_ctrl_c_during_the_build_leaves_no_file(tmp_path, monkeypatch, capsys):
 
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(python_fmu, "zipped", interrupted)
-    assert cli.main([*GUIDES]) == cli.INTERRUPTED
+    assert cli.main(["--model", "PRBDM"]) == cli.INTERRUPTED
     assert capsys.readouterr().err == "build_fmu.py: interrupted\n"
     assert [*tmp_path.iterdir()] == []
 
@@ -480,6 +481,24 @@ def test_ctrl_c_ends_a_simulation_without_a_summary(fmus, tmp_path, moment):
         printed, errors = process.stdout.read(), process.stderr.read()
     assert printed == "interrupted\n"
     assert "Traceback" not in errors
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name != "posix", reason="sends a signal to a group of processes")
+@pytest.mark.parametrize("moment", [0.0, 0.2, 1.0])
+def test_ctrl_c_ends_the_processes_of_a_build(tmp_path, moment):
+    """The processes start together with the first of them, whose line is read."""
+    with subprocess.Popen(
+        [sys.executable, str(BUILD), "--flavour", "python"], cwd=tmp_path, stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE, text=True, process_group=0, preexec_fn=interruptible,
+    ) as process:  # fmt: skip
+        assert "checking the start" in process.stdout.readline()
+        time.sleep(moment)
+        os.killpg(process.pid, signal.SIGINT)
+        errors = process.stderr.read()
+    assert process.returncode == cli.INTERRUPTED
+    assert errors == "build_fmu.py: interrupted\n"
+    assert list(tmp_path.rglob("*.fmu")) == []
 
 
 @pytest.mark.parametrize(

@@ -274,11 +274,11 @@ def test_without_a_kernel_the_processes_are_given_the_python_engine(mechanisms, 
     monkeypatch.setattr(module, "kernel_available", lambda: False)
     setups = []
 
-    def pool(processes, context, prepare, arguments):
-        setups.extend(arguments)
+    def executor(processes, prepare, setup):
+        setups.append(setup)
         raise InterruptedError
 
-    monkeypatch.setattr(module, "ProcessPoolExecutor", pool)
+    monkeypatch.setattr(module, "executor", executor)
     varied = {"stop.position": [0.0, 1e-3]}
     for given, used in ((None, "python"), ("kernel", "kernel")):
         with pytest.raises(InterruptedError):
@@ -289,12 +289,11 @@ def test_without_a_kernel_the_processes_are_given_the_python_engine(mechanisms, 
 def test_the_number_of_processes_has_a_limit(mechanisms, monkeypatch):
     started = []
 
-    def pool(processes, *_):
+    def executor(processes, *_):
         started.append(processes)
         raise InterruptedError
 
-    monkeypatch.setattr(module, "ProcessPoolExecutor", pool)
-    monkeypatch.setattr(module, "PROCESSES_MAX", 61)
+    monkeypatch.setattr(module, "executor", executor)
     for workers, processes in ((100, 61), (3, 3)):
         with pytest.raises(InterruptedError):
             study(

@@ -16,6 +16,7 @@ from typing import NoReturn
 
 from ..base.atomic import check_no_folder, check_writable, write
 from ..base.errors import PrbmError
+from ..base.processes import executor, process_count
 from ..base.version import __version__
 from ..files.mechanism_file import read_mechanism, schema, shipped
 from ..files.settings import UserMistake, assigned, units_of
@@ -329,26 +330,47 @@ def _build(plan: BuildPlan) -> tuple[list[Path], str]:
     Without a compiler, the native FMUs are missing.  That is an error if an option selects native
     FMUs; otherwise the Python FMUs are built.
     """
-    built: dict[Path, bytes] = {}
-    missing = ""
+    processes = process_count(len(plan.mechanisms))
+    order = sorted(plan.mechanisms, key=lambda m: -len(m.flexures))  # These take longest.
+    with executor(processes) as pool:
+        tasks = [pool.submit(_fmus, plan, mechanism) for mechanism in order]
+        done = {m.name: task.result() for m, task in zip(order, tasks, strict=True)}
+    written = []
+    for flavour in plan.flavours:
+        for mechanism in plan.mechanisms:
+            fmus, _ = done[mechanism.name]
+            if flavour in fmus:
+                path = plan.path(flavour, mechanism.name)
+                _write(path, fmus[flavour])
+                written.append(path)
+    return written, next((missing for _, missing in done.values() if missing), "")
+
+
+def _write(path: Path, content: bytes) -> None:
+    """Write an FMU and print its size."""
+    try:
+        write(path, content)
+    except OSError as error:
+        raise UserMistake(
+            f"cannot write {path}: {error.strerror}; choose another folder with --out"
+        ) from None
+    print(f"{path.stem}: {path} ({len(content) / 1000:.0f} kB)", flush=True)
+
+
+def _fmus(plan: BuildPlan, mechanism: Mechanism) -> tuple[dict[Flavour, bytes], str]:
+    """Return the FMUs of a mechanism, and a sentence about missing ones.
+
+    They are built in one process, because they share results in memory.
+    """
+    fmus: dict[Flavour, bytes] = {}
     try:
         for flavour in plan.flavours:
-            for mechanism in plan.mechanisms:
-                path = plan.path(flavour, mechanism.name)
-                built[path] = _fmu(plan, flavour, mechanism)
+            fmus[flavour] = _fmu(plan, flavour, mechanism)
     except CompilerError as error:
         if plan.native_required:
             raise
-        missing = f"only the Python FMUs were built: {error}"
-    for path, content in built.items():
-        try:
-            write(path, content)
-        except OSError as error:
-            raise UserMistake(
-                f"cannot write {path}: {error.strerror}; choose another folder with --out"
-            ) from None
-        print(f"{path.stem}: {path} ({len(content) / 1000:.0f} kB)", flush=True)
-    return [*built], missing
+        return fmus, f"only the Python FMUs were built: {error}"
+    return fmus, ""
 
 
 def _fmu(plan: BuildPlan, flavour: Flavour, mechanism: Mechanism) -> bytes:

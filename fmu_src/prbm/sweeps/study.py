@@ -8,12 +8,8 @@ with its message.  The best sample is refined by further simulations.
 
 import itertools
 import math
-import multiprocessing
-import os
-import signal
-import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from time import perf_counter
@@ -24,6 +20,7 @@ from scipy.optimize import minimize, minimize_scalar
 
 from ..base.errors import ParameterError, PrbmError
 from ..base.names import proposal
+from ..base.processes import executor, process_count
 from ..base.progress import Progress
 from ..hybrid.configuration import checked_tolerance
 from ..hybrid.given import start_values
@@ -49,7 +46,6 @@ REFINED_RTOL = 1e-3  # Tolerance of the refined parameters, relative to the dist
 ROUNDS_MAX = 4  # Repetitions of the refinement.
 REFINEMENTS_MAX = 40  # Simulations that refine an optimum.
 REFINEMENTS_EXPECTED = 30  # Usual number of simulations of a refinement, for the progress.
-PROCESSES_MAX = 61 if sys.platform == "win32" else math.inf  # Windows waits for no more.
 LAST_FRACTION = 0.99  # Reported progress while a refinement takes more simulations than usual.
 EDGE_RTOL = 0.02  # Tolerance of the ends of the flat range, relative to the distance of samples.
 NAMES_LISTED_MAX = 12  # Messages about unknown outputs do not list more names.
@@ -381,7 +377,6 @@ _setup: Setup | None = None  # The study of a worker process.
 def _prepare(setup: Setup) -> None:
     """Keep the study in a worker process."""
     global _setup
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # The main process handles Ctrl-C.
     _setup = setup
 
 
@@ -391,40 +386,21 @@ def _run(values: Mapping[str, float]) -> Outcome:
     return _setup.run(values)
 
 
-class _Serial(Executor):
-    """Runs in this process."""
-
-    def submit(self, function: Any, /, *arguments: Any, **more: Any) -> "Future[Any]":
-        future: Future[Any] = Future()
-        future.set_result(function(*arguments, **more))
-        return future
-
-
 @contextmanager
 def _pool(setup: Setup, workers: int | None, count: int) -> Iterator[Run]:
     """Yield a function that submits a simulation.  An error ends the simulations that still run."""
     if workers is not None and workers < 1:
         raise ParameterError(f"workers = {workers} must be 1 or more")
-    processes = int(min(workers or os.cpu_count() or 1, count, PROCESSES_MAX))
+    processes = process_count(count, workers)
     for name, source in setup.inputs.items():
         if processes > 1 and callable(source) and not isinstance(source, Signal):
             raise ParameterError(
                 f"{name}: a function cannot be sent to other processes; give a text or arrays, or "
                 "workers=1"
             )
-    if processes == 1:
-        yield lambda values: _Serial().submit(setup.run, values)
-        return
-    others = {*multiprocessing.active_children()}
-    pool = ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), _prepare, (setup,))
-    try:
-        yield lambda values: pool.submit(_run, values)
-    except BaseException:  # Ctrl-C, too.
-        for process in {*multiprocessing.active_children()} - others:
-            process.terminate()
-        raise
-    finally:
-        pool.shutdown(cancel_futures=True)
+    run = setup.run if processes == 1 else _run
+    with executor(processes, _prepare, setup) as pool:
+        yield lambda values: pool.submit(run, values)
 
 
 def _report(progress: Progress | None, samples: int, refinements: int) -> Progress:
