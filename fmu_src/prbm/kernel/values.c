@@ -69,7 +69,7 @@ static bool get_derivative(Simulation *sim, int k, double *x, Problem *problem) 
     int extra = EXTRA_STATES * (contact / EXCHANGED_STATES) + EXTRA_IMPULSE + stored;
     *x = now.rates[k < count     ? n + m->independent[k]
                    : contact < 0 ? 2 * n + k - count
-                                 : 2 * n + 2 + extra];
+                                 : m->first_extra + extra];
     return true;
 }
 

@@ -86,7 +86,7 @@ static bool rates_of_motion(const Equations *q, const double *y, const Reference
 static void add_powers(const Equations *q, const Evaluation *result, const double *v, double *dy) {
     int n = q->system->n;
     if (q->mass_damping != 0.0) {
-        dy[2 * n] += 2.0 * q->mass_damping * kinetic_energy_of(q, result, v);
+        dy[2 * n] += 2.0 * q->mass_damping * kinetic_energy_of(q, result);
     }
     if (q->slipping_count > 0) {
         dy[2 * n] += rubbing_power(q, result, v);
@@ -115,7 +115,7 @@ PRBM bool rate_at_time(const Equations *equations, const double *y, const Refere
 PRBM bool rate(const Equations *equations, double t, const double *y, const Reference *near,
                Evaluation *result, double *dy, Problem *problem) {
     result->at.time = t;
-    result->at.extra = y + 2 * equations->system->n + 2;
+    result->at.extra = y + equations->system->mechanism->first_extra;
     return rate_at_time(equations, y, near, result, dy, problem);
 }
 

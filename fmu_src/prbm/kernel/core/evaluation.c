@@ -470,23 +470,21 @@ RARE void mapped_terms(const Equations *q, const Reference *near, Evaluation *re
 
 /* --- energy ----------------------------------------------------------------------------------- */
 
-/* Return the kinetic energy v^T diag(e)^H H diag(e) v / 2. */
-PRBM double kinetic_energy_of(const Equations *equations, const Evaluation *evaluation,
-                              const double *v) {
+/* Return the kinetic energy v^T diag(e)^H H diag(e) v / 2 at the evaluated velocities. */
+PRBM double kinetic_energy_of(const Equations *equations, const Evaluation *evaluation) {
     const System *system = equations->system;
     const Complex *e = evaluation->at.e;
-    const double *own = own_inertia(system, &evaluation->at);
+    const double *own = own_inertia(system, &evaluation->at), *v = evaluation->at.turn;
     double sum = 0.0;
     for (int k = 0; k < system->block_count; k++) {
         int start = system->blocks[k].start, end = start + system->blocks[k].size;
         for (int i = start; i < end; i++) {
-            double turn = direction_of(system, v, i), row = 0.5 * own[i] * turn;
+            const Complex *H = system->H + i * system->d;
+            double row = 0.5 * own[i] * v[i];
             for (int j = start; j < i; j++) {
-                Complex h = system->H[i * system->d + j];
-                double mass = product(product(conjugate(e[i]), h), e[j]).re;
-                row += mass * direction_of(system, v, j);
+                row += product(product(conjugate(e[i]), H[j]), e[j]).re * v[j];
             }
-            sum += row * turn;
+            sum += row * v[i];
         }
     }
     return sum;

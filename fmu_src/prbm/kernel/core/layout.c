@@ -366,5 +366,6 @@ PRBM void lay_out_slots(Mechanism *m) {
         .count = at[SLOTS_GROUPS - 1] + counts[SLOTS_GROUPS - 1],
     };
     m->slots = slots;
-    m->state_count = 2 * m->coordinate_count + 2 + EXTRA_STATES * m->compliant_count;
+    m->first_extra = 2 * m->coordinate_count + 2;
+    m->state_count = m->first_extra + EXTRA_STATES * m->compliant_count;
 }

@@ -186,6 +186,7 @@ typedef struct {
     int coordinate_count, direction_count, loop_count, link_count, strain_count, stretch_count,
         mass_count, spring_count, corner_count;
     int compliant_count; /* Number of compliant stops. */
+    int first_extra;     /* 2 n + 2: position of the states of compliant stops in a state. */
     int state_count;     /* Size of a state: 2 n + 2, and 4 of each compliant stop. */
     int stressed_count;  /* Number of flexures whose stress is an output. */
     int longest; /* Largest number of links or nodes of a flexure. */

@@ -103,7 +103,7 @@ PRBM bool stages(const Equations *equations, double t, int n, const double *y, d
         forces->largest[i] = -HUGE_VAL;
     }
     set_reference(reference, equations->system, y);
-    evaluation->at.extra = y1 + 2 * equations->system->n + 2;
+    evaluation->at.extra = y1 + equations->system->mechanism->first_extra;
     for (int i = 1; i < STAGES; i++) {
         stage_state(n, i, h, k, y, y1);
         if (equations->walls_move) {

@@ -21,7 +21,7 @@ static const Stop *stop_of(const Simulation *sim, int stop) {
 }
 
 PRBM double *extra_of(const Simulation *sim, double *y, int stop) {
-    return y + 2 * system_of(sim)->n + 2 + stop_of(sim, stop)->extra;
+    return y + sim->configuration.mechanism->first_extra + stop_of(sim, stop)->extra;
 }
 
 /* Coordinates, rates and M phi at the first touch of a compliant stop, (3 n,). */
@@ -562,7 +562,7 @@ PRBM double contact_error(Simulation *sim, double h) {
         double depth = greater(greater(fabs(dot(n, row, change)), speed * h),
                                INDENTATION_MIN_RTOL * system->length);
         double squares[2];
-        int give = 2 * n + 2 + stop_of(sim, i)->extra + EXTRA_GIVE;
+        int give = system->mechanism->first_extra + stop_of(sim, i)->extra + EXTRA_GIVE;
         for (int part = 0; part < 2; part++) {
             const double *error = part == 0 ? stepping->error : stepping->coarse_error;
             double d = (dot(n, row, error) + error[give]) / depth;

@@ -41,13 +41,13 @@ PRBM void set_scales(Configuration *configuration, double frequency) {
     scales->rate = configuration->omega > 0.0 ? configuration->omega : spring_rate;
     scales->energy = torsion > 0.0 ? torsion : heaviest * (scales->rate * scales->rate);
     scales->time = TWO_PI / scales->rate;
-    configuration->controlled = (double)(2 * n + 2);
-    int extras = EXTRA_STATES * system->mechanism->compliant_count;
-    for (int j = 2 * n + 2; j < 2 * n + 2 + extras; j++) {
+    int first = system->mechanism->first_extra, count = system->mechanism->state_count;
+    configuration->controlled = (double)first;
+    for (int j = first; j < count; j++) {
         configuration->least[j] = HUGE_VAL; /* The error of these states is not controlled. */
         configuration->share[j] = 0.0;
     }
-    for (int j = 0; j < 2 * n + 2; j++) {
+    for (int j = 0; j < first; j++) {
         bool angle = j < n;
         configuration->least[j] = angle ? 1.0 : j < 2 * n ? scales->rate : scales->energy;
         configuration->share[j] = angle ? 0.0 : 1.0;

@@ -154,7 +154,7 @@ static bool output_motion(Simulation *sim, bool near, Problem *problem) {
         int i = q->pressed[k];
         out[slots->stops + PER_STOP * i + STOP_FORCE] = present->evaluation.pressure[i];
     }
-    out[slots->energies + ENERGY_KINETIC] = kinetic_energy_of(q, &present->evaluation, v);
+    out[slots->energies + ENERGY_KINETIC] = kinetic_energy_of(q, &present->evaluation);
     return true;
 }
 

@@ -26,7 +26,7 @@ PRBM int state_size(const Simulation *sim) {
 
 PRBM const double *extra_states(const Simulation *sim, const double *y) {
     const Mechanism *m = sim->configuration.mechanism;
-    return m->compliant_count > 0 ? y + 2 * m->coordinate_count + 2 : NULL;
+    return m->compliant_count > 0 ? y + m->first_extra : NULL;
 }
 
 PRBM int contact_count(const Simulation *sim) {
