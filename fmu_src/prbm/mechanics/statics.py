@@ -23,9 +23,13 @@ from ..base.tolerances import (
     RELEASE_ROW_RTOL,
     STATICS_CONSTRAINT_RTOL,
     STATICS_FORCE_RTOL,
+    STATICS_GROWTH_MAX,
     STATICS_ITERATIONS_MAX,
     STATICS_LOAD_STEP_MIN,
+    STATICS_SHRINK,
+    STATICS_SHRINK_MIN,
     STATICS_STEP_ATOL,
+    STATICS_TURN_AIM,
     STATICS_TURN_MAX,
     STATICS_TURN_MIN,
 )
@@ -117,7 +121,8 @@ def equilibrium(
     """Return the shape under gravity and loads, free or with the released body held.
 
     Gravity, loads and displacement are raised together from the straight, unloaded shape, so that
-    the shape found is the one that the mechanism reaches when it is loaded slowly.
+    the shape found is the one that the mechanism reaches when it is loaded slowly.  The turn in a
+    load step determines the size of the next one, which does not grow after a rejected step.
 
     Parameters
     ----------
@@ -152,19 +157,23 @@ def equilibrium(
     # Only bodies without a spring, for instance on a pin, may turn far in one load step.  If
     # another coordinate jumps, slow loading does not reach the shape.
     bent = sorted({*system.links, *np.flatnonzero(np.diag(system.K) > 0.0).tolist()})
-    done, fraction = 0.0, 1.0
+    done, step, growth = 0.0, 1.0, STATICS_GROWTH_MAX
     while done < 1.0:
-        target = min(1.0, done + fraction)
+        target = min(1.0, done + step)
+        step, turn, ratio = target - done, math.inf, STATICS_SHRINK
         held = None if displacement is None else target * displacement
         trial = _newton(system, held, (target * w, target * moment), state)
-        near = trial is not None and np.abs((trial - state)[bent]).max() <= STATICS_TURN_MAX
-        if trial is not None and near and _holds(system, held, trial):
+        if trial is not None and _holds(system, held, trial):
+            turn = float(np.abs((trial - state)[bent]).max(initial=0.0))
+            ratio = STATICS_TURN_AIM / max(turn, STATICS_TURN_MIN)
+        if trial is not None and turn <= STATICS_TURN_MAX:
             state, done = trial, target
-            fraction = min(1.0, 2 * fraction)
+            ratio, growth = min(growth, ratio), STATICS_GROWTH_MAX
+        elif step <= STATICS_LOAD_STEP_MIN:
+            raise EquilibriumError(_unreachable(system, displacement, bool(loads), done))
         else:
-            fraction /= 2
-            if fraction < STATICS_LOAD_STEP_MIN:
-                raise EquilibriumError(_unreachable(system, displacement, bool(loads), done))
+            ratio, growth = max(STATICS_SHRINK_MIN, ratio), 1.0
+        step = max(STATICS_LOAD_STEP_MIN, ratio * step)
     force = float(state[n + r]) if displacement is not None else 0.0
     if system.mechanism.release.turns:
         force *= system.length  # The constraint is the rotation times the size.
