@@ -17,6 +17,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 
 from ..base.errors import ParameterError, PrbmError
 from ..base.unit_text import frequency_text, length_unit
@@ -285,7 +286,7 @@ class _Models:
             if cause is None or better is None or quantity in reported:
                 continue
             reported.add(quantity)
-            choice = self._choice() if cause is Cause.PIVOTS else better.choice
+            choice = self._choice if cause is Cause.PIVOTS else better.choice
             where = _where(self.own, shape, cause)
             yield Finding(quantity, mode, cause, where, found, better.values(shape)[key], choice)
 
@@ -299,6 +300,7 @@ class _Models:
             return Cause.INEXTENSIBLE
         return None
 
+    @cached_property
     def _choice(self) -> str:
         """Return the keys of the beams of least order that agree with the finer model."""
         assert self.fine is not None
