@@ -236,10 +236,14 @@ class _Model:
 
     def system(self, shape: Shape) -> System:
         """Return the assembled system, with the offset of an impact."""
-        given = dict(self.given)
-        if isinstance(shape, Impact) and shape.offset is not None:
-            given[f"{self.mechanism.stops[shape.stop].name}.offset"] = shape.offset
+        if not isinstance(shape, Impact) or shape.offset is None:
+            return self._system
+        given = {**self.given, f"{self.mechanism.stops[shape.stop].name}.offset": shape.offset}
         return assemble(self.mechanism, self.mechanism.values(given))
+
+    @cached_property
+    def _system(self) -> System:
+        return assemble(self.mechanism, self.mechanism.values(self.given))
 
     def values(self, shape: Shape) -> Values:
         """Return the quantities in a shape; empty if the shape is not found."""
