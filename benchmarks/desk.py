@@ -186,8 +186,12 @@ def work(task: str, engine: str) -> None:
 
 
 def environment(checkout: Path) -> dict[str, str]:
-    """Return the environment of a process with the package of a checkout."""
-    return os.environ | dict.fromkeys(THREADS, "1") | {"PYTHONPATH": str(checkout / "fmu_src")}
+    """Return the environment of a process with the package of a checkout.
+
+    The package is compiled to bytecode at the first import, as an installed one is.
+    """
+    own = {"PYTHONPATH": str(checkout / "fmu_src"), "PYTHONDONTWRITEBYTECODE": ""}
+    return os.environ | dict.fromkeys(THREADS, "1") | own
 
 
 def command_time(*command: str) -> float:

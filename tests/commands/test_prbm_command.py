@@ -128,6 +128,14 @@ def test_help_imports_no_slow_package():
     subprocess.run([sys.executable, "-c", code], check=True, env=environment())
 
 
+def test_simulating_in_the_kernel_imports_no_scipy(tmp_path):
+    code = (
+        "import sys; from prbm.commands.command_line import main; main(['simulate', 'PRBDM2R']);"
+        "sys.exit(any(name.startswith('scipy') for name in sys.modules))"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, env=environment(), cwd=tmp_path)
+
+
 def test_list_prints_the_shipped_mechanisms(capsys):
     assert run("list") == cli.OK
     assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == [*shipped()]

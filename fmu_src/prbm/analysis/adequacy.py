@@ -17,6 +17,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 
 from ..base.errors import ParameterError, PrbmError
 from ..base.unit_text import frequency_text, length_unit
@@ -235,10 +236,14 @@ class _Model:
 
     def system(self, shape: Shape) -> System:
         """Return the assembled system, with the offset of an impact."""
-        given = dict(self.given)
-        if isinstance(shape, Impact) and shape.offset is not None:
-            given[f"{self.mechanism.stops[shape.stop].name}.offset"] = shape.offset
+        if not isinstance(shape, Impact) or shape.offset is None:
+            return self._system
+        given = {**self.given, f"{self.mechanism.stops[shape.stop].name}.offset": shape.offset}
         return assemble(self.mechanism, self.mechanism.values(given))
+
+    @cached_property
+    def _system(self) -> System:
+        return assemble(self.mechanism, self.mechanism.values(self.given))
 
     def values(self, shape: Shape) -> Values:
         """Return the quantities in a shape; empty if the shape is not found."""
@@ -285,7 +290,7 @@ class _Models:
             if cause is None or better is None or quantity in reported:
                 continue
             reported.add(quantity)
-            choice = self._choice() if cause is Cause.PIVOTS else better.choice
+            choice = self._choice if cause is Cause.PIVOTS else better.choice
             where = _where(self.own, shape, cause)
             yield Finding(quantity, mode, cause, where, found, better.values(shape)[key], choice)
 
@@ -299,6 +304,7 @@ class _Models:
             return Cause.INEXTENSIBLE
         return None
 
+    @cached_property
     def _choice(self) -> str:
         """Return the keys of the beams of least order that agree with the finer model."""
         assert self.fine is not None

@@ -107,7 +107,11 @@ def impact_shape(system: System, stop: int, wall: float) -> Equilibrium:
 
     # The search is in metres.  A rotation is converted to the arc at a radius of system.length.
     per_metre = 1.0 / system.length if system.mechanism.release.turns else 1.0
-    return touching_shape(lambda x, _: equilibrium(system, per_metre * x), gap, wall, system.length)
+
+    def hold(x: float, near: Equilibrium | None) -> Equilibrium:
+        return equilibrium(system, per_metre * x, near=near)
+
+    return touching_shape(hold, gap, wall, system.length)
 
 
 def lever(system: System, stop: int) -> float:

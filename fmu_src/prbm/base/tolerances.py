@@ -26,8 +26,12 @@ PROJECTION_FACTOR = 1.0  # Of the square root of the tolerance: largest change b
 # --- statics and modes -------------------------------------------------------------------------
 STATICS_ITERATIONS_MAX = 30  # Newton steps at one load.
 STATICS_TURN_MAX = 0.5  # rad per Newton step and load step; a larger turn reaches another shape.
+STATICS_TURN_AIM = 0.45  # rad per load step, at which the control of load steps aims.
 STATICS_TURN_MIN = 1e-300  # rad; any positive number, to divide by.
 STATICS_LOAD_STEP_MIN = 1 / 512  # Of the load: smallest continuation step.
+STATICS_SHRINK_MIN = 0.25  # Smallest ratio of a load step to the one before.
+STATICS_SHRINK = 0.5  # Ratio of a load step to one without an equilibrium.
+STATICS_GROWTH_MAX = 2.0  # Largest ratio of a load step to an accepted one before.
 STATICS_CONSTRAINT_RTOL = 1e-13  # Of the size: residual of closed loops at an equilibrium.
 STATICS_FORCE_RTOL = 1e-12  # Of the stiffest spring at one radian, or of the load: residual torque.
 STATICS_STEP_ATOL = 1e-8  # rad; Newton step that ends the iteration: the error is its square.

@@ -27,7 +27,6 @@ from ..interface import tables
 from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble, calculated
 from ..mechanics.compliant_stops import COMPLIANT_STATES
-from ..mechanics.independent import independent
 from ..mechanics.stress import SectionStresses, section_positions
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
@@ -54,7 +53,8 @@ class Tables:
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
-        own = independent(mechanism)
+        system = assemble(mechanism, mechanism.values())
+        own = range(system.n - len(system.loops))  # Any choice: model exchange alone uses them.
         content = tables.tables(mechanism, (), "", own)
         message = ctypes.create_string_buffer(MESSAGE_LENGTH)
         self.library = library()

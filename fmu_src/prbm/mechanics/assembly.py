@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.linalg import qr
 
 from ..base.errors import MechanismError, ParameterError
 from ..base.tolerances import (
@@ -317,6 +316,33 @@ def check_masses(M: Real, names: Sequence[str]) -> None:
     )
 
 
+def dependent_rows(rows: Real, tolerance: float) -> list[int]:
+    """Return the rows that depend on others, by Gram-Schmidt orthogonalisation with pivoting.
+
+    Parameters
+    ----------
+    rows : (k, n)
+        Vectors.
+    tolerance : float
+        Length of a remainder, without the components along the other rows, that is round-off.
+
+    Examples
+    --------
+    >>> dependent_rows(np.array([[1.0, 0.0], [3.0, 4.0], [0.0, 2.0]]), 1e-9)
+    [2]
+    """
+    rest, left = rows.copy(), list(range(len(rows)))
+    while left:
+        lengths = np.linalg.norm(rest[left], axis=1)
+        k = left[int(lengths.argmax())]
+        if lengths.max() <= tolerance:
+            break
+        left.remove(k)
+        along = rest[k] / lengths.max()
+        rest -= np.outer(rest @ along, along)
+    return left
+
+
 def check_loops(jacobian: Real, names: Sequence[str]) -> None:
     """Reject loops that are not independent of each other at the straight shape.
 
@@ -336,9 +362,7 @@ def check_loops(jacobian: Real, names: Sequence[str]) -> None:
     if not rows:
         return
     tolerance = DEPENDENT_LOOP_RTOL * np.abs(jacobian).max()
-    _, R, order = qr(jacobian.T, mode="economic", pivoting=True)
-    size = np.abs(np.diag(R))
-    repeated = sorted({names[row // 2] for row in order[: len(size)][size <= tolerance]})
+    repeated = sorted({names[k // 2] for k in dependent_rows(jacobian, tolerance)})
     if repeated or rows > n:
         raise MechanismError(
             f"the constraints of the loops closed by {', '.join(repeated or names)} depend on "

@@ -7,7 +7,6 @@ Sources
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dgesv, dgetrs
 
 from ..base.errors import SimulationError
 from ..base.tolerances import (
@@ -19,6 +18,11 @@ from .arrays import Complex, Real
 from .system import Rows, System
 
 Factors = tuple[Real, NDArray[np.int32]]
+
+SINGULAR = (
+    "the equations of motion are singular in this shape: two constraints are linearly dependent, "
+    "or a part that can move has no mass"
+)
 
 
 def saddle(M: Real, columns: Real, rows: Real) -> Real:
@@ -40,7 +44,10 @@ def solve(kkt: Real, right: Real) -> Real:
         If the matrix is singular: two constraints contradict or repeat each other, or a motion
         has no mass.
     """
-    return factor_and_solve(kkt, right)[0]
+    try:
+        return np.asarray(np.linalg.solve(kkt, right), float)
+    except np.linalg.LinAlgError:
+        raise SimulationError(SINGULAR) from None
 
 
 def factor_and_solve(kkt: Real, right: Real) -> tuple[Real, Factors]:
@@ -51,17 +58,18 @@ def factor_and_solve(kkt: Real, right: Real) -> tuple[Real, Factors]:
     SimulationError
         As :func:`solve`.
     """
+    from scipy.linalg.lapack import dgesv  # imported here: it takes 0.3 s
+
     lu, pivots, x, info = dgesv(kkt, right)
     if info != 0:
-        raise SimulationError(
-            "the equations of motion are singular in this shape: two constraints are linearly "
-            "dependent, or a part that can move has no mass"
-        )
+        raise SimulationError(SINGULAR)
     return x, (lu, pivots)
 
 
 def solve_again(factors: Factors, right: Real) -> Real:
     """Solve with the factors of :func:`factor_and_solve` and another right side."""
+    from scipy.linalg.lapack import dgetrs  # imported here: it takes 0.3 s
+
     x: Real = dgetrs(*factors, right)[0]
     return x
 

@@ -15,7 +15,6 @@ therefore differs from its row in R.  Stops with the compliant law are loads whi
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from ..mechanism.parts import value
 from . import constraints, forces
@@ -159,7 +158,8 @@ class Equations:
         self._ones = np.ones(size + 1, complex)
         self._last = np.zeros(size + 1, complex if len(self.system.stretches) else float)
         self._last[size] = 1.0
-        self._Phi = block_diag(self.system.Phi.Phi, np.eye(len(self.rows)))
+        self._Phi = np.eye(size, self.n + len(self.rows), self.n - d)
+        self._Phi[:d, : self.n] = self.system.Phi.Phi
 
     def with_contacts(self, contacts: ContactState) -> "Equations":
         """Return the equations for another state of the contacts."""

@@ -3,7 +3,6 @@ r"""Small vibrations about a static shape, and the effect of an impact on the fu
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eigh, null_space
 
 from ..base.tolerances import ZERO_FREQUENCY_RTOL, ZERO_MODE_RTOL
 from . import constraints
@@ -60,10 +59,11 @@ def _modes(system: System, q: Real, B: Complex, lam: Real, w: Complex) -> Modes:
     M = system.mass_matrix(e)
     K_t = tangent_stiffness(system.K, w, B, lam, e, system.arm, system.Phi)
     rows = system.loop_rows.jacobian(e)
-    Z = null_space(rows) if len(rows) else np.eye(system.n)
-    omega2, reduced = eigh(Z.T @ K_t @ Z, Z.T @ M @ Z)
+    Z = np.linalg.qr(rows.T, mode="complete")[0][:, len(rows) :]
+    L = np.linalg.cholesky(Z.T @ M @ Z)
+    omega2, y = np.linalg.eigh(np.linalg.solve(L, np.linalg.solve(L, Z.T @ K_t @ Z).T))
     frequency = np.sign(omega2) * np.sqrt(np.abs(omega2)) / (2 * np.pi)
-    return Modes(frequency, Z @ reduced, M)
+    return Modes(frequency, Z @ np.linalg.solve(L.T, y), M)
 
 
 def fundamental_frequency(system: System) -> float:

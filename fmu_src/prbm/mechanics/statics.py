@@ -11,7 +11,7 @@ position is linear in the arms.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,9 +23,13 @@ from ..base.tolerances import (
     RELEASE_ROW_RTOL,
     STATICS_CONSTRAINT_RTOL,
     STATICS_FORCE_RTOL,
+    STATICS_GROWTH_MAX,
     STATICS_ITERATIONS_MAX,
     STATICS_LOAD_STEP_MIN,
+    STATICS_SHRINK,
+    STATICS_SHRINK_MIN,
     STATICS_STEP_ATOL,
+    STATICS_TURN_AIM,
     STATICS_TURN_MAX,
     STATICS_TURN_MIN,
 )
@@ -35,6 +39,8 @@ from .direction_map import DirectionMap
 from .forces import field_row, force_row, springs
 from .inputs import checked_loads
 from .system import System, values
+
+_Given = tuple[float | None, Complex, Real]  # Displacement, row of the loads, moments.
 
 
 @dataclass(frozen=True)
@@ -113,6 +119,7 @@ def equilibrium(
     system: System,
     displacement: float | None = None,
     loads: Mapping[str, float] | None = None,
+    near: Equilibrium | None = None,
 ) -> Equilibrium:
     """Return the shape under gravity and loads, free or with the released body held.
 
@@ -131,6 +138,9 @@ def equilibrium(
         Forces and moments by the names of the inputs, ``force.x`` and ``force.y`` [N],
         ``force.moment`` [N m] for a :class:`prbm.mechanism.parts.Force` of the name
         ``force``.  They keep their directions; those that are not given are zero.
+    near : Equilibrium or None
+        Shape held under the same loads, from which the displacement is changed slowly.  None, or
+        if the displacement is not reached from there: the straight, unloaded shape.
 
     Raises
     ------
@@ -148,27 +158,60 @@ def equilibrium(
         if displacement != 0.0 and turns_about_point(system):
             raise EquilibriumError(f"{_given(system, displacement)}: {_about(system)}")
     n, r = system.n, len(system.loops)
-    state = np.concatenate([system.q0, np.zeros(r + (displacement is not None))])
+    unit = system.length if system.mechanism.release.turns else 1.0  # The row is turn times size.
+
+    def from_straight(share: float) -> _Given:
+        return None if displacement is None else share * displacement, share * w, share * moment
+
+    done = 0.0
+    if near is not None and displacement is not None:
+        begin = system.amount(near.q)
+        change = displacement - begin
+        state = np.concatenate([near.q, near.lam, [near.force / unit]])
+        state, done = _follow(system, lambda share: (begin + share * change, w, moment), state)
+    if done < 1.0:
+        state = np.concatenate([system.q0, np.zeros(r + (displacement is not None))])
+        state, done = _follow(system, from_straight, state)
+    if done < 1.0:
+        raise EquilibriumError(_unreachable(system, displacement, bool(loads), done))
+    force = unit * float(state[n + r]) if displacement is not None else 0.0
+    return Equilibrium(state[:n], state[n : n + r], force, w)
+
+
+def _follow(system: System, given: Callable[[float], _Given], state: Real) -> tuple[Real, float]:
+    """Change what is given from a share of 0, with the state there, slowly towards a share of 1.
+
+    The turn in a step determines the size of the next one, which does not grow after a rejected
+    step.
+
+    Returns
+    -------
+    state : (n + r,) or (n + r + 1,)
+        Coordinates, multipliers of the loops and, if held, that of the holding force.
+    done : float
+        Share that is reached; below 1 if no equilibrium was found beyond it.
+    """
     # Only bodies without a spring, for instance on a pin, may turn far in one load step.  If
     # another coordinate jumps, slow loading does not reach the shape.
     bent = sorted({*system.links, *np.flatnonzero(np.diag(system.K) > 0.0).tolist()})
-    done, fraction = 0.0, 1.0
+    done, step, growth = 0.0, 1.0, STATICS_GROWTH_MAX
     while done < 1.0:
-        target = min(1.0, done + fraction)
-        held = None if displacement is None else target * displacement
-        trial = _newton(system, held, (target * w, target * moment), state)
-        near = trial is not None and np.abs((trial - state)[bent]).max() <= STATICS_TURN_MAX
-        if trial is not None and near and _holds(system, held, trial):
+        target = min(1.0, done + step)
+        step, turn, ratio = target - done, math.inf, STATICS_SHRINK
+        held, w, moment = given(target)
+        trial = _newton(system, held, (w, moment), state)
+        if trial is not None and _holds(system, held, trial):
+            turn = float(np.abs((trial - state)[bent]).max(initial=0.0))
+            ratio = STATICS_TURN_AIM / max(turn, STATICS_TURN_MIN)
+        if trial is not None and turn <= STATICS_TURN_MAX:
             state, done = trial, target
-            fraction = min(1.0, 2 * fraction)
+            ratio, growth = min(growth, ratio), STATICS_GROWTH_MAX
+        elif step <= STATICS_LOAD_STEP_MIN:
+            break
         else:
-            fraction /= 2
-            if fraction < STATICS_LOAD_STEP_MIN:
-                raise EquilibriumError(_unreachable(system, displacement, bool(loads), done))
-    force = float(state[n + r]) if displacement is not None else 0.0
-    if system.mechanism.release.turns:
-        force *= system.length  # The constraint is the rotation times the size.
-    return Equilibrium(state[:n], state[n : n + r], force, w)
+            ratio, growth = max(STATICS_SHRINK_MIN, ratio), 1.0
+        step = max(STATICS_LOAD_STEP_MIN, ratio * step)
+    return state, done
 
 
 def _loads(system: System, loads: Mapping[str, float]) -> tuple[Complex, Real]:

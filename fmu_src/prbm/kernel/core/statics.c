@@ -250,25 +250,35 @@ static bool holds(const System *system, bool held, double amount, const double *
 }
 
 /* Increase the load and the displacement together from the straight, unloaded shape, so that the
- * result is the equilibrium that slow loading reaches.  state is (q, lam, force). */
+ * result is the equilibrium that slow loading reaches.  The turn in a load step determines the size of
+ * the next one, which does not grow after a rejected step.  state is (q, lam, force). */
 static bool load_slowly(const System *system, bool held, double displacement, double *state,
                         Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
     int size = system->n + system->r + held;
-    double *trial = take(scratch, (size_t)size), done = 0.0, fraction = 1.0;
-    while (done < 1.0 && fraction >= STATICS_LOAD_STEP_MIN) {
-        double target = lesser(1.0, done + fraction);
+    double *trial = take(scratch, (size_t)size), done = 0.0, step = 1.0;
+    double growth = STATICS_GROWTH_MAX;
+    bool going = true;
+    while (done < 1.0 && going) {
+        double target = lesser(1.0, done + step), turn = HUGE_VAL, ratio = STATICS_SHRINK;
+        step = target - done;
         copy(size, state, trial);
-        /* If a link jumps, slow loading does not reach this equilibrium: reduce the step. */
         if (loaded(system, held, displacement, target, trial, scratch) &&
-            jump(system, state, trial) <= STATICS_TURN_MAX &&
             holds(system, held, target * displacement, trial)) {
+            turn = jump(system, state, trial);
+            ratio = STATICS_TURN_AIM / greater(turn, STATICS_TURN_MIN);
+        }
+        if (turn <= STATICS_TURN_MAX) {
             copy(size, trial, state);
             done = target;
-            fraction = lesser(1.0, 2 * fraction);
-        } else {
-            fraction /= 2;
+            ratio = lesser(growth, ratio);
+            growth = STATICS_GROWTH_MAX;
+        } else { /* If a link jumps, slow loading does not reach this equilibrium. */
+            going = step > STATICS_LOAD_STEP_MIN;
+            ratio = greater(STATICS_SHRINK_MIN, ratio);
+            growth = 1.0;
         }
+        step = greater(STATICS_LOAD_STEP_MIN, ratio * step);
     }
     scratch->used = used;
     return done >= 1.0 || unreachable(system, held, displacement, done, problem);
