@@ -5,6 +5,9 @@ Sources
 .. [1] E. Eich, SIAM J. Numer. Anal. 30 (1993) 1467 (coordinate projection).
 """
 
+from functools import cache
+from types import ModuleType
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -50,6 +53,14 @@ def solve(kkt: Real, right: Real) -> Real:
         raise SimulationError(SINGULAR) from None
 
 
+@cache
+def _lapack() -> ModuleType:
+    """Return the functions of LAPACK; their import takes 0.3 s, and only this engine needs them."""
+    from scipy.linalg import lapack
+
+    return lapack
+
+
 def factor_and_solve(kkt: Real, right: Real) -> tuple[Real, Factors]:
     """Solve a saddle-point system and return its factors too, for :func:`solve_again`.
 
@@ -58,9 +69,7 @@ def factor_and_solve(kkt: Real, right: Real) -> tuple[Real, Factors]:
     SimulationError
         As :func:`solve`.
     """
-    from scipy.linalg.lapack import dgesv  # imported here: it takes 0.3 s
-
-    lu, pivots, x, info = dgesv(kkt, right)
+    lu, pivots, x, info = _lapack().dgesv(kkt, right)
     if info != 0:
         raise SimulationError(SINGULAR)
     return x, (lu, pivots)
@@ -68,9 +77,7 @@ def factor_and_solve(kkt: Real, right: Real) -> tuple[Real, Factors]:
 
 def solve_again(factors: Factors, right: Real) -> Real:
     """Solve with the factors of :func:`factor_and_solve` and another right side."""
-    from scipy.linalg.lapack import dgetrs  # imported here: it takes 0.3 s
-
-    x: Real = dgetrs(*factors, right)[0]
+    x: Real = _lapack().dgetrs(*factors, right)[0]
     return x
 
 
