@@ -143,6 +143,7 @@ thickness = 1e-3
 material = "steel"
 """
 HOLE = "[[0.055, 0.002], [0.057, 0.002], [0.057, 0.003]]"
+MISSPELT = HOLE.replace("0.057", '"arm.lenght"', 1)
 RIGHT = 'thickness = "50 um"\nwidth = 8e-3\nmaterial = "steel"\n'
 CHANGES = {
     # units
@@ -530,6 +531,21 @@ CHANGES = {
         ANVIL,
         TRIANGLE.replace("[0.06, 0.02]", '["arm.length", 0.02]'),
         "anvil.outline changes its shape with arm.length: write its dimensions as numbers",
+    ),
+    "outline with an undefined parameter": (
+        ANVIL,
+        TRIANGLE.replace("[0.06, 0.02]", '["arm.lenght", 0.02]'),
+        "anvil.outline refers to 'arm.lenght', which is not a parameter of Striker; did you mean",
+    ),
+    "hole with an undefined parameter": (
+        ANVIL,
+        f"{TRIANGLE}holes = [{MISSPELT}]\n",
+        "anvil.holes refers to 'arm.lenght', which is not a parameter of Striker; did you mean",
+    ),
+    "corner at a point with an undefined parameter": (
+        ANVIL + 'points.top = ["arm.length + 2 cm", "20 mm"]\n',
+        TRIANGLE.replace("[0.06, 0.02]", '"top"') + 'points.top = ["arm.lenght + 2 cm", 0.02]\n',
+        "anvil.top refers to 'arm.lenght', which is not a parameter of Striker; did you mean",
     ),
     "corner that is no point": (
         ANVIL,

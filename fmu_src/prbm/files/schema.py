@@ -43,7 +43,7 @@ from .copies import (
     mirrored_types,
     origins,
 )
-from .outlines import plate
+from .outlines import mean, plate
 from .tables import STRENGTHS, MaterialTable, Named, ParameterTable, RepeatTable, Table
 from .units import check_coherent, contact_stiffness
 from .values import (
@@ -360,7 +360,8 @@ def mechanism(file: MechanismTable, drawing: str = "") -> Mechanism:
     """
     _check_names(file)
     materials = _materials(file)
-    bodies = copied_bodies(file.bodies, [_body(table, materials) for table in file.bodies])
+    misshapen: list[MechanismError] = []
+    bodies = copied_bodies(file.bodies, [_body(t, materials, misshapen) for t in file.bodies])
     drawn = Drawing(file.ground, bodies)
     flexures = tuple(drawn.connections(file.flexures, [*map(_flexure, file.flexures)]))
     own = (flexure for flexure in file.flexures if flexure.type is None)
@@ -369,6 +370,8 @@ def mechanism(file: MechanismTable, drawing: str = "") -> Mechanism:
     connected = mirrored_types(file.flexures, flexures, types)
     try:
         result = _assembled(file, drawn, connected, joints, drawing)
+        if misshapen:  # Raised after an undefined name in an outline, which may be its cause.
+            raise misshapen[0]
         _check_drawn(result)
     except PrbmError as error:
         made_by = origins(_with_copies(file)) | drawn.made_by
@@ -498,8 +501,15 @@ def _named_material(
     return materials[name]
 
 
-def _body(table: BodyTable, materials: Mapping[str, dict[str, Quantity]]) -> parts.Body:
-    """Return the body of a table; mass, inertia and centre are given, or those of a plate."""
+def _body(
+    table: BodyTable,
+    materials: Mapping[str, dict[str, Quantity]],
+    misshapen: list[MechanismError],
+) -> parts.Body:
+    """Return the body of a table; mass, inertia and centre are given, or those of a plate.
+
+    The error of a plate without a valid shape is added to a list.
+    """
     outline = tuple(_corner(table, corner) for corner in table.outline)
     holes = tuple(tuple(_corner(table, corner) for corner in hole) for hole in table.holes)
     shape: dict[str, Any] = {"points": table.points, "outline": outline, "holes": holes}
@@ -530,7 +540,11 @@ def _body(table: BodyTable, materials: Mapping[str, dict[str, Quantity]]) -> par
         f"{table.name}.thickness", table.thickness, "m", "", LENGTH_MIN, LENGTH_MAX
     )
     density = _density(table, materials)
-    computed: Any = plate(table.name, outline, holes, table.thickness, density)
+    try:
+        computed: Any = plate(table.name, outline, holes, table.thickness, density)
+    except MechanismError as error:
+        misshapen.append(error)
+        computed = {"mass": "1", "inertia": "1", "centre": mean(outline)}
     return parts.Body(table.name, **computed, **shape)
 
 

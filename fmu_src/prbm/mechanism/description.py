@@ -454,11 +454,13 @@ class Mechanism:
         for name, point in self.ground.items():
             yield from ((f"{GROUND}.{name}", c) for c in point)
         for body in self.bodies:
-            yield from ((f"{body.name}.centre", c) for c in body.centre)
-            for corners in (body.outline, *body.holes):
-                yield from ((f"{body.name}.outline", c) for corner in corners for c in corner)
             for name, point in body.points.items():
                 yield from ((f"{body.name}.{name}", c) for c in point)
+            yield from ((f"{body.name}.outline", c) for corner in body.outline for c in corner)
+            for hole in body.holes:
+                yield from ((f"{body.name}.holes", c) for corner in hole for c in corner)
+            # Last, because the centre of a plate has the parameters of its corners.
+            yield from ((f"{body.name}.centre", c) for c in body.centre)
         points: tuple[Stop | Friction | Force | Release, ...] = (*self.stops, *self.frictions)
         for part in (*points, *self.forces, self.release):
             yield from ((f"{part.name}.point", c) for c in part.point or ())
