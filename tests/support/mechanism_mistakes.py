@@ -331,6 +331,21 @@ CHANGES = {
         'point = "anvil.top"\ndir',
         "wall.point = 'anvil.top' is not a point of the body arm",
     ),
+    "stop at a point of an unknown body": (
+        'body = "arm"\npoint = "arm.tip"\ndir',
+        'body = "harm"\npoint = "arm.tip"\ndir',
+        "wall.body = 'harm' is not defined; choose one of arm, anvil",
+    ),
+    "force at a point of an unknown body": (
+        'body = "arm"\npoint = "arm.tip"\n\n[[forces]]',
+        'body = "harm"\npoint = "arm.tip"\n\n[[forces]]',
+        "push.body = 'harm' is not defined; choose one of arm, anvil",
+    ),
+    "release of a point of an unknown body": (
+        'body = "arm"\ndirection = "1.5',
+        'body = "harm"\npoint = "arm.tip"\ndirection = "1.5',
+        "release.body = 'harm' is not defined; choose one of arm, anvil",
+    ),
     "stop of an unknown body": (
         'body = "arm"\npoint = "arm.tip"\ndir',
         'body = "harm"\npoint = [0, 0]\ndir',

@@ -21,7 +21,7 @@ from pydantic import (
 
 from ..base.errors import MechanismError, PrbmError
 from ..mechanism import parameters, parts
-from ..mechanism.description import RESERVED, Mechanism
+from ..mechanism.description import RESERVED, Mechanism, undefined
 from ..mechanism.expressions import Quantity, affine
 from ..mechanism.flexure import (
     CLAMP,
@@ -601,14 +601,16 @@ def _attached(
 ) -> dict[str, Any]:
     """Return the fields of a part; a point given by name is replaced by its coordinates."""
     given = dict(table)
+    user = "release" if isinstance(table, ReleaseTable) else table.name
+    if table.body not in bodies:
+        raise MechanismError(undefined(f"{user}.body", table.body, bodies))
     if isinstance(table.point, str):
         body, _, name = table.point.rpartition(".")
-        points = bodies.get(table.body, {})
+        points = bodies[table.body]
         if body != table.body or name not in points:
-            name = "release" if isinstance(table, ReleaseTable) else table.name
             listed = ", ".join(f"{table.body}.{p}" for p in points)
             raise MechanismError(
-                f"{name}.point = {table.point!r} is not a point of the body {table.body}; "
+                f"{user}.point = {table.point!r} is not a point of the body {table.body}; "
                 + (f"its points are {listed}" if points else "define the points of this body")
             )
         given["point"] = points[name]

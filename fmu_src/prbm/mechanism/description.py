@@ -294,18 +294,18 @@ class Mechanism:
         attached: tuple[Stop | Friction | Force, ...] = (*self.stops, *self.frictions, *self.forces)
         for part in attached:
             if part.body not in bodies:
-                raise MechanismError(_undefined(f"{part.name}.body", part.body, bodies))
+                raise MechanismError(undefined(f"{part.name}.body", part.body, bodies))
         for stop in self.stops:
             _check_law(stop)
             if stop.on != GROUND and stop.on not in bodies:
-                raise MechanismError(_undefined(f"{stop.name}.on", stop.on, (GROUND, *bodies)))
+                raise MechanismError(undefined(f"{stop.name}.on", stop.on, (GROUND, *bodies)))
             if stop.on == stop.body:
                 raise MechanismError(
                     f"the stop {stop.name} is fixed to the body that it stops: choose another "
                     f"body for {stop.name}.on"
                 )
         if self.release.body not in bodies:
-            raise MechanismError(_undefined("release.body", self.release.body, bodies))
+            raise MechanismError(undefined("release.body", self.release.body, bodies))
         _check_release(self.release)
 
     def _check_type(self, kind: FlexureType) -> None:
@@ -363,7 +363,7 @@ class Mechanism:
         """Reject a flexure with an undefined type or point, or with inconsistent ends."""
         kind = types.get(flexure.type)
         if kind is None:
-            raise MechanismError(_undefined(f"{flexure.name}.type", flexure.type, types))
+            raise MechanismError(undefined(f"{flexure.name}.type", flexure.type, types))
         self._check_connection("flexure", flexure)
         self._check_ends(flexure, kind)
 
@@ -471,7 +471,7 @@ class Mechanism:
             yield from ((name, c) for name, c in given if c is not None)
 
 
-def _undefined(key: str, name: str, known: Iterable[str]) -> str:
+def undefined(key: str, name: str, known: Iterable[str]) -> str:
     """Return the message for a key whose value is not the name of a known part."""
     remedy = f"choose one of {', '.join(known)}" if known else "define it"
     return f"{key} = {name!r} is not defined; {remedy}"
