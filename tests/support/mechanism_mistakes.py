@@ -832,8 +832,23 @@ CONTENTS = {
     "value instead of a table": (b"release = 3", "line 1: release = 3: write a table, [...]"),
     "half a line": (
         b'name = "x"\ntitle = \n',
-        "not a TOML file (Invalid value (at line 2, column 9))",
+        "not a TOML file (Invalid value (at line 2, column 9)): title =; write texts, and numbers",
     ),
+    "quantity without quotes": (
+        b'name = "x"\nposition = 5 mm\n',
+        "(at line 2, column 14)): position = 5 mm; write texts, and numbers with a unit, in quotes, "
+        'for instance "5 mm"',
+    ),
+    "text without quotes": (
+        b"model = beam",
+        "(Invalid value (at line 1, column 9)): model = beam; write texts, and numbers with a unit,",
+    ),
+    "point without quotes": (
+        b"foot = [5 mm, 0]",
+        "(Unclosed array (at line 1, column 11)): foot = [5 mm, 0]; write texts, and numbers with",
+    ),
+    "text with one quote": (b'name = "x\na = 1', "): name = \"x; write texts, and numbers with"),
+    "line of many characters": (b"a = 1\0" * BOMB, "a = 1 a = 1 a = 1"),
     "bomb of lists": (b"x = " + b"[" * BOMB + b"]" * BOMB, "are nested too deeply"),
     "bomb of tables": (b"x = " + b"{a=" * BOMB + b"1" + b"}" * BOMB, "are nested too deeply"),
     "bomb of keys": (b"a." * BOMB + b"a = 1", "are nested too deeply"),

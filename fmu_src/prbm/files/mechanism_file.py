@@ -19,6 +19,7 @@ from pydantic_core.core_schema import DictSchema, NullableSchema, TupleSchema, W
 from ..base import reading
 from ..base.errors import MechanismError, ParameterError, PrbmError
 from ..base.names import proposal
+from ..base.text import printable
 from ..mechanism.description import Mechanism
 from .schema import MechanismTable, mechanism
 from .tables import RepeatTable, Table
@@ -29,6 +30,9 @@ Item = TypeVar("Item")
 FILE_SIZE_MAX = 1 << 20  # bytes; a mechanism of a hundred flexures has 20 kB.
 PROBLEMS_MAX = 5  # Problems of one file in a message.
 KEY_LENGTH_MAX = 100  # Parts of a dotted key; tomllib needs more than linear time for longer ones.
+LINE_LENGTH_MAX = 80  # Characters of a line of a file in a message.
+UNQUOTED = 'write texts, and numbers with a unit, in quotes, for instance "5 mm"'
+UNQUOTED_REASONS = ("Expected newline", "Invalid value", "Unclosed", "Unterminated", "Illegal")
 DIALECT = "http://json-schema.org/draft-07/schema#"  # The latest that TOML editors support.
 REMEDIES = {  # Remedy for each of pydantic's error types.
     "int_type": "write a whole number",
@@ -77,8 +81,10 @@ def read_mechanism(path: str | Path) -> Mechanism:
         data = None if deep else tomllib.loads(text)
     except RecursionError:
         data = None
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except UnicodeDecodeError as error:
         raise MechanismError(f"{path}: not a TOML file ({error})") from None
+    except tomllib.TOMLDecodeError as error:
+        raise MechanismError(f"{path}: not a TOML file ({_syntax(str(error), text)}") from None
     except ValueError:
         raise MechanismError(f"{path}: a number has thousands of digits; round it") from None
     if data is None:
@@ -147,6 +153,15 @@ def load(name: str | Path) -> Mechanism:
 
 
 # --- error messages ---------------------------------------------------------------------------
+
+
+def _syntax(reason: str, text: str) -> str:
+    """Return the end of the message for an error of the syntax: reason, line and remedy."""
+    number = re.search(r"at line (\d+)", reason)
+    line = text.split("\n")[int(number[1]) - 1] if number else ""
+    shown = f": {printable(line).strip()[:LINE_LENGTH_MAX]}" if line else ""
+    remedy = f"; {UNQUOTED}" if reason.startswith(UNQUOTED_REASONS) else ""
+    return f"{reason}){shown}{remedy}"
 
 
 def _problem(error: dict[str, Any], data: Any) -> str:
