@@ -235,13 +235,36 @@ CHANGES = {
         'point = "tip"\ndir',
         "write the name of a point",
     ),
-    "array instead of table": ("[release]", "[[release]]", "release = [{"),
-    "table instead of array": ("[[joints]]", "[joints]", "joints = {"),
-    "ground as an array": ("[ground]", "[[ground]]", "ground = [{"),
+    "array instead of table": (
+        "[release]",
+        "[[release]]",
+        "release is a list of tables: write [release]",
+    ),
+    "table instead of array": (
+        "[[joints]]",
+        "[joints]",
+        "joints is a table: write [[joints]] for each part",
+    ),
+    "gravity without its direction": (
+        'gravity = ["0 m/s2", "-981 cm/s2"]',
+        "gravity = 9.81",
+        "gravity = 9.81: write a pair, gravity = [0, -9.81]",
+    ),
+    "value instead of a table of points": (
+        '[bodies.points]\nroot = ["20 mm", 0.0]\ntip = ["arm.length", "0 m"]\n',
+        "points = 3\n",
+        "bodies.0.points (of arm) = 3: write [bodies.points]",
+    ),
+    "table as a number": (
+        'mass = "53.187 g"',
+        "mass = { value = 1 }",
+        "bodies.0.mass (of arm) is a table: write a number",
+    ),
+    "ground as an array": ("[ground]", "[[ground]]", "ground is a list of tables: write [ground]"),
     "value instead of an array": (
         '[[probes]]\nname = "watch"\npoint = "arm.tip"\n',
         "[probes]\n",
-        "probes = {}: write a list",
+        "probes is a table: write [[probes]]",
     ),
     # keys
     "unknown key": ("inertia = 1e-6", "inertai = 1e-6", "did you mean inertia?"),
@@ -829,25 +852,25 @@ CONTENTS = {
     "UTF-16": (EXAMPLE.encode("utf-16"), "not a TOML file ('utf-8' codec"),
     "zip": (b"PK\x03\x04\x14\x00", "not a TOML file ("),
     "JSON": (b'{"name": "x"}', "not a TOML file (Invalid statement (at line 1, column 1))"),
-    "value instead of a table": (b"release = 3", "line 1: release = 3: write a table, [...]"),
+    "value instead of a table": (b"release = 3", "line 1: release = 3: write [release]"),
     "half a line": (
         b'name = "x"\ntitle = \n',
         "not a TOML file (Invalid value (at line 2, column 9)): title =; write texts, and numbers",
     ),
     "quantity without quotes": (
         b'name = "x"\nposition = 5 mm\n',
-        "(at line 2, column 14)): position = 5 mm; write texts, and numbers with a unit, in quotes, "
-        'for instance "5 mm"',
+        "(at line 2, column 14)): position = 5 mm; write texts, and numbers with a unit, in "
+        'quotes, for instance "5 mm"',
     ),
     "text without quotes": (
         b"model = beam",
-        "(Invalid value (at line 1, column 9)): model = beam; write texts, and numbers with a unit,",
+        "(Invalid value (at line 1, column 9)): model = beam; write texts, and numbers with",
     ),
     "point without quotes": (
         b"foot = [5 mm, 0]",
         "(Unclosed array (at line 1, column 11)): foot = [5 mm, 0]; write texts, and numbers with",
     ),
-    "text with one quote": (b'name = "x\na = 1', "): name = \"x; write texts, and numbers with"),
+    "text with one quote": (b'name = "x\na = 1', '): name = "x; write texts, and numbers with'),
     "line of many characters": (b"a = 1\0" * BOMB, "a = 1 a = 1 a = 1"),
     "bomb of lists": (b"x = " + b"[" * BOMB + b"]" * BOMB, "are nested too deeply"),
     "bomb of tables": (b"x = " + b"{a=" * BOMB + b"1" + b"}" * BOMB, "are nested too deeply"),

@@ -40,13 +40,11 @@ REMEDIES = {  # Remedy for each of pydantic's error types.
     "string_type": "write a text in quotes",
     "string_too_long": f"write a shorter name, of at most {NAME_LENGTH_MAX} characters",
     "bool_type": "write true or false",
-    "tuple_type": "write a list, [...], or one table [[...]] for each part",
     "too_long": "remove the surplus values",
-    "dict_type": "write a table, [...]",
-    "model_type": "write a table, [...]",
 }
 _CORNERS = "write a list of corners, [[..., ...], [..., ...], [..., ...]]"
 FORMS = {  # Remedy for a value of another form than those that these keys have.
+    "gravity": "write a pair, gravity = [0, -9.81]",
     "outline": _CORNERS,
     "holes": _CORNERS + ", for each hole",
     "mirror": 'write the line of symmetry, "x = 0" or "y = 40 mm", or a list of both',
@@ -183,7 +181,16 @@ def _problem(error: dict[str, Any], data: Any) -> str:
     remedy = _remedy(error, loc)
     if remedy.startswith("cannot read the expression"):
         return f"{where}: {remedy}"  # The remedy quotes the value already.
-    return f"{where} = {reprlib.repr(error['input'])}: {remedy}"
+    return f"{where}{_shown(error['input'])}: {remedy}"
+
+
+def _shown(value: object) -> str:
+    """Return a value for a message, ` = VALUE`; a table, or a list of them, by its kind."""
+    if isinstance(value, dict):
+        return " is a table"
+    if isinstance(value, list) and value and all(isinstance(one, dict) for one in value):
+        return " is a list of tables"
+    return f" = {reprlib.repr(value)}"
 
 
 def _remedy(error: dict[str, Any], loc: Sequence[str | int]) -> str:
@@ -195,8 +202,11 @@ def _remedy(error: dict[str, Any], loc: Sequence[str | int]) -> str:
         return FORMS[key]
     if kind == "string_pattern_mismatch":
         return NAME_REMEDIES[key]
-    if kind == "tuple_type" and len(loc) > 1:
-        return "write a pair, [..., ...]"
+    table = ".".join(one for one in loc if isinstance(one, str))
+    if kind == "tuple_type":
+        return "write a pair, [..., ...]" if len(loc) > 1 else f"write [[{table}]] for each part"
+    if kind in ("dict_type", "model_type"):
+        return f"write [[{table}]]" if isinstance(loc[-1], int) else f"write [{table}]"
     if kind == "less_than_equal":
         return f"write a number of at most {error['ctx']['le']}"
     return str(REMEDIES.get(kind, error["msg"]))
