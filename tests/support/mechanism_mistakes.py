@@ -781,6 +781,18 @@ CHANGES = {
         'model = "beam"\nprofile = "taper"\nend_thickness = 0.2\nthickness = "0.1 mm"',
         "leaf.end_thickness = 0.2 m is not less than the length of the flexure left, 0.02 m: check",
     ),
+    "notch longer than its flexure": (
+        'model = "2R"\nthickness = "0.1 mm"',
+        'model = "beam"\nprofile = "notch"\nnotch_radius = 0.012\nend_thickness = 0.05\n'
+        'thickness = "0.1 mm"',
+        "flexure left: its notch of the length 0.024 m is longer than the flexure, 0.02 m",
+    ),
+    "body that nothing holds": (
+        '[[flexures]]\nname = "left"',
+        '[[bodies]]\nname = "extra"\nmass = 1\ninertia = 1\ncentre = [0, 0]\n'
+        '[[flexures]]\nname = "left"',
+        "the body extra is not held: no flexures or joints connect it to the ground",
+    ),
     "joint of points drawn apart": (
         'points.hook = ["arm.length", 0]',
         "points.hook = [0.041, 0]",

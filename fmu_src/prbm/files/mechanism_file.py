@@ -246,7 +246,7 @@ def _first_by_line(
 
 # The name at the beginning of a message, after the kind of the part, or a quoted name.
 _SUBJECT = re.compile(
-    r"(?:^(?:mechanism |(?:the )?(?:flexure|joint|stop) )?|')([\w\[\]]+(?:\.[\w\[\]]+)*)"
+    r"(?:^(?:mechanism |(?:the )?(?:body|flexure|joint|stop) )?|')([\w\[\]]+(?:\.[\w\[\]]+)*)"
 )
 
 

@@ -20,6 +20,8 @@ from pydantic import (
 )
 
 from ..base.errors import MechanismError, PrbmError
+from ..mechanics.collection import Collection
+from ..mechanics.flexures import check_drawn
 from ..mechanism import parameters, parts
 from ..mechanism.description import RESERVED, Mechanism, undefined
 from ..mechanism.expressions import Quantity, affine
@@ -628,11 +630,11 @@ def _check_drawn(mechanism: Mechanism) -> None:
                 f"{LENGTH_MAX:g} m of the origin"
             )
     types = {kind.name: kind for kind in mechanism.flexure_types}
+    drawn = Collection(mechanism, values)
     for flexure in mechanism.flexures:
-        length = _distance(mechanism, flexure, values)
-        parts.check_slender(flexure, types[flexure.type], length, values)
+        check_drawn(drawn, flexure, types[flexure.type])
     for joint in mechanism.joints:
-        apart = _distance(mechanism, joint, values)
+        apart = abs(drawn.end(joint, joint.end) - drawn.end(joint, joint.start))
         if apart > LENGTH_MIN:
             raise MechanismError(
                 f"joint {joint.name}: {joint.start} and {joint.end} are drawn {apart:g} m apart; "
@@ -647,11 +649,3 @@ def _places(mechanism: Mechanism) -> Iterator[tuple[str, parts.Point]]:
         yield f"{body.name}.centre", body.centre
         yield from ((f"{body.name}.{name}", point) for name, point in body.points.items())
         yield from ((f"{body.name}.outline", corner) for corner in body.outline)
-
-
-def _distance(
-    mechanism: Mechanism, part: parts.Flexure | parts.Joint, values: Mapping[str, float]
-) -> float:
-    """Return the distance of the two points of a part, as drawn [m]."""
-    ends = (mechanism.point(reference, part.name) for reference in (part.start, part.end))
-    return math.dist(*([affine(c)(values) for c in end] for end in ends))

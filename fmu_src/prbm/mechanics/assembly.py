@@ -52,7 +52,7 @@ def assemble(mechanism: Mechanism, values: Mapping[str, float]) -> System:
     Raises
     ------
     MechanismError
-        If a body is not connected to the ground, or loops depend on each other.
+        If loops depend on each other.
     ParameterError
         If a value is missing, a flexure has no length or is as thick as long, or the links of a
         flexure are longer than the flexure.
@@ -93,22 +93,17 @@ class _Assembler(Collection):
     def system(self) -> System:
         waiting: list[Flexure | Joint] = [*self.mechanism.flexures, *self.mechanism.joints]
         while waiting:
-            for part in waiting:
-                if body_of(part.start) in self.origin or body_of(part.end) in self.origin:
-                    break
-            else:
-                names = ", ".join(part.name for part in waiting)
-                raise MechanismError(
-                    f"nothing connects {names} to the ground: connect one of their bodies to it"
-                )
+            part = next(
+                part
+                for part in waiting
+                if body_of(part.start) in self.origin or body_of(part.end) in self.origin
+            )
             waiting.remove(part)
             if isinstance(part, Joint):
                 self.joint(part)
             else:
                 add_flexure(self, part)
         for body in self.mechanism.bodies:
-            if body.name not in self.origin:
-                raise MechanismError(f"the body {body.name} is not held by any flexure or joint")
             self.body(body.name)
         result = self.arrays()
         e = result.directions(result.q0)

@@ -281,6 +281,7 @@ class Mechanism:
             self._check_flexure(flexure, types)
         for joint in self.joints:
             self._check_connection("joint", joint)
+        self._check_held()
         for probe in self.probes:
             self.point(probe.point, probe.name)
         self._check_attached({body.name: body for body in self.bodies})
@@ -405,6 +406,26 @@ class Mechanism:
                 f"{kind} {part.name} joins {body_of(part.start)} to itself: choose points of two "
                 "bodies"
             )
+
+    def _check_held(self) -> None:
+        """Reject bodies that no flexures or joints connect to the ground."""
+        neighbours: dict[str, list[str]] = {}
+        parts: tuple[Flexure | Joint, ...] = (*self.flexures, *self.joints)
+        for part in parts:
+            ends = body_of(part.start), body_of(part.end)
+            for one, other in (ends, ends[::-1]):
+                neighbours.setdefault(one, []).append(other)
+        held, waiting = {GROUND}, [GROUND]
+        while waiting:
+            found = {*neighbours.get(waiting.pop(), ())} - held
+            held |= found
+            waiting += found
+        for body in self.bodies:
+            if body.name not in held:
+                raise MechanismError(
+                    f"the body {body.name} is not held: no flexures or joints connect it to the "
+                    "ground; add one, or remove the body"
+                )
 
     def check_rigid(self, use: str) -> None:
         """Reject compliant stops, for a computation that has rigid impacts only.
