@@ -10,6 +10,7 @@ import pytest
 from prbm.base.errors import EquilibriumError, MechanismError, ParameterError, PrbmError
 from prbm.files.mechanism_file import read_mechanism, shipped
 from prbm.hybrid.simulation import Simulation
+from prbm.kernel.simulation import KernelSimulation
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.modal import modes
 from prbm.mechanics.statics import equilibrium, free_displacement
@@ -135,6 +136,19 @@ def test_moving_parts_without_mass_are_rejected():
         massless.values()
     with pytest.raises(ParameterError, match="has no mass"):
         assemble(GUIDE, values)
+
+
+@pytest.mark.parametrize("engine", [Simulation, KernelSimulation])
+@pytest.mark.parametrize("name", ["PRBDM2R", "GuideBeam"])
+def test_inertias_that_differ_by_round_off_are_rejected_with_the_names_of_both_parts(name, engine):
+    """The inertia of the flexures is mostly in proportion to their section."""
+    thin = {"flexure.thickness": 1e-8, "flexure.width": 1e-8}
+    words = (
+        r"the inertia of flexure \w+, .* less than 1e-12 of that of body shuttle, .* check the "
+        r"units of masses, inertias, densities, lengths and coordinates \(numbers without a unit"
+    )
+    with pytest.raises(ParameterError, match=words):
+        engine(mechanism(name), thin)
 
 
 def test_incomplete_values_are_rejected():

@@ -91,6 +91,7 @@ class _Assembler(Collection):
     # -- from the ground to all bodies --
 
     def system(self) -> System:
+        names: list[str] = []  # Of the parts that move with the coordinates.
         waiting: list[Flexure | Joint] = [*self.mechanism.flexures, *self.mechanism.joints]
         while waiting:
             part = next(
@@ -103,14 +104,16 @@ class _Assembler(Collection):
                 self.joint(part)
             else:
                 add_flexure(self, part)
+            names += [
+                f"body {owner}" if owner in self.index else f"flexure {part.name}"
+                for owner in self.owners[len(names) :]
+            ]
         for body in self.mechanism.bodies:
             self.body(body.name)
         result = self.arrays()
         e = result.directions(result.q0)
         check_loops(result.gradient(result.loops, e), [name for name, _ in self.loops])
-        bodies = {j: f"body {name}" for name, j in self.index.items()}
-        parts = [bodies.get(j, "a flexure") for j in range(result.n)]
-        check_masses(result.mass_matrix(e), parts)
+        check_masses(result.mass_matrix(e), names)
         return result
 
     def body(self, name: str) -> None:
@@ -299,7 +302,8 @@ def check_masses(M: Real, names: Sequence[str]) -> None:
             f"the inertia of {names[light]}, {inertias[light]:.3g} kg m2, is less than "
             f"{INERTIA_RATIO_MIN:g} of that of {names[heavy]}, {inertias[heavy]:.3g} kg m2, so "
             "that round-off would change the motion: check the units of masses, inertias, "
-            "densities and lengths, and make the light part heavier"
+            "densities, lengths and coordinates (numbers without a unit are in SI), or make the "
+            "light part heavier"
         )
     scale = np.sqrt(inertias)
     if np.all(scale > 0.0):
