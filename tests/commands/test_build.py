@@ -580,7 +580,7 @@ FILE_MISTAKES = {
     ("gravity = [9.81, 0.0]", "gravity = [9.81]"): "gravity = [9.81]: a number is missing; add it",
     ("centre = [", "centre = [[1], "): "bodies.0.centre",
     ("left = [0.0, 0.0]", "left = [0.0]"): "ground.left = [0.0]: a number is missing; add it",
-    ("[[stops]]", "[stops]"): "write a list, [...], or one table [[...]]",
+    ("[[stops]]", "[stops]"): "stops is a table: write [[stops]] for each part",
     ("value = 0.04", "value = -1.0"): "flexure.length = -1 m must be at least",
 }
 

@@ -49,6 +49,12 @@ def read(folder: Path, body: str, tail: str = TAIL) -> Mechanism:
     return read_mechanism(path)
 
 
+def leaf(body: str, root: str, point: str = "own") -> str:
+    """Return the table of a flexure between a point of the ground and a point of a body."""
+    ends = f'start = "ground.{root}"\nend = "{body}.{point}"'
+    return f'[[flexures]]\nname = "own_{body}"\ntype = "leaf"\n{ends}\n'
+
+
 def plain(value: object, key: str = "") -> object:
     """Return data in which equal coordinates are equal texts; the order of points is left out."""
     if isinstance(value, dict):
@@ -412,7 +418,8 @@ name = "right_arm"
 mass = "1 g"
 inertia = "0.2 kg.mm2"
 centre = ["span/2 + {shift}", "50 mm"]
-"""
+points.own = ["span/2", "90 mm"]
+{leaf("right_arm", "mid")}"""
     body = MIRRORED.replace('mirror = "x = 0 mm"\n', right)
     joint = read(tmp_path, body).joints[1]
     assert joint.start == "stage.right_ear"
@@ -475,8 +482,9 @@ def test_copies_join_the_bodies_at_the_image_of_the_centre_whatever_their_names(
 def test_copies_join_the_same_body_if_two_bodies_may_be_the_image(tmp_path):
     ring = '[[bodies]]\nname = "ring"\nmass = "1 g"\ninertia = "1 kg.mm2"\n'
     start, end = (BEADS.index(f'[[flexures]]\nname = "{name}"') for name in ("string", "leg"))
-    parts = BEADS[:start] + BEADS[end:] + ring + 'centre = ["10 mm + span", 0]\n'
-    beads = read(tmp_path, parts, '[release]\nbody = "bead"\n')
+    ring += 'centre = ["10 mm + span", 0]\npoints.own = ["10 mm + span", "5 mm"]\n'
+    ring += leaf("ring", "root") + leaf("bead_3", "root", "low")
+    beads = read(tmp_path, BEADS[:start] + BEADS[end:] + ring, '[release]\nbody = "bead"\n')
     assert [f.end for f in beads.flexures if f.name == "leg_2"] == ["bead_2.low_2"]
 
 

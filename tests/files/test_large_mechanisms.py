@@ -14,7 +14,10 @@ PARTS = {
     "geometry": 'value = "3 mm"\n',
     "materials": "youngs_modulus = 1e9\ndensity = 1e3\n",
     "flexure_types": 'model = "2R"\nthickness = 1e-4\nwidth = 1e-2\nmaterial = "steel"\n',
-    "bodies": "mass = 1\ninertia = 1\ncentre = [0, 0]\npoints.p = [0, 0]\n",
+    "bodies": (
+        'mass = 1\ninertia = 1\ncentre = [0, 0]\npoints.p = ["arm.length", 0]\n'
+        '[[joints]]\nname = "PART_pin"\nstart = "arm.tip"\nend = "PART.p"\n'
+    ),
     "flexures": 'type = "leaf"\nstart = "ground.foot"\nend = "arm.root"\n',
     "flexures with sections": (
         'model = "1R"\nthickness = 1e-4\nwidth = 1e-2\nmaterial = "steel"\n'
@@ -30,7 +33,8 @@ PARTS = {
 
 def text(parts: str, n: int, last: str = "") -> str:
     """Return a mechanism file with n more parts of a kind."""
-    tables = (f'[[{parts.split()[0]}]]\nname = "part_{i}"\n{PARTS[parts]}' for i in range(n))
+    table = f'[[{parts.split()[0]}]]\nname = "PART"\n{PARTS[parts]}'
+    tables = (table.replace("PART", f"part_{i}") for i in range(n))
     return EXAMPLE + "\n".join(tables) + last
 
 

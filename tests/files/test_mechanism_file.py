@@ -385,6 +385,7 @@ TWO_LINES = (  # Mistakes of two lines that do not agree.
     "material and body of one name",
     "zero-length flexure",
     "joint of points drawn apart",
+    "notch longer than its flexure",
 )
 
 

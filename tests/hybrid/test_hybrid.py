@@ -11,6 +11,7 @@ from prbm.base.errors import EquilibriumError, ParameterError, SimulationError
 from prbm.hybrid import events
 from prbm.hybrid.events import Event, EventKind
 from prbm.hybrid.simulation import Simulation
+from prbm.kernel.simulation import KernelSimulation
 from prbm.mechanics.contact_state import ContactMode
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.parts import Body, Flexure, FlexureType, Friction, Release, Stop
@@ -338,6 +339,17 @@ def test_links_longer_than_the_flexure_are_rejected():
 def test_a_displacement_at_release_that_is_out_of_reach_is_rejected(model):
     with pytest.raises(EquilibriumError, match=r"displacement = -0\.05 m cannot be reached"):
         Simulation(mechanism(model), {"release.displacement": -0.05})
+
+
+@pytest.mark.parametrize("engine", [Simulation, KernelSimulation])
+@pytest.mark.parametrize(("modulus", "hint"), [(2.0, True), (2e11, False)])
+def test_a_release_out_of_reach_from_the_start_has_a_hint_at_units(modulus, hint, engine):
+    """The unit of Young's modulus may be missing."""
+    values = {"flexure.youngs_modulus": modulus, "gravity.x": 0.0, "gravity.y": -9.81}
+    with pytest.raises(EquilibriumError, match="cannot be reached") as caught:
+        engine(mechanism("GuideBeam"), values | {"release.displacement": -0.2})
+    assert ("beyond 0 m" in str(caught.value)) is hint
+    assert ("check the units of youngs_modulus and thickness" in str(caught.value)) is hint
 
 
 def test_an_earlier_or_invalid_time_is_rejected():

@@ -10,6 +10,7 @@ import pytest
 from prbm.base.errors import EquilibriumError, MechanismError, ParameterError, PrbmError
 from prbm.files.mechanism_file import read_mechanism, shipped
 from prbm.hybrid.simulation import Simulation
+from prbm.kernel.simulation import KernelSimulation
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.modal import modes
 from prbm.mechanics.statics import equilibrium, free_displacement
@@ -137,6 +138,19 @@ def test_moving_parts_without_mass_are_rejected():
         assemble(GUIDE, values)
 
 
+@pytest.mark.parametrize("engine", [Simulation, KernelSimulation])
+@pytest.mark.parametrize("name", ["PRBDM2R", "GuideBeam"])
+def test_inertias_that_differ_by_round_off_are_rejected_with_the_names_of_both_parts(name, engine):
+    """The inertia of the flexures is mostly in proportion to their section."""
+    thin = {"flexure.thickness": 1e-8, "flexure.width": 1e-8}
+    words = (
+        r"the inertia of flexure \w+, .* less than 1e-12 of that of body shuttle, .* check the "
+        r"units of masses, inertias, densities, lengths and coordinates \(numbers without a unit"
+    )
+    with pytest.raises(ParameterError, match=words):
+        engine(mechanism(name), thin)
+
+
 def test_incomplete_values_are_rejected():
     """The message names missing parameters and the call that returns all values."""
     values = GUIDE.values()
@@ -178,12 +192,10 @@ def test_a_mechanism_with_unconnected_bodies_is_rejected():
     loose = Body("loose", 1.0, 1.0, (1.0, 1.0), {"a": (1.0, 1.0)})
     other = Body("other", 1.0, 1.0, (2.0, 1.0), {"a": (2.0, 1.0)})
     between = Flexure("between", "flexure", "loose.a", "other.a")
-    falls = changed(bodies=(BODY, loose, other), flexures=(LEFT, RIGHT, between))
-    with pytest.raises(MechanismError, match="nothing connects"):
-        assemble(falls, falls.values())
-    alone = changed(bodies=(BODY, loose))
     with pytest.raises(MechanismError, match="loose is not held"):
-        assemble(alone, alone.values())
+        changed(bodies=(BODY, loose, other), flexures=(LEFT, RIGHT, between))
+    with pytest.raises(MechanismError, match="loose is not held"):
+        changed(bodies=(BODY, loose))
 
 
 def test_a_flexure_without_length_is_rejected():

@@ -282,6 +282,7 @@ def test_a_result_without_motion_is_reported_and_not_plotted(
     assert [text.get_text() for text in axes.texts] == ["nothing moves in 0.05 s"]
     lines = headline(still.columns, still.mechanism, still.values)
     assert any("nothing moves" in line for line in lines)
+    assert "impacts at stop      0, the smallest gap was 5.00 mm" in lines
     moving = simulate(mechanisms["PRBDM2R"], at_rest | {"force.x": 1e-6}, stop_time=0.05)
     lines = headline(moving.columns, moving.mechanism, moving.values)
     assert not any("nothing moves" in line for line in lines)

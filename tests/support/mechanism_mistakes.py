@@ -143,6 +143,7 @@ thickness = 1e-3
 material = "steel"
 """
 HOLE = "[[0.055, 0.002], [0.057, 0.002], [0.057, 0.003]]"
+MISSPELT = HOLE.replace("0.057", '"arm.lenght"', 1)
 RIGHT = 'thickness = "50 um"\nwidth = 8e-3\nmaterial = "steel"\n'
 CHANGES = {
     # units
@@ -234,13 +235,36 @@ CHANGES = {
         'point = "tip"\ndir',
         "write the name of a point",
     ),
-    "array instead of table": ("[release]", "[[release]]", "release = [{"),
-    "table instead of array": ("[[joints]]", "[joints]", "joints = {"),
-    "ground as an array": ("[ground]", "[[ground]]", "ground = [{"),
+    "array instead of table": (
+        "[release]",
+        "[[release]]",
+        "release is a list of tables: write [release]",
+    ),
+    "table instead of array": (
+        "[[joints]]",
+        "[joints]",
+        "joints is a table: write [[joints]] for each part",
+    ),
+    "gravity without its direction": (
+        'gravity = ["0 m/s2", "-981 cm/s2"]',
+        "gravity = 9.81",
+        "gravity = 9.81: write a pair, gravity = [0, -9.81]",
+    ),
+    "value instead of a table of points": (
+        '[bodies.points]\nroot = ["20 mm", 0.0]\ntip = ["arm.length", "0 m"]\n',
+        "points = 3\n",
+        "bodies.0.points (of arm) = 3: write [bodies.points]",
+    ),
+    "table as a number": (
+        'mass = "53.187 g"',
+        "mass = { value = 1 }",
+        "bodies.0.mass (of arm) is a table: write a number",
+    ),
+    "ground as an array": ("[ground]", "[[ground]]", "ground is a list of tables: write [ground]"),
     "value instead of an array": (
         '[[probes]]\nname = "watch"\npoint = "arm.tip"\n',
         "[probes]\n",
-        "probes = {}: write a list",
+        "probes is a table: write [[probes]]",
     ),
     # keys
     "unknown key": ("inertia = 1e-6", "inertai = 1e-6", "did you mean inertia?"),
@@ -329,6 +353,21 @@ CHANGES = {
         'point = "arm.tip"\ndir',
         'point = "anvil.top"\ndir',
         "wall.point = 'anvil.top' is not a point of the body arm",
+    ),
+    "stop at a point of an unknown body": (
+        'body = "arm"\npoint = "arm.tip"\ndir',
+        'body = "harm"\npoint = "arm.tip"\ndir',
+        "wall.body = 'harm' is not defined; choose one of arm, anvil",
+    ),
+    "force at a point of an unknown body": (
+        'body = "arm"\npoint = "arm.tip"\n\n[[forces]]',
+        'body = "harm"\npoint = "arm.tip"\n\n[[forces]]',
+        "push.body = 'harm' is not defined; choose one of arm, anvil",
+    ),
+    "release of a point of an unknown body": (
+        'body = "arm"\ndirection = "1.5',
+        'body = "harm"\npoint = "arm.tip"\ndirection = "1.5',
+        "release.body = 'harm' is not defined; choose one of arm, anvil",
     ),
     "stop of an unknown body": (
         'body = "arm"\npoint = "arm.tip"\ndir',
@@ -531,6 +570,21 @@ CHANGES = {
         TRIANGLE.replace("[0.06, 0.02]", '["arm.length", 0.02]'),
         "anvil.outline changes its shape with arm.length: write its dimensions as numbers",
     ),
+    "outline with an undefined parameter": (
+        ANVIL,
+        TRIANGLE.replace("[0.06, 0.02]", '["arm.lenght", 0.02]'),
+        "anvil.outline refers to 'arm.lenght', which is not a parameter of Striker; did you mean",
+    ),
+    "hole with an undefined parameter": (
+        ANVIL,
+        f"{TRIANGLE}holes = [{MISSPELT}]\n",
+        "anvil.holes refers to 'arm.lenght', which is not a parameter of Striker; did you mean",
+    ),
+    "corner at a point with an undefined parameter": (
+        ANVIL + 'points.top = ["arm.length + 2 cm", "20 mm"]\n',
+        TRIANGLE.replace("[0.06, 0.02]", '"top"') + 'points.top = ["arm.lenght + 2 cm", 0.02]\n',
+        "anvil.top refers to 'arm.lenght', which is not a parameter of Striker; did you mean",
+    ),
     "corner that is no point": (
         ANVIL,
         TRIANGLE.replace("[0.06, 0.02]", '"nose"'),
@@ -727,6 +781,18 @@ CHANGES = {
         'model = "beam"\nprofile = "taper"\nend_thickness = 0.2\nthickness = "0.1 mm"',
         "leaf.end_thickness = 0.2 m is not less than the length of the flexure left, 0.02 m: check",
     ),
+    "notch longer than its flexure": (
+        'model = "2R"\nthickness = "0.1 mm"',
+        'model = "beam"\nprofile = "notch"\nnotch_radius = 0.012\nend_thickness = 0.05\n'
+        'thickness = "0.1 mm"',
+        "flexure left: its notch of the length 0.024 m is longer than the flexure, 0.02 m",
+    ),
+    "body that nothing holds": (
+        '[[flexures]]\nname = "left"',
+        '[[bodies]]\nname = "extra"\nmass = 1\ninertia = 1\ncentre = [0, 0]\n'
+        '[[flexures]]\nname = "left"',
+        "the body extra is not held: no flexures or joints connect it to the ground",
+    ),
     "joint of points drawn apart": (
         'points.hook = ["arm.length", 0]',
         "points.hook = [0.041, 0]",
@@ -798,11 +864,26 @@ CONTENTS = {
     "UTF-16": (EXAMPLE.encode("utf-16"), "not a TOML file ('utf-8' codec"),
     "zip": (b"PK\x03\x04\x14\x00", "not a TOML file ("),
     "JSON": (b'{"name": "x"}', "not a TOML file (Invalid statement (at line 1, column 1))"),
-    "value instead of a table": (b"release = 3", "line 1: release = 3: write a table, [...]"),
+    "value instead of a table": (b"release = 3", "line 1: release = 3: write [release]"),
     "half a line": (
         b'name = "x"\ntitle = \n',
-        "not a TOML file (Invalid value (at line 2, column 9))",
+        "not a TOML file (Invalid value (at line 2, column 9)): title =; write texts, and numbers",
     ),
+    "quantity without quotes": (
+        b'name = "x"\nposition = 5 mm\n',
+        "(at line 2, column 14)): position = 5 mm; write texts, and numbers with a unit, in "
+        'quotes, for instance "5 mm"',
+    ),
+    "text without quotes": (
+        b"model = beam",
+        "(Invalid value (at line 1, column 9)): model = beam; write texts, and numbers with",
+    ),
+    "point without quotes": (
+        b"foot = [5 mm, 0]",
+        "(Unclosed array (at line 1, column 11)): foot = [5 mm, 0]; write texts, and numbers with",
+    ),
+    "text with one quote": (b'name = "x\na = 1', '): name = "x; write texts, and numbers with'),
+    "line of many characters": (b"a = 1\0" * BOMB, "a = 1 a = 1 a = 1"),
     "bomb of lists": (b"x = " + b"[" * BOMB + b"]" * BOMB, "are nested too deeply"),
     "bomb of tables": (b"x = " + b"{a=" * BOMB + b"1" + b"}" * BOMB, "are nested too deeply"),
     "bomb of keys": (b"a." * BOMB + b"a = 1", "are nested too deeply"),

@@ -19,6 +19,7 @@ from pydantic_core.core_schema import DictSchema, NullableSchema, TupleSchema, W
 from ..base import reading
 from ..base.errors import MechanismError, ParameterError, PrbmError
 from ..base.names import proposal
+from ..base.text import printable
 from ..mechanism.description import Mechanism
 from .schema import MechanismTable, mechanism
 from .tables import RepeatTable, Table
@@ -29,6 +30,9 @@ Item = TypeVar("Item")
 FILE_SIZE_MAX = 1 << 20  # bytes; a mechanism of a hundred flexures has 20 kB.
 PROBLEMS_MAX = 5  # Problems of one file in a message.
 KEY_LENGTH_MAX = 100  # Parts of a dotted key; tomllib needs more than linear time for longer ones.
+LINE_LENGTH_MAX = 80  # Characters of a line of a file in a message.
+UNQUOTED = 'write texts, and numbers with a unit, in quotes, for instance "5 mm"'
+UNQUOTED_REASONS = ("Expected newline", "Invalid value", "Unclosed", "Unterminated", "Illegal")
 DIALECT = "http://json-schema.org/draft-07/schema#"  # The latest that TOML editors support.
 REMEDIES = {  # Remedy for each of pydantic's error types.
     "int_type": "write a whole number",
@@ -36,13 +40,11 @@ REMEDIES = {  # Remedy for each of pydantic's error types.
     "string_type": "write a text in quotes",
     "string_too_long": f"write a shorter name, of at most {NAME_LENGTH_MAX} characters",
     "bool_type": "write true or false",
-    "tuple_type": "write a list, [...], or one table [[...]] for each part",
     "too_long": "remove the surplus values",
-    "dict_type": "write a table, [...]",
-    "model_type": "write a table, [...]",
 }
 _CORNERS = "write a list of corners, [[..., ...], [..., ...], [..., ...]]"
 FORMS = {  # Remedy for a value of another form than those that these keys have.
+    "gravity": "write a pair, gravity = [0, -9.81]",
     "outline": _CORNERS,
     "holes": _CORNERS + ", for each hole",
     "mirror": 'write the line of symmetry, "x = 0" or "y = 40 mm", or a list of both',
@@ -77,8 +79,10 @@ def read_mechanism(path: str | Path) -> Mechanism:
         data = None if deep else tomllib.loads(text)
     except RecursionError:
         data = None
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except UnicodeDecodeError as error:
         raise MechanismError(f"{path}: not a TOML file ({error})") from None
+    except tomllib.TOMLDecodeError as error:
+        raise MechanismError(f"{path}: not a TOML file ({_syntax(str(error), text)}") from None
     except ValueError:
         raise MechanismError(f"{path}: a number has thousands of digits; round it") from None
     if data is None:
@@ -149,6 +153,15 @@ def load(name: str | Path) -> Mechanism:
 # --- error messages ---------------------------------------------------------------------------
 
 
+def _syntax(reason: str, text: str) -> str:
+    """Return the end of the message for an error of the syntax: reason, line and remedy."""
+    number = re.search(r"at line (\d+)", reason)
+    line = text.split("\n")[int(number[1]) - 1] if number else ""
+    shown = f": {printable(line).strip()[:LINE_LENGTH_MAX]}" if line else ""
+    remedy = f"; {UNQUOTED}" if reason.startswith(UNQUOTED_REASONS) else ""
+    return f"{reason}){shown}{remedy}"
+
+
 def _problem(error: dict[str, Any], data: Any) -> str:
     """Return the message for one error that pydantic found: key, value and remedy."""
     kind = error["type"]
@@ -168,7 +181,16 @@ def _problem(error: dict[str, Any], data: Any) -> str:
     remedy = _remedy(error, loc)
     if remedy.startswith("cannot read the expression"):
         return f"{where}: {remedy}"  # The remedy quotes the value already.
-    return f"{where} = {reprlib.repr(error['input'])}: {remedy}"
+    return f"{where}{_shown(error['input'])}: {remedy}"
+
+
+def _shown(value: object) -> str:
+    """Return a value for a message, ` = VALUE`; a table, or a list of them, by its kind."""
+    if isinstance(value, dict):
+        return " is a table"
+    if isinstance(value, list) and value and all(isinstance(one, dict) for one in value):
+        return " is a list of tables"
+    return f" = {reprlib.repr(value)}"
 
 
 def _remedy(error: dict[str, Any], loc: Sequence[str | int]) -> str:
@@ -180,8 +202,11 @@ def _remedy(error: dict[str, Any], loc: Sequence[str | int]) -> str:
         return FORMS[key]
     if kind == "string_pattern_mismatch":
         return NAME_REMEDIES[key]
-    if kind == "tuple_type" and len(loc) > 1:
-        return "write a pair, [..., ...]"
+    table = ".".join(one for one in loc if isinstance(one, str))
+    if kind == "tuple_type":
+        return "write a pair, [..., ...]" if len(loc) > 1 else f"write [[{table}]] for each part"
+    if kind in ("dict_type", "model_type"):
+        return f"write [[{table}]]" if isinstance(loc[-1], int) else f"write [{table}]"
     if kind == "less_than_equal":
         return f"write a number of at most {error['ctx']['le']}"
     return str(REMEDIES.get(kind, error["msg"]))
@@ -221,7 +246,7 @@ def _first_by_line(
 
 # The name at the beginning of a message, after the kind of the part, or a quoted name.
 _SUBJECT = re.compile(
-    r"(?:^(?:mechanism |(?:the )?(?:flexure|joint|stop) )?|')([\w\[\]]+(?:\.[\w\[\]]+)*)"
+    r"(?:^(?:mechanism |(?:the )?(?:body|flexure|joint|stop) )?|')([\w\[\]]+(?:\.[\w\[\]]+)*)"
 )
 
 

@@ -129,6 +129,15 @@ def plate(
     }
 
 
+def mean(corners: Sequence[Point]) -> Point:
+    """Return the mean of corners, which may depend on parameters [m]."""
+    x, y = (
+        written(reduce(Affine.plus, map(affine, along)).scaled(1.0 / len(corners)))
+        for along in zip(*corners, strict=True)
+    )
+    return x, y
+
+
 def _shape(key: str, corners: Sequence[Point], origin: Point) -> Complex:
     """Return the corners of a simple polygon relative to a point [m]; reject other ones."""
     if not 3 <= len(corners) <= CORNERS_MAX:

@@ -20,8 +20,10 @@ from pydantic import (
 )
 
 from ..base.errors import MechanismError, PrbmError
+from ..mechanics.collection import Collection
+from ..mechanics.flexures import check_drawn
 from ..mechanism import parameters, parts
-from ..mechanism.description import RESERVED, Mechanism
+from ..mechanism.description import RESERVED, Mechanism, undefined
 from ..mechanism.expressions import Quantity, affine
 from ..mechanism.flexure import (
     CLAMP,
@@ -43,7 +45,7 @@ from .copies import (
     mirrored_types,
     origins,
 )
-from .outlines import plate
+from .outlines import mean, plate
 from .tables import STRENGTHS, MaterialTable, Named, ParameterTable, RepeatTable, Table
 from .units import check_coherent, contact_stiffness
 from .values import (
@@ -360,7 +362,8 @@ def mechanism(file: MechanismTable, drawing: str = "") -> Mechanism:
     """
     _check_names(file)
     materials = _materials(file)
-    bodies = copied_bodies(file.bodies, [_body(table, materials) for table in file.bodies])
+    misshapen: list[MechanismError] = []
+    bodies = copied_bodies(file.bodies, [_body(t, materials, misshapen) for t in file.bodies])
     drawn = Drawing(file.ground, bodies)
     flexures = tuple(drawn.connections(file.flexures, [*map(_flexure, file.flexures)]))
     own = (flexure for flexure in file.flexures if flexure.type is None)
@@ -369,6 +372,8 @@ def mechanism(file: MechanismTable, drawing: str = "") -> Mechanism:
     connected = mirrored_types(file.flexures, flexures, types)
     try:
         result = _assembled(file, drawn, connected, joints, drawing)
+        if misshapen:  # Raised after an undefined name in an outline, which may be its cause.
+            raise misshapen[0]
         _check_drawn(result)
     except PrbmError as error:
         made_by = origins(_with_copies(file)) | drawn.made_by
@@ -498,8 +503,15 @@ def _named_material(
     return materials[name]
 
 
-def _body(table: BodyTable, materials: Mapping[str, dict[str, Quantity]]) -> parts.Body:
-    """Return the body of a table; mass, inertia and centre are given, or those of a plate."""
+def _body(
+    table: BodyTable,
+    materials: Mapping[str, dict[str, Quantity]],
+    misshapen: list[MechanismError],
+) -> parts.Body:
+    """Return the body of a table; mass, inertia and centre are given, or those of a plate.
+
+    The error of a plate without a valid shape is added to a list.
+    """
     outline = tuple(_corner(table, corner) for corner in table.outline)
     holes = tuple(tuple(_corner(table, corner) for corner in hole) for hole in table.holes)
     shape: dict[str, Any] = {"points": table.points, "outline": outline, "holes": holes}
@@ -530,7 +542,11 @@ def _body(table: BodyTable, materials: Mapping[str, dict[str, Quantity]]) -> par
         f"{table.name}.thickness", table.thickness, "m", "", LENGTH_MIN, LENGTH_MAX
     )
     density = _density(table, materials)
-    computed: Any = plate(table.name, outline, holes, table.thickness, density)
+    try:
+        computed: Any = plate(table.name, outline, holes, table.thickness, density)
+    except MechanismError as error:
+        misshapen.append(error)
+        computed = {"mass": "1", "inertia": "1", "centre": mean(outline)}
     return parts.Body(table.name, **computed, **shape)
 
 
@@ -587,14 +603,16 @@ def _attached(
 ) -> dict[str, Any]:
     """Return the fields of a part; a point given by name is replaced by its coordinates."""
     given = dict(table)
+    user = "release" if isinstance(table, ReleaseTable) else table.name
+    if table.body not in bodies:
+        raise MechanismError(undefined(f"{user}.body", table.body, bodies))
     if isinstance(table.point, str):
         body, _, name = table.point.rpartition(".")
-        points = bodies.get(table.body, {})
+        points = bodies[table.body]
         if body != table.body or name not in points:
-            name = "release" if isinstance(table, ReleaseTable) else table.name
             listed = ", ".join(f"{table.body}.{p}" for p in points)
             raise MechanismError(
-                f"{name}.point = {table.point!r} is not a point of the body {table.body}; "
+                f"{user}.point = {table.point!r} is not a point of the body {table.body}; "
                 + (f"its points are {listed}" if points else "define the points of this body")
             )
         given["point"] = points[name]
@@ -612,11 +630,11 @@ def _check_drawn(mechanism: Mechanism) -> None:
                 f"{LENGTH_MAX:g} m of the origin"
             )
     types = {kind.name: kind for kind in mechanism.flexure_types}
+    drawn = Collection(mechanism, values)
     for flexure in mechanism.flexures:
-        length = _distance(mechanism, flexure, values)
-        parts.check_slender(flexure, types[flexure.type], length, values)
+        check_drawn(drawn, flexure, types[flexure.type])
     for joint in mechanism.joints:
-        apart = _distance(mechanism, joint, values)
+        apart = abs(drawn.end(joint, joint.end) - drawn.end(joint, joint.start))
         if apart > LENGTH_MIN:
             raise MechanismError(
                 f"joint {joint.name}: {joint.start} and {joint.end} are drawn {apart:g} m apart; "
@@ -631,11 +649,3 @@ def _places(mechanism: Mechanism) -> Iterator[tuple[str, parts.Point]]:
         yield f"{body.name}.centre", body.centre
         yield from ((f"{body.name}.{name}", point) for name, point in body.points.items())
         yield from ((f"{body.name}.outline", corner) for corner in body.outline)
-
-
-def _distance(
-    mechanism: Mechanism, part: parts.Flexure | parts.Joint, values: Mapping[str, float]
-) -> float:
-    """Return the distance of the two points of a part, as drawn [m]."""
-    ends = (mechanism.point(reference, part.name) for reference in (part.start, part.end))
-    return math.dist(*([affine(c)(values) for c in end] for end in ends))

@@ -51,7 +51,7 @@ def assemble(mechanism: Mechanism, values: Mapping[str, float]) -> System:
     Raises
     ------
     MechanismError
-        If a body is not connected to the ground, or loops depend on each other.
+        If loops depend on each other.
     ParameterError
         If a value is missing, a flexure has no length or is as thick as long, or the links of a
         flexure are longer than the flexure.
@@ -90,31 +90,29 @@ class _Assembler(Collection):
     # -- from the ground to all bodies --
 
     def system(self) -> System:
+        names: list[str] = []  # Of the parts that move with the coordinates.
         waiting: list[Flexure | Joint] = [*self.mechanism.flexures, *self.mechanism.joints]
         while waiting:
-            for part in waiting:
-                if body_of(part.start) in self.origin or body_of(part.end) in self.origin:
-                    break
-            else:
-                names = ", ".join(part.name for part in waiting)
-                raise MechanismError(
-                    f"nothing connects {names} to the ground: connect one of their bodies to it"
-                )
+            part = next(
+                part
+                for part in waiting
+                if body_of(part.start) in self.origin or body_of(part.end) in self.origin
+            )
             waiting.remove(part)
             if isinstance(part, Joint):
                 self.joint(part)
             else:
                 add_flexure(self, part)
+            names += [
+                f"body {owner}" if owner in self.index else f"flexure {part.name}"
+                for owner in self.owners[len(names) :]
+            ]
         for body in self.mechanism.bodies:
-            if body.name not in self.origin:
-                raise MechanismError(f"the body {body.name} is not held by any flexure or joint")
             self.body(body.name)
         result = self.arrays()
         e = result.directions(result.q0)
         check_loops(result.gradient(result.loops, e), [name for name, _ in self.loops])
-        bodies = {j: f"body {name}" for name, j in self.index.items()}
-        parts = [bodies.get(j, "a flexure") for j in range(result.n)]
-        check_masses(result.mass_matrix(e), parts)
+        check_masses(result.mass_matrix(e), names)
         return result
 
     def body(self, name: str) -> None:
@@ -303,7 +301,8 @@ def check_masses(M: Real, names: Sequence[str]) -> None:
             f"the inertia of {names[light]}, {inertias[light]:.3g} kg m2, is less than "
             f"{INERTIA_RATIO_MIN:g} of that of {names[heavy]}, {inertias[heavy]:.3g} kg m2, so "
             "that round-off would change the motion: check the units of masses, inertias, "
-            "densities and lengths, and make the light part heavier"
+            "densities, lengths and coordinates (numbers without a unit are in SI), or make the "
+            "light part heavier"
         )
     scale = np.sqrt(inertias)
     if np.all(scale > 0.0):

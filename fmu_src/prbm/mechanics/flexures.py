@@ -40,6 +40,16 @@ def add_flexure(parts: Collection, flexure: Flexure) -> None:
         _add_links(parts, flexure, _segments(parts, flexure, kind))
 
 
+def check_drawn(parts: Collection, flexure: Flexure, kind: FlexureType) -> None:
+    """Reject a flexure as :func:`add_flexure`, without adding it."""
+    check_slender(flexure, kind, parts.length(flexure), parts.values)
+    model = parts.mechanism.model(kind)
+    if model.order:
+        _panels(parts, flexure, kind, _line(parts, flexure, kind).length, model.nodes)
+    else:
+        _segments(parts, flexure, kind)
+
+
 def _segments(parts: Collection, flexure: Flexure, kind: FlexureType) -> Segments:
     """Return the segments of a flexure, from its start to its end."""
     L = parts.length(flexure)

@@ -302,13 +302,14 @@ def _unreachable(system: System, displacement: float | None, loaded: bool, done:
         )
     where = (
         f"{_given(system, displacement)} cannot be reached: no equilibrium was found beyond "
-        f"{done * displacement:.4g} {_unit(system)}"
+        f"{done * displacement + 0.0:.4g} {_unit(system)}"
     )
+    units = "" if done else "; or check the units of youngs_modulus and thickness"
     if not system.gravity:
-        return f"{where}; release closer to the straight shape"
+        return f"{where}; release closer to the straight shape{units}"
     return (
         f"{where} (gravity raised in proportion); release closer to the straight shape, or reduce "
-        "gravity across the motion"
+        f"gravity across the motion{units}"
     )
 
 

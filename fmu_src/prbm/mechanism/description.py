@@ -281,6 +281,7 @@ class Mechanism:
             self._check_flexure(flexure, types)
         for joint in self.joints:
             self._check_connection("joint", joint)
+        self._check_held()
         for probe in self.probes:
             self.point(probe.point, probe.name)
         self._check_attached({body.name: body for body in self.bodies})
@@ -294,18 +295,18 @@ class Mechanism:
         attached: tuple[Stop | Friction | Force, ...] = (*self.stops, *self.frictions, *self.forces)
         for part in attached:
             if part.body not in bodies:
-                raise MechanismError(_undefined(f"{part.name}.body", part.body, bodies))
+                raise MechanismError(undefined(f"{part.name}.body", part.body, bodies))
         for stop in self.stops:
             _check_law(stop)
             if stop.on != GROUND and stop.on not in bodies:
-                raise MechanismError(_undefined(f"{stop.name}.on", stop.on, (GROUND, *bodies)))
+                raise MechanismError(undefined(f"{stop.name}.on", stop.on, (GROUND, *bodies)))
             if stop.on == stop.body:
                 raise MechanismError(
                     f"the stop {stop.name} is fixed to the body that it stops: choose another "
                     f"body for {stop.name}.on"
                 )
         if self.release.body not in bodies:
-            raise MechanismError(_undefined("release.body", self.release.body, bodies))
+            raise MechanismError(undefined("release.body", self.release.body, bodies))
         _check_release(self.release)
 
     def _check_type(self, kind: FlexureType) -> None:
@@ -363,7 +364,7 @@ class Mechanism:
         """Reject a flexure with an undefined type or point, or with inconsistent ends."""
         kind = types.get(flexure.type)
         if kind is None:
-            raise MechanismError(_undefined(f"{flexure.name}.type", flexure.type, types))
+            raise MechanismError(undefined(f"{flexure.name}.type", flexure.type, types))
         self._check_connection("flexure", flexure)
         self._check_ends(flexure, kind)
 
@@ -405,6 +406,26 @@ class Mechanism:
                 f"{kind} {part.name} joins {body_of(part.start)} to itself: choose points of two "
                 "bodies"
             )
+
+    def _check_held(self) -> None:
+        """Reject bodies that no flexures or joints connect to the ground."""
+        neighbours: dict[str, list[str]] = {}
+        parts: tuple[Flexure | Joint, ...] = (*self.flexures, *self.joints)
+        for part in parts:
+            ends = body_of(part.start), body_of(part.end)
+            for one, other in (ends, ends[::-1]):
+                neighbours.setdefault(one, []).append(other)
+        held, waiting = {GROUND}, [GROUND]
+        while waiting:
+            found = {*neighbours.get(waiting.pop(), ())} - held
+            held |= found
+            waiting += found
+        for body in self.bodies:
+            if body.name not in held:
+                raise MechanismError(
+                    f"the body {body.name} is not held: no flexures or joints connect it to the "
+                    "ground; add one, or remove the body"
+                )
 
     def check_rigid(self, use: str) -> None:
         """Reject compliant stops, for a computation that has rigid impacts only.
@@ -454,11 +475,13 @@ class Mechanism:
         for name, point in self.ground.items():
             yield from ((f"{GROUND}.{name}", c) for c in point)
         for body in self.bodies:
-            yield from ((f"{body.name}.centre", c) for c in body.centre)
-            for corners in (body.outline, *body.holes):
-                yield from ((f"{body.name}.outline", c) for corner in corners for c in corner)
             for name, point in body.points.items():
                 yield from ((f"{body.name}.{name}", c) for c in point)
+            yield from ((f"{body.name}.outline", c) for corner in body.outline for c in corner)
+            for hole in body.holes:
+                yield from ((f"{body.name}.holes", c) for corner in hole for c in corner)
+            # Last, because the centre of a plate has the parameters of its corners.
+            yield from ((f"{body.name}.centre", c) for c in body.centre)
         points: tuple[Stop | Friction | Force | Release, ...] = (*self.stops, *self.frictions)
         for part in (*points, *self.forces, self.release):
             yield from ((f"{part.name}.point", c) for c in part.point or ())
@@ -469,7 +492,7 @@ class Mechanism:
             yield from ((name, c) for name, c in given if c is not None)
 
 
-def _undefined(key: str, name: str, known: Iterable[str]) -> str:
+def undefined(key: str, name: str, known: Iterable[str]) -> str:
     """Return the message for a key whose value is not the name of a known part."""
     remedy = f"choose one of {', '.join(known)}" if known else "define it"
     return f"{key} = {name!r} is not defined; {remedy}"

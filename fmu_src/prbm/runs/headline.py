@@ -119,6 +119,9 @@ def headline(
         if first is not None:
             which = "the first" if first.count == 1 else f"number {first.count}"
             details = f", {which} at t = {instant(first.time, span, 5)} with {first.speed:.3f} m/s"
+        elif not count:
+            nearest = float(column(columns, f"{stop}.gap").min())
+            details = f", the smallest gap was {length(nearest, system.length)}"
         lines.append(f"impacts at {stop:9} {count}{details}")
         force, indentation, duration = largest_latched(result, stop) if compliant else (0.0,) * 3
         if force > 0.0:

@@ -303,14 +303,17 @@ static Complex first_ground_end(const System *system) {
 
 /* --- checks ----------------------------------------------------------------------------------- */
 
-/* The name of the part that turns or stretches with a coordinate. */
-static const char *part_of(const System *system, int j) {
-    for (int body = 1; body <= system->b; body++) {
-        if (system->origins[body].j == j) {
-            return system->mechanism->bodies[body - 1].name;
-        }
+/* The name of the body or the flexure that turns or stretches with a coordinate. */
+static const char *part_of(const Mechanism *m, int j) {
+    int body = m->coordinates[j].body;
+    if (body != GROUND) {
+        return m->bodies[body - 1].name;
     }
-    return NULL;
+    int i = m->flexure_count + m->joint_count - 1;
+    while (m->steps[i].first > j) {
+        i--;
+    }
+    return m->steps[i].name;
 }
 
 static bool check_ratio(const System *system, const double *M, Problem *problem) {
@@ -323,13 +326,15 @@ static bool check_ratio(const System *system, const double *M, Problem *problem)
     if (!(0.0 < least && least < INERTIA_RATIO_MIN * most)) {
         return true;
     }
-    const char *first = part_of(system, light), *second = part_of(system, heavy);
+    const Mechanism *m = system->mechanism;
     return fail(problem,
-                "the inertia of %s%s, %.3g kg m2, is less than %g of that of %s%s, %.3g kg m2, so "
+                "the inertia of %s %s, %.3g kg m2, is less than %g of that of %s %s, %.3g kg m2, so "
                 "that round-off would change the motion: check the units of masses, inertias, "
-                "densities and lengths, and make the light part heavier",
-                first ? "body " : "a flexure", first ? first : "", least, INERTIA_RATIO_MIN,
-                second ? "body " : "a flexure", second ? second : "", most);
+                "densities, lengths and coordinates (numbers without a unit are in SI), or make "
+                "the light part heavier",
+                m->coordinates[light].body != GROUND ? "body" : "flexure", part_of(m, light), least,
+                INERTIA_RATIO_MIN, m->coordinates[heavy].body != GROUND ? "body" : "flexure",
+                part_of(m, heavy), most);
 }
 
 static bool check_masses(const System *system, const Complex *e0, Scratch *scratch,

@@ -235,10 +235,11 @@ static bool unreachable(const System *system, bool held, double displacement, do
     const char *unit_name = turns(system) ? "rad" : "m";
     return fail(problem,
                 "release.%s = %g %s cannot be reached: no equilibrium was found beyond %.4g %s%s; "
-                "release closer to the straight shape%s",
-                name, displacement, unit_name, done * displacement, unit_name,
+                "release closer to the straight shape%s%s",
+                name, displacement, unit_name, done * displacement + 0.0, unit_name,
                 heavy ? " (gravity raised in proportion)" : "",
-                heavy ? ", or reduce gravity across the motion" : "");
+                heavy ? ", or reduce gravity across the motion" : "",
+                done > 0.0 ? "" : "; or check the units of youngs_modulus and thickness");
 }
 
 /* Return whether a shape is held at an amount, and not half a turn or more away.  The sine that
