@@ -183,6 +183,21 @@ def test_rigid_links_are_offered_only_if_flexures_have_them(browser, guide, tmp_
     assert not browser.find("#show-links").is_displayed()
 
 
+def test_notches_that_fill_their_flexures_are_drawn_with_their_ground(browser, tmp_path):
+    """The flexures are 10 mm long, as two radii."""
+    page = written(tmp_path, mechanism("NotchGuide"))
+    browser.open(page, "#notch.notch_radius=0.005", prefers_reduced_motion="reduce")
+    assert browser.message() == ""
+    for tab in ("#tab-motion", "#tab-modes"):
+        browser.find(tab).click()
+        paths = browser.run(
+            "return [...document.querySelectorAll('#stage .flexure, #stage .ground')]"
+            ".map((path) => path.getAttribute('d'))"
+        )
+        assert len(paths) == 5
+        assert all(path and "NaN" not in path for path in paths)
+
+
 def test_the_space_key_starts_the_film_only_if_it_has_the_focus(browser, guide):
     actions = pytest.importorskip("selenium.webdriver").ActionChains
     browser.open(guide, prefers_reduced_motion="reduce")
