@@ -232,25 +232,46 @@ def test_a_number_may_have_the_unit_that_the_field_shows(browser, guide):
     browser.changed(lambda: enter(browser, "flexure.length", "35 mm"))
     assert browser.run("return location.hash") == "#flexure.length=0.035"
     enter(browser, "flexure.length", "3.5 cm")
-    assert "must be a finite number" in browser.message()
+    assert "flexure.length: \u201c3.5 cm\u201d is not a number in mm." in browser.message()
 
 
 @pytest.mark.parametrize(
     ("name", "text", "words"),
     [
         ("stop.restitution", "2", "stop.restitution = 2 must be at most 1"),
-        ("stop.restitution", "much", "stop.restitution = nan must be a finite number"),
+        ("stop.restitution", "1e999", "stop.restitution = inf must be a finite number"),
+        ("stop.restitution", "50 %", "\u201c50 %\u201d is not a number without a unit."),
+        (
+            "flexure.thickness",
+            "much",
+            "flexure.thickness: \u201cmuch\u201d is not a number in \u00b5m.",
+        ),
+        ("flexure.thickness", "", "flexure.thickness: an empty field is not a number in \u00b5m."),
         ("flexure.thickness", "-1", "flexure.thickness"),
         ("stop.position", "-25", "the wall stop is penetrated"),
     ],
 )
-def test_an_invalid_number_gives_the_message_of_the_kernel(browser, guide, name, text, words):
-    first = browser.open(guide)
+@pytest.mark.parametrize("size", [(1366, 640), NARROW])
+def test_an_invalid_number_is_marked_beside_the_message(browser, guide, size, name, text, words):
+    """The message about the wall does not name the parameter."""
+    first = browser.open(guide, size=size, prefers_reduced_motion="reduce")
     enter(browser, name, text)
     assert words in browser.message()
+    assert browser.find("#problem").text == browser.message()
+    assert not browser.find("#brief").is_displayed()
+    marked = browser.driver.find_elements("css selector", '[aria-invalid="true"]')
+    assert [field.get_attribute("data-name") for field in marked] == [name]
+    boxes = [
+        browser.run("return arguments[0].getBoundingClientRect().toJSON()", node)
+        for node in (browser.find("#problem"), marked[0])
+    ]
+    assert 0 <= boxes[0]["top"] < boxes[0]["bottom"] <= boxes[1]["top"]
+    assert boxes[1]["bottom"] <= size[1]
     assert browser.run("return document.documentElement.dataset.last") == first["last"]
     data = browser.changed(lambda: browser.find("#reset").click())
     assert (browser.message(), data["last"]) == ("", first["last"])
+    assert browser.find("#brief").is_displayed()
+    assert browser.driver.find_elements("css selector", "[aria-invalid]") == []
 
 
 @pytest.mark.parametrize(
