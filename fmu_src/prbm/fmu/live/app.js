@@ -81,12 +81,14 @@ class Page {
         }
       });
     });
-    new ResizeObserver(() => {
+    const resize = () => {
       if (this.shapes && this.stage.bounds) {
         this.stage.resize(this.shapes);
         this.show(true);
       }
-    }).observe(byId("plots"));
+    };
+    new ResizeObserver(resize).observe(byId("plots"));
+    window.addEventListener("resize", resize);
     window
       .matchMedia("(prefers-color-scheme: dark)")
       .addEventListener("change", () => this.show(true));
