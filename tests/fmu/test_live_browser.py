@@ -198,6 +198,28 @@ def test_notches_that_fill_their_flexures_are_drawn_with_their_ground(browser, t
         assert all(path and "NaN" not in path for path in paths)
 
 
+@pytest.mark.parametrize("size", [(1366, 640), NARROW])
+def test_the_drawing_and_its_controls_are_in_view_together(browser, guide, size):
+    browser.open(guide, size=size, prefers_reduced_motion="reduce")
+    span = (
+        "const [drawing, controls] = arguments[0].map((id) => document.querySelector(id)"
+        ".getBoundingClientRect()); return [drawing.top, controls.bottom]"
+    )
+    for tab, controls in (("#tab-motion", "#transport"), ("#tab-modes", ".mode-list")):
+        browser.find(tab).click()
+        top, bottom = browser.run(span, ["#stage", controls])
+        assert 0 <= top < bottom <= size[1]
+
+
+def test_modes_say_how_bodies_move_and_about_which_position(browser, tmp_path):
+    page = written(tmp_path, replace(mechanism("PRBDM2R"), gravity=(0.0, 0.0)))
+    browser.open(page, prefers_reduced_motion="reduce")
+    browser.find("#tab-modes").click()
+    text = browser.find("#modes").text
+    assert "shuttle 100\u202f% (x)" in text
+    assert "about the rest position under gravity, without stops." in text
+
+
 def test_the_space_key_starts_the_film_only_if_it_has_the_focus(browser, guide):
     actions = pytest.importorskip("selenium.webdriver").ActionChains
     browser.open(guide, prefers_reduced_motion="reduce")
