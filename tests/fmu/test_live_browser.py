@@ -296,6 +296,17 @@ def test_an_invalid_number_is_marked_beside_the_message(browser, guide, size, na
     assert browser.driver.find_elements("css selector", "[aria-invalid]") == []
 
 
+def test_a_second_invalid_number_restores_the_field_of_the_first(browser, guide):
+    browser.open(guide)
+    enter(browser, "stop.restitution", "much")
+    enter(browser, "flexure.length", "more")
+    values = [
+        browser.find(f'input[data-name="{name}"]').get_property("value")
+        for name in ("stop.restitution", "flexure.length")
+    ]
+    assert values == ["0.6", "more"]
+
+
 @pytest.mark.parametrize(
     ("fragment", "words"),
     [

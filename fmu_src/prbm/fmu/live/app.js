@@ -210,8 +210,9 @@ class Page {
     }
   }
 
-  // Show a message about a value that is not simulated.
+  // Show a message about the value of a field that is not simulated; the other fields show theirs.
   reject(text, name) {
+    this.known.forEach((_, own) => own !== name && this.controls.show(own, this.value(own)));
     this.say(`${text}${this.run ? " The last valid simulation is still shown." : ""}`, name);
   }
 
