@@ -183,6 +183,43 @@ def test_rigid_links_are_offered_only_if_flexures_have_them(browser, guide, tmp_
     assert not browser.find("#show-links").is_displayed()
 
 
+def test_notches_that_fill_their_flexures_are_drawn_with_their_ground(browser, tmp_path):
+    """The flexures are 10 mm long, as two radii."""
+    page = written(tmp_path, mechanism("NotchGuide"))
+    browser.open(page, "#notch.notch_radius=0.005", prefers_reduced_motion="reduce")
+    assert browser.message() == ""
+    for tab in ("#tab-motion", "#tab-modes"):
+        browser.find(tab).click()
+        paths = browser.run(
+            "return [...document.querySelectorAll('#stage .flexure, #stage .ground')]"
+            ".map((path) => path.getAttribute('d'))"
+        )
+        assert len(paths) == 5
+        assert all(path and "NaN" not in path for path in paths)
+
+
+@pytest.mark.parametrize("size", [(1366, 640), NARROW])
+def test_the_drawing_and_its_controls_are_in_view_together(browser, guide, size):
+    browser.open(guide, size=size, prefers_reduced_motion="reduce")
+    span = (
+        "const [drawing, controls] = arguments[0].map((id) => document.querySelector(id)"
+        ".getBoundingClientRect()); return [drawing.top, controls.bottom]"
+    )
+    for tab, controls in (("#tab-motion", "#transport"), ("#tab-modes", ".mode-list")):
+        browser.find(tab).click()
+        top, bottom = browser.run(span, ["#stage", controls])
+        assert 0 <= top < bottom <= size[1]
+
+
+def test_modes_say_how_bodies_move_and_about_which_position(browser, tmp_path):
+    page = written(tmp_path, replace(mechanism("PRBDM2R"), gravity=(0.0, 0.0)))
+    browser.open(page, prefers_reduced_motion="reduce")
+    browser.find("#tab-modes").click()
+    text = browser.find("#modes").text
+    assert "shuttle 100\u202f% (x)" in text
+    assert "about the rest position under gravity, without stops." in text
+
+
 def test_the_space_key_starts_the_film_only_if_it_has_the_focus(browser, guide):
     actions = pytest.importorskip("selenium.webdriver").ActionChains
     browser.open(guide, prefers_reduced_motion="reduce")
@@ -217,25 +254,57 @@ def test_a_number_may_have_the_unit_that_the_field_shows(browser, guide):
     browser.changed(lambda: enter(browser, "flexure.length", "35 mm"))
     assert browser.run("return location.hash") == "#flexure.length=0.035"
     enter(browser, "flexure.length", "3.5 cm")
-    assert "must be a finite number" in browser.message()
+    assert "flexure.length: \u201c3.5 cm\u201d is not a number in mm." in browser.message()
 
 
 @pytest.mark.parametrize(
     ("name", "text", "words"),
     [
         ("stop.restitution", "2", "stop.restitution = 2 must be at most 1"),
-        ("stop.restitution", "much", "stop.restitution = nan must be a finite number"),
+        ("stop.restitution", "1e999", "stop.restitution = inf must be a finite number"),
+        ("stop.restitution", "50 %", "\u201c50 %\u201d is not a number without a unit."),
+        (
+            "flexure.thickness",
+            "much",
+            "flexure.thickness: \u201cmuch\u201d is not a number in \u00b5m.",
+        ),
+        ("flexure.thickness", "", "flexure.thickness: an empty field is not a number in \u00b5m."),
         ("flexure.thickness", "-1", "flexure.thickness"),
         ("stop.position", "-25", "the wall stop is penetrated"),
     ],
 )
-def test_an_invalid_number_gives_the_message_of_the_kernel(browser, guide, name, text, words):
-    first = browser.open(guide)
+@pytest.mark.parametrize("size", [(1366, 640), NARROW])
+def test_an_invalid_number_is_marked_beside_the_message(browser, guide, size, name, text, words):
+    """The message about the wall does not name the parameter."""
+    first = browser.open(guide, size=size, prefers_reduced_motion="reduce")
     enter(browser, name, text)
     assert words in browser.message()
+    assert browser.find("#problem").text == browser.message()
+    assert not browser.find("#brief").is_displayed()
+    marked = browser.driver.find_elements("css selector", '[aria-invalid="true"]')
+    assert [field.get_attribute("data-name") for field in marked] == [name]
+    boxes = [
+        browser.run("return arguments[0].getBoundingClientRect().toJSON()", node)
+        for node in (browser.find("#problem"), marked[0])
+    ]
+    assert 0 <= boxes[0]["top"] < boxes[0]["bottom"] <= boxes[1]["top"]
+    assert boxes[1]["bottom"] <= size[1]
     assert browser.run("return document.documentElement.dataset.last") == first["last"]
     data = browser.changed(lambda: browser.find("#reset").click())
     assert (browser.message(), data["last"]) == ("", first["last"])
+    assert browser.find("#brief").is_displayed()
+    assert browser.driver.find_elements("css selector", "[aria-invalid]") == []
+
+
+def test_a_second_invalid_number_restores_the_field_of_the_first(browser, guide):
+    browser.open(guide)
+    enter(browser, "stop.restitution", "much")
+    enter(browser, "flexure.length", "more")
+    values = [
+        browser.find(f'input[data-name="{name}"]').get_property("value")
+        for name in ("stop.restitution", "flexure.length")
+    ]
+    assert values == ["0.6", "more"]
 
 
 @pytest.mark.parametrize(

@@ -127,9 +127,23 @@ def beside(chain, taper):
     )  # fmt: skip
 
 
+def filled(name, **dimensions):
+    """Return the guide on notches with other notches, which are as long as the flexures: 10 mm."""
+    guide = mechanism("NotchGuide")
+    return replace(guide, name=name, flexure_types=(replace(guide.flexure_types[0], **dimensions),))
+
+
 @pytest.mark.parametrize(
     "chosen",
-    [*map(mechanism, ("NotchGuide", "CurvedBistable")), beside(False, True), beside(True, False)],
+    [
+        *map(mechanism, ("NotchGuide", "CurvedBistable")),
+        beside(False, True),
+        beside(True, False),
+        filled("Circular", notch_radius=5e-3),
+        filled("Elliptic", notch_radius=5e-3, notch_depth=3e-3),
+        filled("Shallow", notch_radius=5e-3, end_thickness=5e-3),
+        filled("Filleted", notch_radius=3e-3, waist_length=4e-3),
+    ],
     ids=lambda chosen: chosen.name,
 )
 def test_profiles_and_the_straight_shape_equal_those_of_the_python_package(chosen):

@@ -40,9 +40,10 @@ class Page {
     };
     this.film = new Film(description.stopTime, () => this.show());
     this.stage = new Stage(byId("stage"), description, actions);
-    this.controls = new Controls(byId("fields"), description, (...change) =>
-      this.change(...change),
-    );
+    this.controls = new Controls(byId("fields"), description, {
+      change: (...change) => this.change(...change),
+      reject: (...problem) => this.reject(...problem),
+    });
     const seek = (time) => this.film.seek(time);
     this.plots = plotList(description, this.column).map(
       (plot) => new Plot(plot, byId("plots"), seek),
@@ -80,12 +81,14 @@ class Page {
         }
       });
     });
-    new ResizeObserver(() => {
+    const resize = () => {
       if (this.shapes && this.stage.bounds) {
         this.stage.resize(this.shapes);
         this.show(true);
       }
-    }).observe(byId("plots"));
+    };
+    new ResizeObserver(resize).observe(byId("plots"));
+    window.addEventListener("resize", resize);
     window
       .matchMedia("(prefers-color-scheme: dark)")
       .addEventListener("change", () => this.show(true));
@@ -116,6 +119,7 @@ class Page {
     } else {
       changes.set(name, value);
     }
+    this.touched = name;
     this.apply(changes, ended);
   }
 
@@ -145,6 +149,7 @@ class Page {
 
   follow() {
     const { changes, problems } = changesOf(location.hash, this.known);
+    this.touched = null;
     this.apply(changes, true);
     if (problems.length) {
       this.say([byId("message").textContent, ...problems].filter(Boolean).join(" "));
@@ -192,11 +197,8 @@ class Page {
     if (!(error instanceof KernelError)) {
       throw error;
     }
-    const wrong = [...changes.keys()].find((name) => error.message.startsWith(name));
-    this.say(
-      `${error.message}.${this.run ? " The last valid simulation is still shown." : ""}`,
-      wrong,
-    );
+    const named = [...changes.keys()].find((name) => ` ${error.message}`.includes(` ${name} = `));
+    this.reject(`${error.message}.`, named ?? this.touched);
     if (!this.run) {
       this.state("error");
       if (changes.size) {
@@ -206,6 +208,12 @@ class Page {
         this.say(`${text} The default values are shown instead.`);
       }
     }
+  }
+
+  // Show a message about the value of a field that is not simulated; the other fields show theirs.
+  reject(text, name) {
+    this.known.forEach((_, own) => own !== name && this.controls.show(own, this.value(own)));
+    this.say(`${text}${this.run ? " The last valid simulation is still shown." : ""}`, name);
   }
 
   progress() {
@@ -249,9 +257,10 @@ class Page {
   }
 
   say(text, name = null) {
-    const message = byId("message");
-    message.textContent = text;
-    message.hidden = text === "";
+    for (const message of [byId("message"), byId("problem")]) {
+      message.textContent = text;
+      message.hidden = text === "";
+    }
     this.controls.mark(name);
   }
 

@@ -6,10 +6,11 @@ const FIRST_GROUPS = 2; // Groups that are open at first.
 const LAST = ["damping", "friction", "gravity", "base", "solver"];
 
 class Controls {
-  // Parameters: the parent element, the description of the page, and the function
-  // change(name, value, ended).
-  constructor(parent, description, change) {
+  // Parameters: the parent element, the description of the page, and the functions
+  // change(name, value, ended) and reject(message, name) for a text that is not a number.
+  constructor(parent, description, { change, reject }) {
     this.change = change;
+    this.reject = reject;
     this.rows = new Map();
     const groups = new Map();
     for (const quantity of description.quantities) {
@@ -75,13 +76,7 @@ class Controls {
     );
     const row = { quantity, node, number, slider, reset };
     this.rows.set(quantity.name, row);
-    number.addEventListener("change", () =>
-      this.change(
-        quantity.name,
-        parsed(withoutUnit(number.value, quantity)) / quantity.factor,
-        true,
-      ),
-    );
+    number.addEventListener("change", () => this.entered(quantity, number.value));
     slider.addEventListener("input", () =>
       this.change(quantity.name, fromSlider(quantity, Number(slider.value)), false),
     );
@@ -90,6 +85,19 @@ class Controls {
     );
     reset.addEventListener("click", () => this.change(quantity.name, quantity.start, true));
     return node;
+  }
+
+  // Take the text of a field.
+  entered(quantity, text) {
+    const x = parsed(withoutUnit(text, quantity));
+    if (Number.isNaN(x)) {
+      const unit = unitText(quantity.shown);
+      const given = text.trim() === "" ? "an empty field" : `\u201c${text.trim()}\u201d`;
+      const needed = unit ? `a number in ${unit}` : "a number without a unit";
+      this.reject(`${quantity.name}: ${given} is not ${needed}.`, quantity.name);
+    } else {
+      this.change(quantity.name, x / quantity.factor, true);
+    }
   }
 
   // Show the value of a quantity [SI].
@@ -116,7 +124,11 @@ class Controls {
       number.toggleAttribute("aria-invalid", wrong);
       if (wrong) {
         number.setAttribute("aria-invalid", "true");
+        number.setAttribute("aria-errormessage", "problem");
         node.parentElement.open = true;
+        if (document.activeElement === number) {
+          number.scrollIntoView({ block: "nearest" }); // The message has made the head higher.
+        }
       }
     }
   }

@@ -4,6 +4,7 @@ const GROUND = "ground";
 const CURVE_POINTS = 40; // Points of the drawn curve of a flexure.
 const SPLINE_POINTS = 8; // Points of the drawn curve between two nodes of a beam.
 const CURVED_CORNERS_MAX = 11; // More corners are joined by straight lines, not by a curve.
+const COINCIDENT_RTOL = 1e-9; // A shorter step between points, over the length of the line, is none.
 const BODY_THICKNESS_MIN = 0.04; // Of the size of the mechanism.
 
 const plus = ([a, b], [c, d]) => [a + c, b + d];
@@ -47,7 +48,7 @@ const pointOf = (point, values) => point.map((x) => evaluated(x, values));
 function chainCurve(z, [startGuided, endGuided]) {
   const steps = z.slice(1).map((point, k) => minus(point, z[k]));
   const length = steps.reduce((sum, step) => sum + norm(step), 0);
-  const long = steps.filter((step) => norm(step) > 1e-9 * length);
+  const long = steps.filter((step) => norm(step) > COINCIDENT_RTOL * length);
   const first = z[0];
   const last = z[z.length - 1];
   const chord = minus(last, first);
@@ -68,8 +69,17 @@ function chainCurve(z, [startGuided, endGuided]) {
   });
 }
 
+// Return points without those that coincide with the point before: the nodes in the thick parts of a
+// notch that fills its flexure do.
+function distinct(points) {
+  const steps = points.slice(1).map((point, k) => norm(minus(point, points[k])));
+  const least = COINCIDENT_RTOL * steps.reduce((sum, step) => sum + step, 0);
+  return points.filter((_, k) => k === 0 || steps[k - 1] > least);
+}
+
 // Return a smooth curve through points (Catmull and Rom, centripetal).
-function splineCurve(z) {
+function splineCurve(points) {
+  const z = distinct(points);
   const parts = z.slice(1).map((_, k) => splinePart(z, k, SPLINE_POINTS));
   return [z[0], ...parts.flat()];
 }
@@ -79,7 +89,7 @@ function splinePart(z, k, count) {
   const c = z[k + 1];
   const a = k > 0 ? z[k - 1] : minus(times(2, b), c);
   const d = k + 2 < z.length ? z[k + 2] : minus(times(2, c), b);
-  const [p, q, r] = [minus(b, a), minus(c, b), minus(d, c)].map((v) => Math.sqrt(norm(v)) || 1e-12);
+  const [p, q, r] = [minus(b, a), minus(c, b), minus(d, c)].map((v) => Math.sqrt(norm(v)));
   const slope = (u, v, w, before, after) => {
     const first = times(1 / before, minus(v, u));
     const second = times(1 / after, minus(w, v));

@@ -4,6 +4,7 @@ const MODES_MAX = 8; // Modes in the list.
 const MODE_AMPLITUDE = 0.1; // Largest displacement, as a share of the size of the mechanism.
 const SMALL_ANGLE = 1e-4; // rad; amplitude at which a mode is linear.
 const MODE_PERIOD = 1.6; // Seconds of the film of one period.
+const DIRECTION_RTOL = 0.3; // Smaller shares of the displacement of a body do not say how it moves.
 const MOVING_RTOL = 0.05; // Parts with a smaller share of the largest displacement are not named.
 
 class ModeView {
@@ -74,14 +75,18 @@ class ModeView {
     this.scale = (MODE_AMPLITUDE * this.shapes.size) / moves[0][1];
     const shares = moves
       .filter(([, size]) => size > MOVING_RTOL * moves[0][1])
-      .map(([name, size]) => `${words(name)} ${digits((100 * size) / moves[0][1], 2)}\u202f%`);
+      .map(([name, size, how]) => {
+        const share = `${words(name)} ${digits((100 * size) / moves[0][1], 2)}\u202f%`;
+        return how ? `${share} (${how})` : share;
+      });
     const resting = moves
       .filter(([, size]) => size <= MOVING_RTOL * moves[0][1])
       .map(([name]) => words(name));
     this.text.textContent =
       `Mode ${k + 1} moves: ${shares.join(", ")}` +
       (resting.length ? `. Hardly moves: ${resting.join(", ")}.` : ".") +
-      " Percentages are of the largest displacement.";
+      " Percentages are of the largest displacement." +
+      " Undamped, about the rest position under gravity, without stops.";
     this.paint(1);
   }
 
@@ -105,7 +110,8 @@ class ModeView {
     );
   }
 
-  // Return the largest displacement of each body and flexure for a mode of amplitude 1.
+  // Return the largest displacement of each body and flexure for a mode of amplitude 1, and how the
+  // body moves.
   parts() {
     const small = (SMALL_ANGLE * this.shapes.size) / Math.max(...this.slopes.map(Math.abs));
     const [rest, moved] = [this.moved(0), this.moved(small)];
@@ -116,13 +122,26 @@ class ModeView {
     };
     const bodies = this.description.bodies.map(({ name }, k) => {
       const [a, b] = [rest, moved].map((shape) => this.shapes.body(k, shape.poses));
-      return [name, largest(a, b)];
+      return [name, largest(a, b), this.direction(k, rest.poses.get(name), moved.poses.get(name))];
     });
     const lines = this.description.flexures.map(({ name }, k) => [
       name,
       largest(corners(rest, k), corners(moved, k)),
     ]);
     return [...bodies, ...lines];
+  }
+
+  // Return how a body moves between two poses: along x or y, or by a rotation.
+  direction(k, from, to) {
+    const [x, y] = minus(to.centre, from.centre).map(Math.abs);
+    const reach = Math.max(...this.shapes.outlines[k].map(norm));
+    const rotation = reach * norm(minus(to.arm, from.arm));
+    const ways = Object.entries({ x, y, rotation });
+    const largest = Math.max(x, y, rotation);
+    return ways
+      .filter(([, size]) => size > DIRECTION_RTOL * largest)
+      .map(([way]) => way)
+      .join(", ");
   }
 
   paint(share) {

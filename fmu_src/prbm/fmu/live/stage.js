@@ -1,6 +1,7 @@
 // The drawing of the mechanism as SVG: flexures, bodies, ground, and handles to drag.
 
 const MARGIN = 34; // Pixels around the motion.
+const HEIGHT_MAX = 0.5; // Of the window: the controls below the drawing are in view with it.
 const FOOT = 16; // Further pixels below it, for the scale.
 const FLASH_TIME = 0.35; // Seconds of the film in which the mark of an impact fades.
 const HATCH_PITCH = 11; // Pixels between two strokes of a hatching.
@@ -197,7 +198,12 @@ class Stage {
     const height = Math.round(
       Math.max(
         220,
-        Math.min(0.62 * width + 60, 440, aspect * (width - 2 * MARGIN) + 2 * MARGIN + FOOT),
+        Math.min(
+          0.62 * width + 60,
+          440,
+          HEIGHT_MAX * window.innerHeight,
+          aspect * (width - 2 * MARGIN) + 2 * MARGIN + FOOT,
+        ),
       ),
     );
     this.svg.setAttribute("height", height);
