@@ -120,7 +120,10 @@ def test_the_closed_form_is_rejected_at_a_stop_on_a_moving_body():
         stops=(on,),
         flexures=(
             *two.flexures,
-            *(replace(f, name=f"{f.name}_other", end=f.end) for f in two.flexures),
+            *(
+                replace(f, name=f"{f.name}_other", end=f.end.replace(two.bodies[0].name, "other"))
+                for f in two.flexures
+            ),
         ),
     )
     with pytest.raises(ParameterError, match="stop is on other, which moves"):

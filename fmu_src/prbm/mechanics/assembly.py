@@ -328,7 +328,7 @@ def dependent_rows(rows: Real, tolerance: float) -> list[int]:
     Examples
     --------
     >>> dependent_rows(np.array([[1.0, 0.0], [3.0, 4.0], [0.0, 2.0]]), 1e-9)
-    [2]
+    [0]
     """
     rest, left = rows.copy(), list(range(len(rows)))
     while left:
