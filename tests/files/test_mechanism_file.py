@@ -618,3 +618,14 @@ def test_the_example_of_the_page_is_a_mechanism(tmp_path):
         if "title" in text:
             assert schema_errors(tomllib.loads(text)) == []
             assert read(tmp_path, text).bodies
+
+
+@pytest.mark.parametrize(
+    "line", ["stress = True", "width = 0,1", "gravity = [1,, 2]", "mass = 1-2"]
+)
+def test_quotes_are_no_remedy_for_numbers_and_truth_values(tmp_path, line):
+    path = tmp_path / "mine.toml"
+    path.write_text(line, "utf-8")
+    with pytest.raises(MechanismError, match="not a TOML file") as caught:
+        read_mechanism(path)
+    assert "in quotes" not in str(caught.value)

@@ -867,7 +867,7 @@ CONTENTS = {
     "value instead of a table": (b"release = 3", "line 1: release = 3: write [release]"),
     "half a line": (
         b'name = "x"\ntitle = \n',
-        "not a TOML file (Invalid value (at line 2, column 9)): title =; write texts, and numbers",
+        "not a TOML file (Invalid value (at line 2, column 9)): title =",
     ),
     "quantity without quotes": (
         b'name = "x"\nposition = 5 mm\n',
@@ -882,7 +882,7 @@ CONTENTS = {
         b"foot = [5 mm, 0]",
         "(Unclosed array (at line 1, column 11)): foot = [5 mm, 0]; write texts, and numbers with",
     ),
-    "text with one quote": (b'name = "x\na = 1', '): name = "x; write texts, and numbers with'),
+    "text with one quote": (b'name = "x\na = 1', '): name = "x'),
     "line of many characters": (b"a = 1\0" * BOMB, "a = 1 a = 1 a = 1"),
     "bomb of lists": (b"x = " + b"[" * BOMB + b"]" * BOMB, "are nested too deeply"),
     "bomb of tables": (b"x = " + b"{a=" * BOMB + b"1" + b"}" * BOMB, "are nested too deeply"),

@@ -10,6 +10,7 @@ from concurrent.futures.process import BrokenProcessPool
 import numpy as np
 import pytest
 
+from prbm.base import processes as base_processes
 from prbm.base.errors import ParameterError
 from prbm.files.settings import UserMistake
 from prbm.plots.study import curves, maps
@@ -294,6 +295,7 @@ def test_the_number_of_processes_has_a_limit(mechanisms, monkeypatch):
         raise InterruptedError
 
     monkeypatch.setattr(module, "executor", executor)
+    monkeypatch.setattr(base_processes, "PROCESSES_MAX", 61)
     for workers, processes in ((100, 61), (3, 3)):
         with pytest.raises(InterruptedError):
             study(

@@ -1,8 +1,10 @@
 """Work in several processes."""
 
+import math
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
@@ -12,7 +14,7 @@ from typing import Any
 
 from .errors import PrbmError
 
-PROCESSES_MAX = 61  # A limit of Windows.
+PROCESSES_MAX = 61 if sys.platform == "win32" else math.inf  # Windows waits for no more.
 
 
 class _Serial(Executor):
@@ -34,7 +36,10 @@ class _Pool(ProcessPoolExecutor):
 
 @contextmanager
 def _interrupts_ignored() -> Iterator[None]:
-    """Ignore Ctrl-C for the moment in which a process starts, which inherits this."""
+    """Ignore Ctrl-C for the moment in which a process starts, which inherits this.
+
+    Ctrl-C in this moment, of some milliseconds, is lost.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -42,12 +47,12 @@ def _interrupts_ignored() -> Iterator[None]:
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
 
 
 def process_count(tasks: int, requested: int | None = None) -> int:
     """Return the number of processes for several tasks: one for each core, or as requested."""
-    return min(requested or os.cpu_count() or 1, tasks, PROCESSES_MAX)
+    return int(min(requested or os.cpu_count() or 1, tasks, PROCESSES_MAX))
 
 
 @contextmanager
@@ -79,8 +84,8 @@ def executor(
         yield pool
     except BrokenProcessPool:
         raise PrbmError(
-            "a process of this computation ended early, mostly for lack of memory: close other "
-            "programs and repeat it"
+            "a process of this computation ended early: a script must make the call under "
+            "'if __name__ == \"__main__\":'; otherwise memory may be short, close other programs"
         ) from None
     except BaseException:  # Ctrl-C, too.
         for process in {*multiprocessing.active_children()} - others:

@@ -32,7 +32,7 @@ PROBLEMS_MAX = 5  # Problems of one file in a message.
 KEY_LENGTH_MAX = 100  # Parts of a dotted key; tomllib needs more than linear time for longer ones.
 LINE_LENGTH_MAX = 80  # Characters of a line of a file in a message.
 UNQUOTED = 'write texts, and numbers with a unit, in quotes, for instance "5 mm"'
-UNQUOTED_REASONS = ("Expected newline", "Invalid value", "Unclosed", "Unterminated", "Illegal")
+UNQUOTED_VALUE = re.compile(r"=[\s\[]*+(?!(?:True|False)\b)[^\"'#]*[^\W\d_]")
 DIALECT = "http://json-schema.org/draft-07/schema#"  # The latest that TOML editors support.
 REMEDIES = {  # Remedy for each of pydantic's error types.
     "int_type": "write a whole number",
@@ -157,9 +157,9 @@ def _syntax(reason: str, text: str) -> str:
     """Return the end of the message for an error of the syntax: reason, line and remedy."""
     number = re.search(r"at line (\d+)", reason)
     line = text.split("\n")[int(number[1]) - 1] if number else ""
-    shown = f": {printable(line).strip()[:LINE_LENGTH_MAX]}" if line else ""
-    remedy = f"; {UNQUOTED}" if reason.startswith(UNQUOTED_REASONS) else ""
-    return f"{reason}){shown}{remedy}"
+    shown = printable(line).strip()[:LINE_LENGTH_MAX]
+    remedy = f"; {UNQUOTED}" if UNQUOTED_VALUE.search(shown) else ""
+    return f"{reason}){shown and f': {shown}'}{remedy}"
 
 
 def _problem(error: dict[str, Any], data: Any) -> str:
