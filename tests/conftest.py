@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from c_importer import host_fmu
 from prbm.base.atomic import write
@@ -15,6 +16,8 @@ from shared import once
 from support import GUIDES, SUPPORT, mechanism
 
 collect_ignore = ["support"]  # Modules that tests import; they contain no tests.
+settings.register_profile("untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("untimed")
 LONGEST = "tests/project/test_wheel_with_libraries.py"  # It takes minutes and is started first.
 
 
