@@ -26,6 +26,7 @@ from prbm.drawing.icon import icon
 from prbm.files.mechanism_file import read_mechanism, shipped
 from prbm.fmu import python_fmu
 from prbm.fmu.description import Heading, model_description
+from prbm.fmu.start import interface, start_sample
 from prbm.kernel import compiler
 from prbm.kernel.sources import kernel
 from signals import interruptible
@@ -359,14 +360,14 @@ def test_source_date_epoch_sets_the_date(epoch, mechanisms, tmp_path, monkeypatc
         assert f"SOURCE_DATE_EPOCH = {epoch!r} must be a number" in capsys.readouterr().err
         assert [*tmp_path.iterdir()] == []
     else:
-        listed = python_fmu.interface(mechanisms["PRBDM"], {})
+        listed = interface(mechanisms["PRBDM"], {})
         xml = model_description(Heading("X", "", "", {}), listed).decode()
         assert f'generationDateAndTime="{EPOCHS[epoch]}"' in xml
 
 
 def test_the_icon_does_not_depend_on_matplotlibrc(mechanisms):
     mechanism = mechanisms["PRBDM"]
-    sample = python_fmu.start_sample(mechanism, {})
+    sample = start_sample(mechanism, {})
     plain = icon(mechanism, sample)
     settings = {"lines.linewidth": 5.0, "savefig.transparent": True, "lines.markersize": 20.0}
     with matplotlib.rc_context(settings):

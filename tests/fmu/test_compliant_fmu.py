@@ -11,7 +11,7 @@ from fmpy.validation import validate_fmu
 from point_mass import point_mass
 from prbm.fmu import mathml
 from prbm.fmu.documentation import page
-from prbm.fmu.python_fmu import interface
+from prbm.fmu.start import interface
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanism.parts import LAWS
 from prbm.runs.experiment import Experiment

@@ -22,8 +22,8 @@ from fmu_host import OK, Instance
 from prbm.fmu.description import Heading, model_description
 from prbm.fmu.documentation import page
 from prbm.fmu.native_fmu import described
-from prbm.fmu.python_fmu import interface, start_sample
 from prbm.fmu.slave.resolved import mechanism_from, resolved
+from prbm.fmu.start import interface, start_sample
 from prbm.interface.units import UNITS
 from prbm.interface.variables import variables, with_starts
 from prbm.runs.experiment import Experiment, experiment

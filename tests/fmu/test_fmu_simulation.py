@@ -13,7 +13,7 @@ import pytest
 from fmu_host import OK, Instance
 from prbm.base.atomic import write
 from prbm.fmu import python_fmu
-from prbm.fmu.python_fmu import interface
+from prbm.fmu.start import interface
 from prbm.hybrid.simulation import Simulation
 from support import GUIDES, ROOT, SHIPPED, SUPPORT, case, record, selected
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from c_importer import NATIVE, TWO_STOPS, Job, described, execute, native, run, unpack
-from prbm.fmu.python_fmu import interface
+from prbm.fmu.start import interface
 from prbm.hybrid.simulation import Simulation
 from support import GUIDES, SHIPPED, case, each_shipped, mechanism, record
 

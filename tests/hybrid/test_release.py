@@ -10,8 +10,8 @@ import pytest
 from kernel_simulation import KernelMistake, KernelSimulation
 from prbm.base.errors import EquilibriumError, MechanismError, ParameterError, PrbmError
 from prbm.files.mechanism_file import read_mechanism
-from prbm.fmu.python_fmu import interface
 from prbm.fmu.slave.resolved import mechanism_from, resolved
+from prbm.fmu.start import interface
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.forces import springs

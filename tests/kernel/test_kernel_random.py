@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kernel_simulation import KernelSimulation
-from prbm.fmu.python_fmu import interface
+from prbm.fmu.start import interface
 from prbm.hybrid.simulation import Simulation
 from random_mechanisms import inputs, seeded
 

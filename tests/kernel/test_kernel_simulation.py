@@ -9,7 +9,7 @@ import pytest
 from kernel_simulation import KernelMistake, KernelSimulation, library
 from many_parts import anvil, beams, elastic, profiles, two_stops
 from prbm.base.errors import PrbmError
-from prbm.fmu.python_fmu import interface
+from prbm.fmu.start import interface
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.assembly import assemble
 from support import GUIDES, PMMA, case, each_shipped, mechanism, record

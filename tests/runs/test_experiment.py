@@ -11,7 +11,7 @@ from prbm.files.mechanism_file import shipped
 from prbm.fmu import reference_results as reference
 from prbm.fmu.documentation import native_page, page
 from prbm.fmu.native_fmu import described
-from prbm.fmu.python_fmu import interface
+from prbm.fmu.start import interface
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.parts import Body, Flexure, FlexureType, Release, Stop

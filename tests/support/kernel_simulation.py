@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from kernel_library import FLAGS, KERNEL
-from prbm.fmu.python_fmu import interface
+from prbm.fmu.start import interface
 from prbm.interface.tables import slots, tables
 from prbm.mechanics.independent import independent
 from prbm.mechanism.description import Mechanism

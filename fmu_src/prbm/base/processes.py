@@ -14,6 +14,8 @@ from typing import Any
 
 from .errors import PrbmError
 
+# Variables of the environment that limit the threads of linear algebra in a new process.
+THREAD_LIMITS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
 PROCESSES_MAX = 61 if sys.platform == "win32" else math.inf  # Windows waits for no more.
 
 
@@ -27,10 +29,10 @@ class _Serial(Executor):
 
 
 class _Pool(ProcessPoolExecutor):
-    """Runs in other processes, which ignore Ctrl-C from their start."""
+    """Runs in other processes with one thread each, which ignore Ctrl-C from their start."""
 
     def submit(self, function: Any, /, *arguments: Any, **more: Any) -> "Future[Any]":
-        with _interrupts_ignored():
+        with _interrupts_ignored(), _single_threaded():
             return super().submit(function, *arguments, **more)
 
 
@@ -48,6 +50,22 @@ def _interrupts_ignored() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
+
+
+@contextmanager
+def _single_threaded() -> Iterator[None]:
+    """Let processes that start meanwhile use one thread for linear algebra.
+
+    There is a process for each core; more threads would wait for each other.  Limits that the
+    environment already has remain.
+    """
+    added = [name for name in THREAD_LIMITS if name not in os.environ]
+    os.environ.update(dict.fromkeys(added, "1"))
+    try:
+        yield
+    finally:
+        for name in added:
+            os.environ.pop(name, None)
 
 
 def process_count(tasks: int, requested: int | None = None) -> int:

@@ -22,8 +22,11 @@ from ..files.mechanism_file import read_mechanism, schema, shipped
 from ..files.settings import UserMistake, assigned, units_of
 from ..fmu import native_fmu, python_fmu
 from ..fmu.parameter_sets import read_parameter_set
+from ..fmu.reference_results import steps
 from ..kernel.compiler import ALL, HOST, PLATFORMS, CompilerError, this_platform
 from ..mechanism.description import Mechanism
+from ..runs.engine import PYTHON as PYTHON_ENGINE
+from ..runs.experiment import experiment
 from .arguments import ProposingParser
 from .missing import missing_package
 from .program import FAILED, INTERRUPTED, MISTAKE, OK, command_name
@@ -331,7 +334,9 @@ def _build(plan: BuildPlan) -> tuple[list[Path], str]:
     FMUs; otherwise the Python FMUs are built.
     """
     processes = process_count(len(plan.mechanisms))
-    order = sorted(plan.mechanisms, key=lambda m: -len(m.flexures))  # These take longest.
+    order = list(plan.mechanisms)
+    if processes > 1:
+        order.sort(key=lambda m: -_effort(plan, m))  # The last of them ends late otherwise.
     with executor(processes) as pool:
         tasks = [pool.submit(_fmus, plan, mechanism) for mechanism in order]
         done = {m.name: task.result() for m, task in zip(order, tasks, strict=True)}
@@ -344,6 +349,15 @@ def _build(plan: BuildPlan) -> tuple[list[Path], str]:
                 _write(path, fmus[flavour])
                 written.append(path)
     return written, next((missing for _, missing in done.values() if missing), "")
+
+
+def _effort(plan: BuildPlan, mechanism: Mechanism) -> float:
+    """Return an estimate of the time to build an FMU, of which reference results take the most."""
+    changes = plan.changes
+    try:
+        return steps(mechanism, changes, experiment(mechanism, changes, engine=PYTHON_ENGINE))
+    except PrbmError:
+        return 0.0  # The build reports it.
 
 
 def _write(path: Path, content: bytes) -> None:

@@ -28,7 +28,7 @@ from .reference_results import reference
 from .related import related_files
 from .slave.resolved import FILE as MODEL
 from .slave.resolved import resolved
-from .start import interface, magnitudes, start_sample
+from .start import start, start_sample
 from .terminals import terminals
 
 NAMESPACE = uuid.UUID("f0b6b5a1-6d5c-5b0e-8c55-1a52a0e6f1d3")
@@ -182,11 +182,12 @@ def described(
             f"{mechanism.name} has no stop: a clock ticks at the impacts of a stop; build the FMU "
             "without clocks"
         )
+    begun = start(mechanism, changes)
     return native_interface(
         mechanism,
-        interface(mechanism, changes),
-        start_sample(mechanism, {}),
-        magnitudes(mechanism, changes),
+        begun.variables,
+        begun.defaults,
+        begun.magnitudes,
         independent(mechanism),
         time=fmi == 3,
         clock=clock,

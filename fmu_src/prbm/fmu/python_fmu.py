@@ -23,7 +23,7 @@ from .parameter_sets import default_set
 from .related import related_files
 from .slave.resolved import FILE, resolved
 from .slave.slave import MechanismSlave
-from .start import interface, start_sample
+from .start import start
 
 NAMESPACE = uuid.UUID("6f1c6c1e-0c53-5d0e-9d6e-3b1f0b4f7a52")
 ROOT = __package__.rpartition(".")[0]  # The parent package.
@@ -101,7 +101,8 @@ def build(
 
     changes = dict(changes or {})
     progress("checking the start")
-    listed = interface(mechanism, changes)
+    begun = start(mechanism, changes)
+    listed = begun.variables
     progress(f"collecting {len(listed)} variables and the engine")
     default = experiment(mechanism, changes, engine=PYTHON)
     sources = dict(_sources(mechanism, listed, default.step))
@@ -115,9 +116,8 @@ def build(
     heading = replace(heading, guid=f"{{{uuid.uuid5(NAMESPACE, anonymous)}}}")
     contents["modelDescription.xml"] = model_description(heading, listed)
     contents["documentation/index.html"] = documentation.page(mechanism, listed, default).encode()
-    sample = start_sample(mechanism, changes)
-    contents["model.png"] = icon(mechanism, sample)
-    contents["documentation/icon.svg"] = vector_icon(mechanism, sample)
+    contents["model.png"] = icon(mechanism, begun.sample)
+    contents["documentation/icon.svg"] = vector_icon(mechanism, begun.sample)
     contents |= related_files([default_set(mechanism, listed)])
     progress("packing")
     return zipped(contents)

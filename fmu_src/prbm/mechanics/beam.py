@@ -26,7 +26,7 @@ the axial flexibility 1/EA over its mean.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -35,6 +35,15 @@ from numpy.polynomial.legendre import leggauss, legvander
 from ..base.tolerances import FINE_POINTS
 from .arrays import Complex, Real
 from .profile import Line, Panel, Sections
+
+
+@lru_cache
+def gauss(points: int) -> tuple[Real, Real]:
+    """Return the points and weights of Gauss' quadrature from -1 to 1, as read-only arrays."""
+    x, weights = leggauss(points)
+    x.setflags(write=False)
+    weights.setflags(write=False)
+    return x, weights
 
 
 def integrals(order: int, x: Real) -> Real:
@@ -79,7 +88,7 @@ def interpolation(nodes: int, x: Real) -> Real:
     -------
     (m, nodes)
     """
-    points, weights = leggauss(nodes)
+    points, weights = gauss(nodes)
     P = legvander(points, nodes - 1) * weights[:, None]
     factors = np.arange(nodes) + 0.5
     result: Real = 2.0 * (integrals(nodes - 1, x) * factors) @ P.T
@@ -107,7 +116,7 @@ def orthogonal(order: int, u: Real, weights: Real) -> Real:
     --------
     Legendre polynomials follow from the weights of Gauss' quadrature:
 
-    >>> x, weights = leggauss(4)
+    >>> x, weights = gauss(4)
     >>> bool(abs(orthogonal(2, x, weights / 2) - legvander(x, 2)).max() < 1e-14)
     True
     """
@@ -193,17 +202,17 @@ class Beam:
     @cached_property
     def _nodes(self) -> tuple[Real, Sections]:
         """Weights of the nodes with the sum 2 in each panel, and their sections."""
-        rules = [leggauss(panel.nodes) for panel in self.panels]
+        rules = [gauss(panel.nodes) for panel in self.panels]
         sections = [panel.at(x) for panel, (x, _) in zip(self.panels, rules, strict=True)]
         return np.concatenate([w for _, w in rules]), _joined(sections)
 
     @cached_property
     def _fine(self) -> tuple[Real, Sections]:
         """Weights times the arc length per x [m], and sections, at points between all nodes."""
-        x, weights = leggauss(FINE_POINTS)
+        x, weights = gauss(FINE_POINTS)
         found, factors = [], []
         for panel in self.panels:
-            edges = np.concatenate([[-1.0], leggauss(panel.nodes)[0], [1.0]])
+            edges = np.concatenate([[-1.0], gauss(panel.nodes)[0], [1.0]])
             half = 0.5 * np.diff(edges)
             middle = 0.5 * (edges[1:] + edges[:-1])
             found.append(panel.at((middle[:, None] + half[:, None] * x).ravel()))
@@ -342,7 +351,7 @@ class Beam:
     @property
     def node_positions(self) -> Complex:
         """The lengths A for the nodes, (N, N) [m]."""
-        return self.positions([leggauss(panel.nodes)[0] for panel in self.panels])
+        return self.positions([gauss(panel.nodes)[0] for panel in self.panels])
 
     # -- cuts --
 
@@ -353,7 +362,7 @@ class Beam:
         factors = [np.ones((2, 1))]
         first = 0
         for panel in self.panels:
-            nodes, waists = leggauss(panel.nodes)[0], np.array(panel.waists)
+            nodes, waists = gauss(panel.nodes)[0], np.array(panel.waists)
             rank = np.append(np.arange(panel.nodes), np.searchsorted(nodes, waists) - 0.5)
             order = np.argsort(rank)
             x = np.append(nodes, waists)[order]

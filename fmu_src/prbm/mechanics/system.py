@@ -391,10 +391,25 @@ class System:
         )
 
     @cached_property
-    def stretched(self) -> Whole:
-        """The arms that stretch, in the order of :attr:`stretches`."""
-        result: Whole = self.arm[self.stretches]
-        return result
+    def _exponents(self) -> tuple[Complex, Complex]:
+        """The map from coordinates to s + i theta of the arms, (d, n), and factors of the arms.
+
+        Stretches have the row of their arm, and the factor -i.
+        """
+        exponents: Complex = self.Phi.Phi.astype(complex) * 1j
+        factors: Complex = np.ones(self.d, complex)
+        stretched = self.arm[self.stretches]
+        exponents[stretched] += self.Phi.Phi[self.stretches]
+        exponents[self.stretches] = exponents[stretched]
+        factors[self.stretches] = -1j
+        return exponents.T.copy(), factors
+
+    @cached_property
+    def _turns(self) -> Complex:
+        """The map from rates to theta' - i s' of the arms, (n, d); zero for stretches."""
+        turns = -1j * self._exponents[0]
+        turns[:, self.stretches] = 0.0
+        return turns
 
     def directions(self, q: Real) -> Complex:
         """Return e: the arms exp(s + i theta) for angles, and -i times the arms for stretches.
@@ -412,36 +427,31 @@ class System:
         --------
         A link that stands up, stretched by 1 %:
 
-        >>> class Bar:
-        ...     stretches, stretched = np.array([1]), np.array([0])
-        ...     Phi = DirectionMap(np.eye(2))
-        >>> e = System.directions(Bar, np.array([np.pi / 2, np.log(1.01)]))
+        >>> bar = object.__new__(System)
+        >>> vars(bar).update(arm=np.array([0, 0]), Phi=DirectionMap(np.eye(2)))
+        >>> e = bar.directions(np.array([np.pi / 2, np.log(1.01)]))
         >>> bool(abs(e - [1.01j, 1.01]).max() < 1e-15)
         True
         """
+        if len(self.stretches):
+            exponents, factors = self._exponents
+            e: Complex = np.exp(q @ exponents)
+            e *= factors
+            return e
         theta = self.Phi.of(q)
-        if not len(self.stretches):
-            turned = np.empty(theta.shape, complex)
-            turned.real, turned.imag = np.cos(theta), np.sin(theta)
-            return turned
-        w = 1j * theta
-        w[..., self.stretched] += theta[..., self.stretches]
-        e: Complex = np.exp(w)
-        e[..., self.stretches] = -1j * e[..., self.stretched]
-        return e
+        turned = np.empty(theta.shape, complex)
+        turned.real, turned.imag = np.cos(theta), np.sin(theta)
+        return turned
 
     def turning(self, v: Real) -> Real | Complex:
         """Return the rates w = theta' - i s' of the arms (..., d) for rates v (..., n) [1/s].
 
         The entries of stretches are zero.  Without stretches the result is real.
         """
-        turned = self.Phi.of(v)
-        if not len(self.stretches):
-            return turned
-        w = turned.astype(complex)
-        w[..., self.stretched] -= 1j * turned[..., self.stretches]
-        w[..., self.stretches] = 0.0
-        return w
+        if len(self.stretches):
+            w: Complex = v @ self._turns
+            return w
+        return self.Phi.of(v)
 
     def mass_matrix(self, e: Complex) -> Real:
         """Return the mass matrix M, (n, n) [kg m^2]."""
