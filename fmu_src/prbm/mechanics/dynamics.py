@@ -156,7 +156,9 @@ class Equations:
         self._terms[:d, size] = 1j * self.w.conj()
         self._J = np.diag(np.concatenate([self.system.J, np.zeros(len(self.rows))]))
         self._ones = np.ones(size + 1, complex)
-        self._last = np.zeros(size + 1, complex if len(self.system.stretches) else float)
+        self._stretching = bool(len(self.system.stretches))
+        self._identity = self.system.Phi.identity
+        self._last = np.zeros(size + 1, complex if self._stretching else float)
         self._last[size] = 1.0
         self._Phi = np.eye(size, self.n + len(self.rows), self.n - d)
         self._Phi[:d, : self.n] = self.system.Phi.Phi
@@ -235,13 +237,13 @@ class Equations:
         X = self._terms * u
         X *= u[:-1].conj()[:, None]
         kkt = X.real[:, :-1] + self._J
-        right: Real = X.imag.dot(squares) if squares.dtype == float else X.dot(squares).imag
-        carried = d + self.rows.carried
-        if len(carried):
+        right: Real = X.dot(squares).imag if self._stretching else X.imag.dot(squares)
+        if len(self.rows.carried):
+            carried = d + self.rows.carried
             kkt[carried, :d] = self.rows.by_direction(e)[self.rows.carried]
             kkt[:d, carried] = kkt[carried, :d].T
             right[carried] = self.rows.carried_convective(e, w)
-        if not self.system.Phi.identity:
+        if not self._identity:
             kkt, right = self._Phi.T @ kkt @ self._Phi, self._Phi.T @ right
         if self.moving_walls:
             right[n + self.first_hold : n + self.first_stick] -= self.held_motions(t)[2]
