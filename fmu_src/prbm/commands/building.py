@@ -334,10 +334,12 @@ def _build(plan: BuildPlan) -> tuple[list[Path], str]:
     FMUs; otherwise the Python FMUs are built.
     """
     processes = process_count(len(plan.mechanisms))
-    order = list(plan.mechanisms)
-    if processes > 1:
-        order.sort(key=lambda m: -_effort(plan, m))  # The last of them ends late otherwise.
+    order = plan.mechanisms
     with executor(processes) as pool:
+        if processes > 1:  # The slowest are built first, so that all processes end together.
+            efforts = [pool.submit(_effort, plan, mechanism) for mechanism in order]
+            found = {m.name: effort.result() for m, effort in zip(order, efforts, strict=True)}
+            order = tuple(sorted(order, key=lambda m: -found[m.name]))
         tasks = [pool.submit(_fmus, plan, mechanism) for mechanism in order]
         done = {m.name: task.result() for m, task in zip(order, tasks, strict=True)}
     written = []
