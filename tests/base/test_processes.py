@@ -25,3 +25,13 @@ def test_a_process_that_ends_early_is_reported():
 def test_there_are_at_most_as_many_processes_as_tasks():
     assert process_count(1) == 1
     assert process_count(3, 2) == 2
+
+
+@pytest.mark.parametrize("given", [None, "3"])
+def test_processes_use_one_thread_unless_the_environment_sets_another_number(monkeypatch, given):
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    if given:
+        monkeypatch.setenv("OPENBLAS_NUM_THREADS", given)
+    with executor(2) as pool:
+        assert pool.submit(os.getenv, "OPENBLAS_NUM_THREADS").result() == (given or "1")
+    assert os.getenv("OPENBLAS_NUM_THREADS") == given
