@@ -2,20 +2,21 @@
 
 import io
 import os
+import subprocess
 import sys
 from contextlib import suppress
 
 import pytest
 
 from prbm import __main__
-from prbm.commands import build_fmu
-from prbm.commands.program import THREADS
+from prbm.base.threads import THREAD_LIMITS
+from prbm.commands import build_fmu, program
 
 
 @pytest.mark.parametrize("main", [__main__.main, build_fmu.main])
 @pytest.mark.parametrize("given", [None, "3"])
 def test_threads_of_linear_algebra_default_to_one(main, given, monkeypatch, capsys):
-    for name in THREADS:
+    for name in THREAD_LIMITS:
         monkeypatch.setenv(name, given or "")
         if given is None:
             monkeypatch.delenv(name)
@@ -23,7 +24,7 @@ def test_threads_of_linear_algebra_default_to_one(main, given, monkeypatch, caps
     with suppress(SystemExit):
         main()
     assert capsys.readouterr().out.strip()
-    assert {os.environ[name] for name in THREADS} == {given or "1"}
+    assert {os.environ[name] for name in THREAD_LIMITS} == {given or "1"}
 
 
 @pytest.mark.parametrize("main", [__main__.main, build_fmu.main])
@@ -36,3 +37,29 @@ def test_characters_that_the_output_cannot_encode_are_printed_as_escapes(main, m
     print("3 \N{MICRO SIGN}m", flush=True)
     assert printed.getvalue().splitlines()[-1] == rb"3 \xb5m"
     sys.stdout.detach()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["prbm", "list"],
+        ["prbm.commands.build_fmu", "--list"],
+        [
+            "prbm.commands.build_fmu",
+            "--flavour",
+            "python",
+            "--model",
+            "PRBDM",
+            "--model",
+            "PRBDM2R",
+        ],
+    ],
+)
+def test_a_reader_that_closes_the_pipe_ends_a_command_without_a_message(arguments, tmp_path):
+    read, write = os.pipe()
+    os.close(read)
+    command = [sys.executable, "-m", *arguments]
+    with os.fdopen(write) as pipe:
+        done = subprocess.run(command, stdout=pipe, stderr=subprocess.PIPE, cwd=tmp_path, text=True)
+    assert (done.returncode, done.stderr) == (program.FAILED, "")
+    assert [*tmp_path.iterdir()] == []

@@ -13,9 +13,8 @@ from contextlib import contextmanager
 from typing import Any
 
 from .errors import PrbmError
+from .threads import THREAD_LIMITS
 
-# Variables of the environment that limit the threads of linear algebra in a new process.
-THREAD_LIMITS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
 PROCESSES_MAX = 61 if sys.platform == "win32" else math.inf  # Windows waits for no more.
 
 

@@ -8,7 +8,14 @@ import sys
 
 from ..fmu.date import date
 from .missing import missing_package
-from .program import INTERRUPTED, MISTAKE, command_name, escape_output, limit_threads
+from .program import (
+    INTERRUPTED,
+    MISTAKE,
+    command_name,
+    discard_output,
+    escape_output,
+    limit_threads,
+)
 
 
 def main() -> int:
@@ -23,7 +30,11 @@ def main() -> int:
             return MISTAKE
         from . import building  # imported here: it takes a second, and packages may be missing
 
-        return building.main()
+        status = building.main()
+        sys.stdout.flush()
+        return status
+    except BrokenPipeError:  # The reader of the output, for instance head, has closed the pipe.
+        return discard_output()
     except ModuleNotFoundError as error:
         print(f"{command_name()}: {missing_package(error)}", file=sys.stderr)
         return MISTAKE

@@ -7,7 +7,6 @@ computation fails, 2 for a mistake of the user, 130 after Ctrl-C.
 
 import argparse
 import importlib
-import os
 import re
 import sys
 from collections.abc import Callable, Sequence
@@ -43,7 +42,7 @@ from .arguments import (
     sweep_arguments,
 )
 from .measure_arguments import measure_arguments
-from .program import FAILED, INTERRUPTED, MISTAKE, OK
+from .program import FAILED, INTERRUPTED, MISTAKE, OK, discard_output
 from .remedies import in_options
 
 NEGATIVE = re.compile(r"-\.?\d")
@@ -513,8 +512,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         status = _run([*(sys.argv[1:] if arguments is None else arguments)])
         sys.stdout.flush()
     except BrokenPipeError:  # The reader of the output, for instance head, has closed the pipe.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return FAILED
+        return discard_output()
     return status
 
 

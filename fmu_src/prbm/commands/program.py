@@ -5,16 +5,10 @@ import os
 import sys
 from pathlib import Path
 
+from ..base.threads import THREAD_LIMITS
+
 OK, FAILED, MISTAKE, INTERRUPTED = 0, 1, 2, 130
 BUILDER = "build_fmu"  # Module that python -m runs.
-
-# Threads of linear algebra cost more time than they save on matrices of fewer than 300 rows.
-THREADS = (
-    "MKL_NUM_THREADS",
-    "OMP_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
-    "VECLIB_MAXIMUM_THREADS",
-)
 
 
 def limit_threads() -> None:
@@ -22,7 +16,7 @@ def limit_threads() -> None:
 
     The function has no effect after the import of NumPy, which reads the variables.
     """
-    for name in THREADS:
+    for name in THREAD_LIMITS:
         os.environ.setdefault(name, "1")
 
 
@@ -33,6 +27,12 @@ def escape_output() -> None:
     """
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
+
+
+def discard_output() -> int:
+    """Discard all further output, whose reader has closed the pipe; return the exit status."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return FAILED
 
 
 def command_name() -> str:
