@@ -9,4 +9,6 @@ def printable(text: str) -> str:
     >>> printable("a bell\a rings")
     'a bell  rings'
     """
+    if text.isprintable():
+        return text
     return "".join(c if c.isprintable() else " " for c in text)
