@@ -26,7 +26,7 @@ from prbm.drawing.icon import icon
 from prbm.files.mechanism_file import read_mechanism, shipped
 from prbm.fmu import python_fmu
 from prbm.fmu.description import Heading, model_description
-from prbm.fmu.start import interface, start_sample
+from prbm.fmu.start import interface, start
 from prbm.kernel import compiler
 from prbm.kernel.sources import kernel
 from signals import interruptible
@@ -367,7 +367,7 @@ def test_source_date_epoch_sets_the_date(epoch, mechanisms, tmp_path, monkeypatc
 
 def test_the_icon_does_not_depend_on_matplotlibrc(mechanisms):
     mechanism = mechanisms["PRBDM"]
-    sample = start_sample(mechanism, {})
+    sample = start(mechanism, {}).sample
     plain = icon(mechanism, sample)
     settings = {"lines.linewidth": 5.0, "savefig.transparent": True, "lines.markersize": 20.0}
     with matplotlib.rc_context(settings):

@@ -21,9 +21,10 @@ import prbm
 from fmu_host import OK, Instance
 from prbm.fmu.description import Heading, model_description
 from prbm.fmu.documentation import page
+from prbm.fmu.export import Export
 from prbm.fmu.native_fmu import described
 from prbm.fmu.slave.resolved import mechanism_from, resolved
-from prbm.fmu.start import interface, start_sample
+from prbm.fmu.start import interface, start
 from prbm.interface.units import UNITS
 from prbm.interface.variables import variables, with_starts
 from prbm.runs.experiment import Experiment, experiment
@@ -200,7 +201,7 @@ def test_changed_start_values_are_written_exactly(mechanisms, model):
 
 def test_start_values_of_computed_or_unknown_variables_are_rejected(mechanisms):
     mechanism = mechanisms["PRBDM"]
-    listed = variables(mechanism, start_sample(mechanism, {}))
+    listed = variables(mechanism, start(mechanism, {}).sample)
     with pytest.raises(prbm.base.errors.ParameterError, match=r"shuttle\.x is computed"):
         with_starts(listed, {"shuttle.x": 1.0})
     with pytest.raises(prbm.base.errors.ParameterError, match=r"did you mean stop\.restitution"):
@@ -223,7 +224,7 @@ def test_a_parameter_cannot_have_the_name_of_another_variable(mechanisms, name):
     with pytest.raises(
         prbm.base.errors.MechanismError, match=f"have the name {re.escape(name)}: rename"
     ):
-        described(named, {}, 3, clock=True)
+        described(Export(named), 3, clock=True)
     harmless = replace(
         guide, geometry=(*guide.geometry, prbm.mechanism.parameters.Parameter("shuttle.depth", 1.0))
     )

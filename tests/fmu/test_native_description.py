@@ -23,6 +23,7 @@ from prbm.commands import fmu_report as report
 from prbm.files.mechanism_file import read_mechanism, shipped
 from prbm.fmu import native_fmu
 from prbm.fmu import reference_results as reference
+from prbm.fmu.export import Export
 from prbm.fmu.native_fmu import described
 from prbm.interface.structure import dependencies
 from prbm.kernel.sources import TABLES, UNIT, amalgamation, kernel
@@ -184,7 +185,7 @@ def test_fmi_2_has_no_terminals_but_an_icon(fmu):
 
 @each_shipped
 def test_dependencies_cover_every_output_and_derivative(model, mechanisms):
-    native = described(mechanisms[model], {}, 3, clock=True)
+    native = described(Export(mechanisms[model]), 3, clock=True)
     found = dependencies(mechanisms[model], native)
     outputs = {v.name for v in native.variables if v.causality == "output"}
     assert {*outputs, *native.derivatives, *native.indicators} <= found.keys()
@@ -202,7 +203,7 @@ def test_dependencies_cover_every_output_and_derivative(model, mechanisms):
 
 def test_an_output_without_dependencies_is_rejected(mechanisms):
     guide = mechanisms["PRBDM"]
-    native = described(guide, {}, 3)
+    native = described(Export(guide), 3)
     added = replace(native.variables[-1], name="shuttle.energy", causality="output")
     with pytest.raises(MechanismError, match=r"outputs shuttle.energy: add them to"):
         dependencies(guide, replace(native, variables=(*native.variables, added)))

@@ -13,6 +13,7 @@ from fmpy import simulate_fmu
 from native_host import INTERFACES, OK, Instance, Integrator, clocked, unpacked
 from prbm.base.atomic import write
 from prbm.fmu import native_fmu
+from prbm.fmu.export import Export
 from prbm.fmu.native_fmu import described
 from prbm.hybrid.simulation import Simulation
 from prbm.runs.experiment import experiment
@@ -78,7 +79,7 @@ def slopes(sim: Simulation, listed: dict, now: dict) -> dict[str, float]:
 @cache
 def engine_run(model: str) -> SimpleNamespace:
     """Return the declared variables, their values in the engine, and the engine's impacts."""
-    listed = {v.name: v for v in described(mechanism(model), {}, 3).variables}
+    listed = {v.name: v for v in described(Export(mechanism(model)), 3).variables}
     sim, end = simulation(model), case(model).end
     given = {n: v.start for n, v in listed.items() if v.start is not None}
     rows = []
@@ -629,7 +630,7 @@ def test_declared_dependencies_are_complete(native, model, fmi):
 def driven(model: str) -> tuple[dict, list[dict]]:
     """Return the declared variables and the engine's values in a run with changes of inputs."""
     it = case(model)
-    listed = {v.name: v for v in described(it.mechanism, {}, 3).variables}
+    listed = {v.name: v for v in described(Export(it.mechanism), 3).variables}
     sim = Simulation(it.mechanism, it.starts(), start_time=2.0, tolerance=1e-9)
     given = {n: v.start for n, v in listed.items() if v.start is not None} | it.starts()
     rows = []

@@ -10,6 +10,7 @@ from kernel_library import KernelError, kernel
 from many_parts import anvil, elastic, profiles
 from prbm.base.errors import MechanismError
 from prbm.files.mechanism_file import read_mechanism, shipped
+from prbm.fmu.export import Export
 from prbm.fmu.native_fmu import described
 from prbm.hybrid.simulation import Simulation
 from prbm.interface.tables import HEAD, VERSION, slots, tables
@@ -130,7 +131,7 @@ def mechanism(request, tmp_path_factory) -> Mechanism:
 
 @pytest.fixture(scope="module")
 def written(mechanism) -> bytes:
-    native = described(mechanism, {}, 3, clock=True)
+    native = described(Export(mechanism), 3, clock=True)
     return tables(mechanism, native.variables, TOKEN, native.independent, STEP)
 
 
@@ -153,7 +154,7 @@ class Comparison:
 
     def __init__(self, mechanism: Mechanism, written: bytes) -> None:
         self.mechanism, self.reader = mechanism, Reader(written)
-        self.native = described(mechanism, {}, 3, clock=True)
+        self.native = described(Export(mechanism), 3, clock=True)
         self.bodies = ["ground", *(b.name for b in mechanism.bodies)]
         self.bounds = [
             (part, name)
@@ -325,7 +326,7 @@ def test_tables_contain_every_field_of_the_mechanism(mechanism, written):
 def test_start_values_are_those_of_the_variables(mechanism):
     """The start values of a parameter and an input are changed and found in the tables."""
     changes = {"solver.tolerance": 1e-5, "base.acceleration.y": 2.5}
-    native = described(mechanism, changes, 2)
+    native = described(Export(mechanism, changes), 2)
     written = tables(mechanism, native.variables, TOKEN, native.independent)
     for name, start in changes.items():
         at = written.index(name.encode() + b"\0") + len(name) + 1
@@ -389,7 +390,7 @@ def test_the_length_of_a_name_is_in_bytes(tmp_path):
     text = shipped()["PRBDM"].read_text()
     path.write_text(text.replace('"left_flexure"', '"linke_Fläche"'), "utf-8")
     mechanism = read_mechanism(path)
-    native = described(mechanism, {}, 2)
+    native = described(Export(mechanism), 2)
     written = tables(mechanism, native.variables, TOKEN, native.independent)
     name = "linke_Fläche".encode()
     assert struct.pack("<I", len(name)) + name + b"\0" in written

@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import eigh, null_space
 
 from prbm.analysis.impact_map.impacts import mode_energies
-from prbm.fmu.start import start_sample
+from prbm.fmu.start import start
 from prbm.hybrid import impacts
 from prbm.hybrid.simulation import Simulation
 from prbm.interface.variables import variables
@@ -173,6 +173,6 @@ def test_bounds_and_coordinates_are_documented():
     section = page.partition("## Modal restitution")[2].partition("\n## ")[0]
     assert "below -1" in section
     assert "coordinates" in section
-    listed = variables(mechanism("PRBDM"), start_sample(mechanism("PRBDM"), {}))
+    listed = variables(mechanism("PRBDM"), start(mechanism("PRBDM"), {}).sample)
     (found,) = [v.description for v in listed if v.name == "stop.modal_restitution"]
     assert "below -1" in found

@@ -18,7 +18,7 @@ from prbm.drawing.icon import BODY, POINTS, SVG, icon, shape, vector_icon
 from prbm.drawing.shapes import Shapes, box, corners, hull
 from prbm.drawing.style import png
 from prbm.files.mechanism_file import load, read_mechanism, shipped
-from prbm.fmu.start import start_sample
+from prbm.fmu.start import start
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.modal import modes
@@ -331,7 +331,7 @@ def test_films_contain_the_whole_motion_of_any_mechanism(name: str) -> None:
 def test_the_icon_shows_the_shape_at_release(name: str) -> None:
     chosen = mechanism(name)
     simulation = Simulation(chosen)
-    sample = start_sample(chosen, {})
+    sample = start(chosen, {}).sample
     exact = simulation.state()[: simulation.system.n]
     np.testing.assert_allclose(shape(simulation.system, sample), exact, atol=1e-9)
     first, again = icon(chosen, sample), icon(chosen, sample)
@@ -355,7 +355,7 @@ def bodies_of(drawing: bytes) -> list[np.ndarray]:
 def test_the_svg_icon_has_the_parts_of_the_png_at_the_same_places(name: str) -> None:
     """Halfway from the middle of each body to its corners, the PNG has the colour of bodies."""
     chosen = mechanism(name)
-    sample = start_sample(chosen, {})
+    sample = start(chosen, {}).sample
     drawing = vector_icon(chosen, sample)
     assert drawing == vector_icon(chosen, sample)
     found = bodies_of(drawing)[: len(chosen.bodies)]
@@ -378,8 +378,8 @@ def test_the_title_of_an_icon_is_text() -> None:
     """Quotes, markup and control characters of a title do not change the structure of the SVG."""
     title = "</title><script>alert('a & \"b\"')</script>\x07"
     chosen = replace(mechanism("PRBDM"), title=title)
-    plain = ElementTree.fromstring(vector_icon(mechanism("PRBDM"), start_sample(chosen, {})))
-    named = ElementTree.fromstring(vector_icon(chosen, start_sample(chosen, {})))
+    plain = ElementTree.fromstring(vector_icon(mechanism("PRBDM"), start(chosen, {}).sample))
+    named = ElementTree.fromstring(vector_icon(chosen, start(chosen, {}).sample))
     assert [element.tag for element in named.iter()] == [element.tag for element in plain.iter()]
     assert named.findtext(f"{{{SVG}}}title") == title.replace("\x07", " ")
 

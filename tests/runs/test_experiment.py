@@ -10,6 +10,7 @@ import pytest
 from prbm.files.mechanism_file import shipped
 from prbm.fmu import reference_results as reference
 from prbm.fmu.documentation import native_page, page
+from prbm.fmu.export import Export
 from prbm.fmu.native_fmu import described
 from prbm.fmu.start import interface
 from prbm.hybrid.simulation import Simulation
@@ -149,7 +150,7 @@ def test_damping_increases_the_estimated_number_of_steps():
 def test_the_documentation_shows_the_experiment_and_included_results(inside):
     small = guide(1e-5)
     chosen = experiment(small)
-    native = described(small, {}, 3)
+    native = described(Export(small), 3)
     html = native_page(small, native, 3, ["x86_64-linux"], chosen, inside)
     assert f"stop_time={chosen.stop_time:g}," in html
     assert ("reference results" in html) == inside

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 import prbm.fmu.live
+from prbm.fmu.export import Export
 from prbm.fmu.live.content import content
 from prbm.fmu.native_fmu import described
 from prbm.interface.tables import slots, tables
@@ -51,7 +52,7 @@ def simulated(mechanism: Mechanism, names: list[str], **job: Any) -> dict[str, A
     ``names`` are the outputs of which the last values are returned.  See live_host.js for further
     items of the job and the result.
     """
-    native = described(mechanism, {}, 3)
+    native = described(Export(mechanism), 3)
     default = experiment(mechanism)
     slot = slots(mechanism, native.independent)
     changes = [[slot[name], str(x)] for name, x in job.pop("changes", {}).items()]

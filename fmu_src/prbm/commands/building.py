@@ -21,6 +21,7 @@ from ..base.version import __version__
 from ..files.mechanism_file import read_mechanism, schema, shipped
 from ..files.settings import UserMistake, assigned, units_of
 from ..fmu import native_fmu, python_fmu
+from ..fmu.export import Export
 from ..fmu.parameter_sets import read_parameter_set
 from ..fmu.reference_results import steps
 from ..kernel.compiler import ALL, HOST, PLATFORMS, CompilerError, this_platform
@@ -376,12 +377,13 @@ def _write(path: Path, content: bytes) -> None:
 def _fmus(plan: BuildPlan, mechanism: Mechanism) -> tuple[dict[Flavour, bytes], str]:
     """Return the FMUs of a mechanism, and a sentence about missing ones.
 
-    They are built in one process, because they share results in memory.
+    They are built in one process, because they have much in common.
     """
+    export = Export(mechanism, plan.changes)
     fmus: dict[Flavour, bytes] = {}
     try:
         for flavour in plan.flavours:
-            fmus[flavour] = _fmu(plan, flavour, mechanism)
+            fmus[flavour] = _fmu(plan, flavour, export)
     except CompilerError as error:
         if plan.native_required:
             raise
@@ -389,17 +391,17 @@ def _fmus(plan: BuildPlan, mechanism: Mechanism) -> tuple[dict[Flavour, bytes], 
     return fmus, ""
 
 
-def _fmu(plan: BuildPlan, flavour: Flavour, mechanism: Mechanism) -> bytes:
-    progress = _progress(f"{flavour.folder}/{mechanism.name}")
-    changes, platforms = plan.changes, plan.platforms
+def _fmu(plan: BuildPlan, flavour: Flavour, export: Export) -> bytes:
+    name, platforms = export.mechanism.name, plan.platforms
+    progress = _progress(f"{flavour.folder}/{name}")
     try:
         if not flavour.native:
-            return python_fmu.build(mechanism, changes, progress)
-        return native_fmu.build(mechanism, changes, flavour.fmi, platforms, flavour.clock, progress)
+            return python_fmu.build_export(export, progress)
+        return native_fmu.build_export(export, flavour.fmi, platforms, flavour.clock, progress)
     except CompilerError:
         raise  # The error does not depend on the mechanism.
     except PrbmError as error:
-        raise UserMistake(f"{mechanism.name}: {error}") from None
+        raise UserMistake(f"{name}: {error}") from None
 
 
 def _progress(name: str) -> Callable[[str], None]:

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 
 from ..kernel.compiler import browser_module
 from ..mechanism.description import Mechanism
-from ..runs.experiment import experiment
 from .documentation import explorer_page
+from .export import Export
 from .native_fmu import described, simulated_part
 
 
@@ -25,8 +25,6 @@ def explorer(mechanism: Mechanism, changes: Mapping[str, float] | None = None) -
         If the mechanism cannot start with these values, or there is no WebAssembly module and no
         compiler for it.
     """
-    changes = dict(changes or {})
-    native = described(mechanism, changes, 3)
-    default = experiment(mechanism, changes)
-    part = simulated_part(mechanism, changes, default, browser_module())
-    return explorer_page(mechanism, native.variables, part)
+    export = Export(mechanism, changes)
+    native = described(export, 3)
+    return explorer_page(mechanism, native.variables, simulated_part(export, browser_module()))

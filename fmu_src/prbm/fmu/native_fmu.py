@@ -12,14 +12,11 @@ from ..interface.tables import FILE, tables
 from ..interface.variables import CLOCK
 from ..kernel.compiler import HOST, NoCompilerError, Platform, browser_module, libraries
 from ..kernel.sources import TABLES, amalgamation, files_digest, kernel, tables_header
-from ..mechanics.independent import independent
-from ..mechanics.stress import with_stress
 from ..mechanism.description import Mechanism
-from ..runs.engine import PYTHON
-from ..runs.experiment import Experiment, experiment
 from . import documentation
 from .archive import zipped
 from .description import Heading
+from .export import Export
 from .live.content import content
 from .live.page import LivePart, live_part
 from .native_description import LOG_CATEGORIES, build_description, description
@@ -28,7 +25,6 @@ from .reference_results import reference
 from .related import related_files
 from .slave.resolved import FILE as MODEL
 from .slave.resolved import resolved
-from .start import start, start_sample
 from .terminals import terminals
 
 NAMESPACE = uuid.UUID("f0b6b5a1-6d5c-5b0e-8c55-1a52a0e6f1d3")
@@ -77,15 +73,24 @@ def build(
         If the mechanism cannot start with these values, one of them is invalid, or there is no
         compiler for a platform.
     """
-    from ..drawing.icon import icon, vector_icon  # Imported here: Matplotlib takes half a second.
+    return build_export(Export(mechanism, changes), fmi, platforms, clock, progress)
 
-    changes = dict(changes or {})
+
+def build_export(
+    export: Export,
+    fmi: int = 3,
+    platforms: Sequence[str] = (HOST,),
+    clock: bool = False,
+    progress: Callable[[str], None] = lambda step: None,
+) -> bytes:
+    """Return the native FMU of an export, as :func:`build`."""
+    mechanism, changes = export.mechanism, export.changes
     progress("checking the start")
-    native = described(mechanism, changes, fmi, clock)
+    native = described(export, fmi, clock)
     compiled = libraries(platforms, progress)
     progress(f"collecting {len(native.variables)} variables and the tables")
     name, source = mechanism.name, f"{mechanism.name}.c"
-    default = experiment(mechanism, changes, engine=PYTHON)
+    default = export.experiment
     heading = Heading(name, mechanism.title, "", LOG_CATEGORIES, default)
     token = f"{{{uuid.uuid5(NAMESPACE, _digest(mechanism, native, fmi, source, heading))}}}"
     heading = replace(heading, guid=token)
@@ -105,11 +110,9 @@ def build(
     results = reference(mechanism, changes, native.variables, default, progress)
     contents |= related_files([default_set(mechanism, native.variables), *results])
     progress("drawing the icon and writing the documentation")
-    sample = start_sample(mechanism, changes)
-    png, svg = ICONS[fmi]
-    contents |= {png: icon(mechanism, sample), svg: vector_icon(mechanism, sample)}
+    contents |= dict(zip(ICONS[fmi], export.icons, strict=True))
     names = sorted(platform.name for platform in compiled)
-    part = live(mechanism, changes, default, progress)
+    part = live(export, progress)
     contents["documentation/index.html"] = documentation.native_page(
         mechanism, native, fmi, names, default, bool(results), part
     ).encode()
@@ -119,22 +122,13 @@ def build(
     return zipped(contents)
 
 
-def live(
-    mechanism: Mechanism,
-    changes: Mapping[str, float],
-    default: Experiment,
-    progress: Callable[[str], None] = lambda step: None,
-) -> LivePart | None:
+def live(export: Export, progress: Callable[[str], None] = lambda step: None) -> LivePart | None:
     """Return the part of a page that simulates a mechanism.
 
     Parameters
     ----------
-    mechanism : Mechanism
-        The mechanism.
-    changes : mapping
-        Start values of the page that replace those of the mechanism.
-    default : Experiment
-        The default experiment.
+    export : Export
+        The mechanism with the start values of the page.
     progress : callable
         Called with a description of the stage, and with a sentence if there is no such part.
 
@@ -148,47 +142,44 @@ def live(
     except NoCompilerError as error:
         progress(f"the documentation has no simulation: {error}.")
         return None
-    return simulated_part(mechanism, changes, default, module)
+    return simulated_part(export, module)
 
 
-def simulated_part(
-    mechanism: Mechanism, changes: Mapping[str, float], default: Experiment, module: bytes
-) -> LivePart:
+def simulated_part(export: Export, module: bytes) -> LivePart:
     """Return the part of a page that simulates a mechanism, see :func:`live`.
 
     The page shows the stress of all flexures, whether or not it is an output of the FMU.  The
     motion does not depend on this.
     """
-    mechanism = with_stress(mechanism)
-    native = described(mechanism, changes, 3)
+    default, export = export.experiment, export.with_stress
+    mechanism, native = export.mechanism, described(export, 3)
     table = tables(mechanism, native.variables, "", native.independent, default.step)
     described_by = content(mechanism, native.variables, native.independent, default)
     return live_part(described_by, table, module)
 
 
-def described(
-    mechanism: Mechanism, changes: Mapping[str, float], fmi: int, clock: bool = False
-) -> NativeInterface:
-    """Return the interface of the native FMU of a mechanism with changed start values.
+def described(export: Export, fmi: int, clock: bool = False) -> NativeInterface:
+    """Return the interface of the native FMU of an export.
 
     Raises
     ------
     PrbmError
-        If the mechanism cannot start, ``changes`` has a name that is not a parameter or input, or
-        clocks are requested for a mechanism without stops.
+        If the mechanism cannot start, a changed name is not a parameter or input, or clocks are
+        requested for a mechanism without stops.
     """
+    mechanism = export.mechanism
     if clock and not mechanism.stops:
         raise MechanismError(
             f"{mechanism.name} has no stop: a clock ticks at the impacts of a stop; build the FMU "
             "without clocks"
         )
-    begun = start(mechanism, changes)
+    begun = export.start
     return native_interface(
         mechanism,
         begun.variables,
         begun.defaults,
         begun.magnitudes,
-        independent(mechanism),
+        export.independent,
         time=fmi == 3,
         clock=clock,
     )

@@ -14,16 +14,14 @@ from ..base.text import printable
 from ..interface.variables import Variable
 from ..kernel.sources import files_digest
 from ..mechanism.description import Mechanism
-from ..runs.engine import PYTHON
-from ..runs.experiment import experiment
 from . import documentation
 from .archive import zipped
 from .description import Heading, model_description
+from .export import Export
 from .parameter_sets import default_set
 from .related import related_files
 from .slave.resolved import FILE, resolved
 from .slave.slave import MechanismSlave
-from .start import start
 
 NAMESPACE = uuid.UUID("6f1c6c1e-0c53-5d0e-9d6e-3b1f0b4f7a52")
 ROOT = __package__.rpartition(".")[0]  # The parent package.
@@ -97,14 +95,16 @@ def build(
     PrbmError
         If the mechanism cannot start with these values, or one of them is out of bounds.
     """
-    from ..drawing.icon import icon, vector_icon  # Imported here: Matplotlib takes half a second.
+    return build_export(Export(mechanism, changes), progress)
 
-    changes = dict(changes or {})
+
+def build_export(export: Export, progress: Callable[[str], None] = lambda step: None) -> bytes:
+    """Return the Python FMU of an export, as :func:`build`."""
+    mechanism = export.mechanism
     progress("checking the start")
-    begun = start(mechanism, changes)
-    listed = begun.variables
+    listed = export.start.variables
     progress(f"collecting {len(listed)} variables and the engine")
-    default = experiment(mechanism, changes, engine=PYTHON)
+    default = export.experiment
     sources = dict(_sources(mechanism, listed, default.step))
     token = f"{mechanism.name}_{files_digest(sources | {'': SCRIPT.encode()})[:TOKEN_DIGITS]}"
     progress("drawing the icon and writing the documentation")
@@ -116,8 +116,7 @@ def build(
     heading = replace(heading, guid=f"{{{uuid.uuid5(NAMESPACE, anonymous)}}}")
     contents["modelDescription.xml"] = model_description(heading, listed)
     contents["documentation/index.html"] = documentation.page(mechanism, listed, default).encode()
-    contents["model.png"] = icon(mechanism, begun.sample)
-    contents["documentation/icon.svg"] = vector_icon(mechanism, begun.sample)
+    contents["model.png"], contents["documentation/icon.svg"] = export.icons
     contents |= related_files([default_set(mechanism, listed)])
     progress("packing")
     return zipped(contents)

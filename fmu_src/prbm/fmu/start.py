@@ -44,17 +44,6 @@ def start(mechanism: Mechanism, changes: Mapping[str, float]) -> Start:
     return Start(changed, defaults, motion.outputs(), motion.magnitudes())
 
 
-def start_sample(mechanism: Mechanism, changes: Mapping[str, float]) -> dict[str, Number]:
-    """Return all outputs at the start by name.
-
-    Raises
-    ------
-    PrbmError
-        If the mechanism cannot start with these start values.
-    """
-    return dict(Simulation(mechanism, changes).outputs())
-
-
 def interface(mechanism: Mechanism, changes: Mapping[str, float]) -> tuple[Variable, ...]:
     """Return the variables that every FMU of a mechanism has, as :func:`start`."""
     return start(mechanism, changes).variables
