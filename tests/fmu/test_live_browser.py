@@ -85,7 +85,7 @@ def test_each_entry_of_the_headline_is_one_line(browser, size, tmp_path):
 
 def lever() -> str:
     """Return the mechanism file of the page that describes a lever."""
-    blocks = (ROOT / "docs" / "describe-your-mechanism.md").read_text().split("```")
+    blocks = (ROOT / "docs" / "describe-your-mechanism.md").read_text(encoding="utf-8").split("```")
     return "".join(block.removeprefix("toml\n") for block in blocks if block.startswith("toml\n"))
 
 
@@ -99,7 +99,9 @@ OTHERS = {
 @pytest.mark.parametrize("name", ["lever", *OTHERS])
 def test_mechanisms_that_are_not_shipped_can_be_explored(browser, name, tmp_path):
     path = tmp_path / f"{name}.toml"
-    path.write_text(OTHERS[name].read_text() if name in OTHERS else lever())
+    path.write_text(
+        OTHERS[name].read_text(encoding="utf-8") if name in OTHERS else lever(), encoding="utf-8"
+    )
     data = browser.open(written(tmp_path, load(str(path))))
     assert data["state"] == "done"
     assert browser.errors() == []
@@ -455,6 +457,24 @@ def test_a_slow_run_shows_its_progress_and_can_be_replaced(browser, guide):
     browser.find("#reset").click()
     assert browser.wait(lambda data: data["state"] == "done")["impacts"] == "14"
     assert browser.find("#brief").text.startswith("Impacts: 14 ")
+
+
+def test_numbers_are_those_of_the_whole_simulation_at_its_end(browser, guide):
+    """The film plays meanwhile, and shows its numbers less often than its pictures."""
+    browser.view(guide)
+    browser.run(
+        "window.briefs = []; const root = document.documentElement;"
+        "new MutationObserver(() => root.dataset.state === 'done' &&"
+        "  briefs.push([root.dataset.impacts, document.getElementById('brief').textContent])"
+        ").observe(root, {attributeFilter: ['data-state']})"
+    )
+    browser.wait(lambda data: data["state"] == "done")
+    for speed in ("0.3", "0.6", "0.9"):
+        browser.changed(lambda speed=speed: enter(browser, "release.velocity", speed))
+    briefs = browser.run("return briefs")
+    assert len(briefs) >= 3
+    for impacts, brief in briefs:
+        assert brief.startswith(f"Impacts: {impacts} "), brief
 
 
 def test_a_browser_without_a_needed_function_shows_the_remedy(browser, guide):

@@ -223,7 +223,7 @@ class Page {
       this.busy = false;
       this.finish();
     }
-    this.show();
+    this.show(run.finished);
     if (this.wanted && (run.finished || performance.now() - this.started > RUN_AGE_MIN)) {
       this.begin();
     }
