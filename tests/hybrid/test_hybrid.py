@@ -352,6 +352,18 @@ def test_a_release_out_of_reach_from_the_start_has_a_hint_at_units(modulus, hint
     assert ("check the units of youngs_modulus and thickness" in str(caught.value)) is hint
 
 
+@pytest.mark.parametrize("engine", [Simulation, KernelSimulation])
+def test_a_body_that_turns_freely_without_gravity_is_rejected_with_a_hint_at_its_pins(engine):
+    """Nothing determines the angle of a body on a leaf with pins at both ends."""
+    arm = mechanism("Cantilever")
+    (leaf,) = arm.flexures
+    free = dataclasses.replace(arm, flexures=(dataclasses.replace(leaf, ends=("pin", "pin")),))
+    given = {"gravity.x": 0.0, "gravity.y": 0.0, "release.displacement": 1e-3}
+    with pytest.raises(EquilibriumError, match=r"turns freely on pins.*add gravity") as caught:
+        engine(free, given)
+    assert "youngs_modulus" not in str(caught.value)
+
+
 def test_an_earlier_or_invalid_time_is_rejected():
     sim = simulation("PRBDM")
     sim.advance(0.01)

@@ -271,7 +271,7 @@ def test_last_stage_but_one_is_a_solution_of_third_order():
 @pytest.mark.parametrize("z", np.linspace(0.2, 4.4, 22))
 def test_estimated_error_of_an_oscillation_is_close_to_its_error(z):
     """The ratio of both errors is 0.35 to 1.8 up to the limit of stability, h omega = z = 4.4."""
-    scales = Scales(length=1.0, rate=1.0, energy=1e-9)
+    scales = Scales(length=1.0, rate=1.0, energy=1e-9, time=2 * math.pi)
     turn = np.array([[0.0, 1.0, 0.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0] * 4, [0.0] * 4])
     estimated, actual = [], []
     for phase in np.linspace(0.0, np.pi, 8, endpoint=False):

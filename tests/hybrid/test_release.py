@@ -243,10 +243,13 @@ def test_a_python_fmu_keeps_the_release():
 
 
 def test_a_file_names_the_point_and_gives_the_angle_in_degrees(tmp_path):
-    text = (SUPPORT / "pivot.toml").read_text()
+    text = (SUPPORT / "pivot.toml").read_text(encoding="utf-8")
     assert PIVOT.release.angle == pytest.approx(math.radians(-5.0), rel=1e-12)
     path = tmp_path / "pivot.toml"
-    path.write_text(text.replace('angle = "-5 deg"', 'displacement = "-1 mm"\npoint = "wheel.rim"'))
+    path.write_text(
+        text.replace('angle = "-5 deg"', 'displacement = "-1 mm"\npoint = "wheel.rim"'),
+        encoding="utf-8",
+    )
     assert read_mechanism(path).release.point == RIM
     for old, message in (
         ('point = "wheel.hub"', r"release.point = 'wheel.hub' is not a point of the body wheel"),
@@ -254,7 +257,7 @@ def test_a_file_names_the_point_and_gives_the_angle_in_degrees(tmp_path):
         ('angle = "5 mm"', "release.angle = '5 mm'"),
         ('displacement = "1 mm"\nangle = 0.1', "excludes release.displacement"),
     ):
-        path.write_text(text.replace('angle = "-5 deg"', old))
+        path.write_text(text.replace('angle = "-5 deg"', old), encoding="utf-8")
         with pytest.raises(MechanismError, match=message):
             read_mechanism(path)
 

@@ -6,6 +6,7 @@ Most tests compile a short stub instead of the kernel.
 import hashlib
 import os
 import re
+import shlex
 import shutil
 import struct
 import subprocess
@@ -67,7 +68,7 @@ def only(made: dict) -> bytes:
 def script(path: Path, text: str) -> Path:
     """Write an executable shell script."""
     path.parent.mkdir(exist_ok=True)
-    path.write_text(f"#!/bin/sh\n{text}\n")
+    path.write_text(f"#!/bin/sh\n{text}\n", encoding="utf-8")
     path.chmod(0o755)
     return path
 
@@ -129,7 +130,7 @@ def test_error_contains_the_last_lines_of_the_compiler_output(cache, tmp_path, m
         '[ "$1" = --version ] && echo bad 1.0 && exit 0\n'
         "for i in 1 2 3 4 5 6 7 8 9; do echo line $i >&2; done; exit 3",
     )
-    monkeypatch.setenv("CC", str(bad))
+    monkeypatch.setenv("CC", shlex.quote(str(bad)))
     with pytest.raises(CompilerError, match=r"status 3: line 4; .*line 9\)") as error:
         libraries([HOST])
     assert "line 3" not in str(error.value)
@@ -148,7 +149,7 @@ def test_the_next_compiler_is_used_if_one_fails(cache, tmp_path, monkeypatch):
 
 
 def test_a_compiler_that_writes_no_file_is_an_error(cache, tmp_path, monkeypatch):
-    monkeypatch.setenv("CC", str(script(tmp_path / "bin" / "idle", "exit 0")))
+    monkeypatch.setenv("CC", shlex.quote(str(script(tmp_path / "bin" / "idle", "exit 0"))))
     with pytest.raises(CompilerError, match=r"cannot compile .*status 0: no message"):
         libraries([HOST])
 
@@ -193,7 +194,7 @@ def test_a_missing_function_is_an_error_of_the_compilation(cache, monkeypatch):
 
 def test_libraries_are_compiled_without_a_cache_if_it_cannot_be_written(cache, monkeypatch):
     cache.parent.parent.mkdir(exist_ok=True)
-    cache.parent.write_text("a file where the folder should be")
+    cache.parent.write_text("a file where the folder should be", encoding="utf-8")
     messages: list[str] = []
     made = libraries([HOST], messages.append)
     assert only(made)
@@ -311,9 +312,10 @@ def test_an_interrupted_compilation_leaves_no_file_in_the_cache(cache, monkeypat
 
 def test_simultaneous_exports_compile_once(cache, tmp_path):
     log = tmp_path / "log"
+    note = f"echo one >> {shlex.quote(str(log))}; sleep 1"
     slow = script(
         tmp_path / "bin" / "slow",
-        f'[ "$1" = --version ] || {{ echo one >> {log}; sleep 1; }}\nexec {SYSTEM} "$@"',
+        f'[ "$1" = --version ] || {{ {note}; }}\nexec {SYSTEM} "$@"',
     )
     code = (
         "from prbm.kernel import compiler\n"
@@ -322,7 +324,7 @@ def test_simultaneous_exports_compile_once(cache, tmp_path):
         "for made in compiler.libraries(['host']).values():\n"
         "    print(hashlib.sha256(made).hexdigest())"
     )
-    environment = os.environ | {"CC": str(slow), "PYTHONPATH": str(ROOT / "fmu_src")}
+    environment = os.environ | {"CC": shlex.quote(str(slow)), "PYTHONPATH": str(ROOT / "fmu_src")}
     started = [
         subprocess.Popen(
             [sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, text=True
@@ -332,7 +334,7 @@ def test_simultaneous_exports_compile_once(cache, tmp_path):
     printed = {process.communicate()[0] for process in started}
     assert [process.returncode for process in started] == [0, 0, 0]
     assert len(printed) == 1
-    assert log.read_text() == "one\n"
+    assert log.read_text(encoding="utf-8") == "one\n"
 
 
 def test_the_lock_of_a_process_that_died_is_released(cache):

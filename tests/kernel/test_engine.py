@@ -44,7 +44,9 @@ def both(mechanism, values=None, **options):
 
 def prototypes():
     """Return result and argument types of the functions of engine.h, by name."""
-    text = re.sub(r"/\*.*?\*/", "", (KERNEL / "engine.h").read_text(), flags=re.DOTALL)
+    text = re.sub(
+        r"/\*.*?\*/", "", (KERNEL / "engine.h").read_text(encoding="utf-8"), flags=re.DOTALL
+    )
     found = {}
     for result, star, name, arguments in re.findall(
         r"^EXPORTED (\w+) (\*?)(\w+)\(([^)]*)\);", text, re.MULTILINE
@@ -62,7 +64,9 @@ def prototypes():
 
 def test_the_functions_are_declared_as_in_the_header():
     assert prototypes() == FUNCTIONS
-    header = (KERNEL / "engine.h").read_text() + (KERNEL / "core" / "memory.h").read_text()
+    header = (KERNEL / "engine.h").read_text(encoding="utf-8") + (
+        KERNEL / "core" / "memory.h"
+    ).read_text(encoding="utf-8")
     numbers = dict(re.findall(r"enum \{ (\w+) = (-?\d+) \};", header))
     assert int(numbers["ENGINE_UNFINISHED"]) == UNFINISHED
     assert int(numbers["PROBLEM_LENGTH"]) == MESSAGE_LENGTH

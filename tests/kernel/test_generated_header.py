@@ -64,7 +64,7 @@ def sources():
     """Return the C files by their path, without comments, texts and preprocessor conditions."""
     found = {}
     for path in sorted(KERNEL.rglob("*.[ch]")):
-        text = re.sub(r"/\*.*?\*/", "", path.read_text(), flags=re.DOTALL)
+        text = re.sub(r"/\*.*?\*/", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
         text = re.sub(r'"(?:\\.|[^"\\])*"|' + r"'(?:\\.|[^'\\])+'", '""', text)
         found[path.relative_to(KERNEL).as_posix()] = re.sub(r"(?m)^\s*#\s*if.*$", "", text)
     return found
@@ -87,7 +87,7 @@ def test_a_stale_header_fails_the_check(tmp_path, monkeypatch, capsys):
     assert "is stale" in capsys.readouterr().err
     assert header.main() == 0
     assert header.main(["--check"]) == 0
-    assert header.PATH.read_text() == header.header()
+    assert header.PATH.read_text(encoding="utf-8") == header.header()
 
 
 @pytest.mark.parametrize("file", sources())
@@ -117,13 +117,13 @@ def literals(text):
 
 @pytest.mark.parametrize("file", ENGINE)
 def test_the_engine_contains_no_literal_tolerance(file):
-    found = literals((KERNEL.parent / file).read_text()) - ENGINE_PLAIN
+    found = literals((KERNEL.parent / file).read_text(encoding="utf-8")) - ENGINE_PLAIN
     assert found <= ENGINE_ALLOWED.get(file, {}).keys() or file in ENGINE_DATA
 
 
 def test_every_exception_of_the_engine_is_needed():
     for file, allowed in ENGINE_ALLOWED.items():
-        assert allowed.keys() <= literals((KERNEL.parent / file).read_text())
+        assert allowed.keys() <= literals((KERNEL.parent / file).read_text(encoding="utf-8"))
 
 
 def test_the_checks_find_a_literal_tolerance_in_python_and_c():

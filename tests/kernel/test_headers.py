@@ -20,7 +20,9 @@ FILES = [
 def check(folder, file):
     """Return the messages of the compiler about a file that is compiled alone."""
     command = ["cc", "-std=c99", "-fsyntax-only", *ALONE, *WARNINGS, f"-I{folder}", *FOLDERS]
-    if "\nEXPORTED " in file.read_text():  # Importers have the prototypes of these functions.
+    if "\nEXPORTED " in file.read_text(
+        encoding="utf-8"
+    ):  # Importers have the prototypes of these functions.
         command.append("-Wno-missing-prototypes")
     return subprocess.run([*command, str(file)], capture_output=True, text=True).stderr
 
@@ -39,7 +41,7 @@ def test_a_file_compiles_alone(file):
 )
 def test_the_compiler_finds_functions_without_a_header(tmp_path, text, complaint):
     file = tmp_path / "wrong.c"
-    file.write_text(text)
+    file.write_text(text, encoding="utf-8")
     assert complaint in check(tmp_path, file)
 
 
@@ -60,14 +62,16 @@ def test_functions_are_declared_in_the_header_of_their_file(file):
     """The public functions of a simulation are in motion.h instead."""
     path = KERNEL / file
     own = path.with_suffix(".h")
-    found = declared((KERNEL / "motion.h").read_text())
-    found |= declared(own.read_text()) if own.exists() else set()
-    assert defined(path.read_text()) <= found
+    found = declared((KERNEL / "motion.h").read_text(encoding="utf-8"))
+    found |= declared(own.read_text(encoding="utf-8")) if own.exists() else set()
+    assert defined(path.read_text(encoding="utf-8")) <= found
     if own.exists():
-        assert declared(own.read_text()) <= defined(path.read_text())
+        assert declared(own.read_text(encoding="utf-8")) <= defined(
+            path.read_text(encoding="utf-8")
+        )
 
 
 def test_every_file_is_part_of_the_library():
-    included = re.findall(r'#include "(.*\.c)"', (KERNEL / UNIT).read_text())
+    included = re.findall(r'#include "(.*\.c)"', (KERNEL / UNIT).read_text(encoding="utf-8"))
     assert sorted(included) == FILES
     assert all(Path(file).suffix == ".c" for file in included)

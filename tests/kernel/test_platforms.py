@@ -64,7 +64,7 @@ def functions_of_the_standards() -> set[str]:
     """Return the names of all functions of FMI 2.0 and 3.0, from the standards' headers."""
     names = set()
     for version in (2, 3):
-        header = (HEADERS / f"fmi{version}FunctionTypes.h").read_text()
+        header = (HEADERS / f"fmi{version}FunctionTypes.h").read_text(encoding="utf-8")
         names |= set(re.findall(rf"\b(fmi{version}\w+)TYPE\b", header))
     return names
 

@@ -25,7 +25,8 @@ def test_functions_have_the_types_of_the_standard_headers(version, tmp_path):
         f"#define PRBM_FMI {version}\n"
         '#include "fmi/exported.h"\n'
         f'#include "fmi{version}Functions.h"\n'
-        '#include "prbm_fmu.c"\n'
+        '#include "prbm_fmu.c"\n',
+        encoding="utf-8",
     )
     command = ["cc", *FLAGS, "-fsyntax-only", "unit.c"]
     subprocess.run(command, cwd=tmp_path, check=True)
@@ -43,7 +44,8 @@ def test_types_and_constants_have_the_values_of_the_standard_headers(version, tm
     for header in (f"fmi/types{version}.h", f"fmi{version}Functions.h"):
         source, program = tmp_path / "print.c", tmp_path / "print"
         source.write_text(
-            f'#include <stdio.h>\n#include "{header}"\nint main(void) {{\n{body}\nreturn 0;\n}}\n'
+            f'#include <stdio.h>\n#include "{header}"\nint main(void) {{\n{body}\nreturn 0;\n}}\n',
+            encoding="utf-8",
         )
         subprocess.run(["cc", f"-I{KERNEL}", f"-I{HEADERS}", "-o", program, source], check=True)
         printed.append(subprocess.check_output([program], text=True).splitlines())
@@ -52,7 +54,7 @@ def test_types_and_constants_have_the_values_of_the_standard_headers(version, tm
 
 def declared(version: int) -> tuple[list[str], list[str]]:
     """Return the names of all types, and of all constants, that the kernel declares."""
-    text = (KERNEL / "fmi" / f"types{version}.h").read_text()
+    text = (KERNEL / "fmi" / f"types{version}.h").read_text(encoding="utf-8")
     found = re.findall(rf"\bfmi{version}\w+", text)
     names = sorted(set(found))
     constants = set(

@@ -8,6 +8,8 @@ from scipy.optimize import minimize
 
 from many_parts import cantilever
 from prbm.base.errors import EquilibriumError
+from prbm.base.tolerances import STATICS_LOAD_STEP_MIN
+from prbm.mechanics import statics
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.forces import elastic_energy, gravitational_energy
 from prbm.mechanics.modal import modes
@@ -145,3 +147,28 @@ def test_a_displacement_out_of_reach_is_rejected():
     system = assemble(guide, guide.values())
     with pytest.raises(EquilibriumError, match="beyond"):
         equilibrium(system, 0.2)
+
+
+def test_slow_loading_ends_at_the_largest_load_that_can_be_carried(monkeypatch):
+    """It ends within the smallest step of it, whatever the rounding of the sums of steps.
+
+    A sum of steps is rounded where it passes a power of two.
+    """
+    system = assemble(mechanism("PRBDM"), mechanism("PRBDM").values())
+    rng = np.random.default_rng(0)
+    near = 0.5 ** rng.integers(1, 6, 2000) + STATICS_LOAD_STEP_MIN * rng.uniform(-1, 1, 2000)
+    for limit in (1.0, *near, *rng.uniform(size=200)):
+        tried, slope = [], rng.uniform(0.6, 3.0)
+
+        def carried(system, held, load, start, limit=limit, slope=slope, tried=tried):
+            share = load[1]
+            tried.append(share)
+            assert len(tried) <= 4.0 / STATICS_LOAD_STEP_MIN, "the loading does not end"
+            return np.full(system.n, slope * share) if share <= limit else None
+
+        monkeypatch.setattr(statics, "_newton", carried)
+        start = np.zeros(system.n)
+        _, done = statics._follow(system, lambda share: (None, None, share), start)
+        assert limit - 1.001 * STATICS_LOAD_STEP_MIN <= done <= limit
+        assert done < 1.0 or limit == 1.0
+        assert max(tried) <= 1.0

@@ -88,3 +88,18 @@ def test_the_second_stable_shape_is_twice_the_rise_away():
     forces = [equilibrium(system, d).force for d in np.linspace(near, far, 5)]
     assert forces[0] < 0.0
     assert min(forces) < -0.3 * max(abs(f) for f in forces)
+
+
+@pytest.mark.slow
+def test_tall_beams_need_the_order_5():
+    """The rise is 15 times the thickness.  The limits are those of the page on flexure models."""
+    thickness = RISE / 15
+    displacements = np.linspace(0.05e-3, 1.6e-3, 32)
+    peak = snap_forces(displacements, thickness).max()
+    excess = []
+    for order in (3, 5):
+        system = of_order(order, **{"beam.thickness": thickness})
+        found = [equilibrium(system, d).force for d in displacements]
+        excess.append(max(found) / peak - 1.0)
+    assert 0.05 < excess[0] < 0.095
+    assert abs(excess[1]) < 2e-3

@@ -111,9 +111,12 @@ def _header() -> str:
 
     A line ``@name.c@`` precedes the declarations of each header ``core/name.h``.
     """
-    included = re.findall(r'#include "core/(\w+)\.h"', (KERNEL / "kernel.h").read_text())
-    return _plain((KERNEL / "generated.h").read_text()) + "\n".join(
-        f"@{name}.c@\n" + _plain((KERNEL / "core" / f"{name}.h").read_text()) for name in included
+    included = re.findall(
+        r'#include "core/(\w+)\.h"', (KERNEL / "kernel.h").read_text(encoding="utf-8")
+    )
+    return _plain((KERNEL / "generated.h").read_text(encoding="utf-8")) + "\n".join(
+        f"@{name}.c@\n" + _plain((KERNEL / "core" / f"{name}.h").read_text(encoding="utf-8"))
+        for name in included
     )
 
 
@@ -172,7 +175,9 @@ def prototypes() -> dict[str, Prototype]:
 
 def translation_unit() -> str:
     """Return C code that includes kernel.h and all C files of core/."""
-    includes = re.findall(r'#include "(core/\w+\.c)"', (KERNEL / "prbm_fmu.c").read_text())
+    includes = re.findall(
+        r'#include "(core/\w+\.c)"', (KERNEL / "prbm_fmu.c").read_text(encoding="utf-8")
+    )
     return "".join(f'#include "{name}"\n' for name in ("kernel.h", *includes))
 
 
@@ -186,7 +191,7 @@ def compiled(
     folder = Path(mkdtemp(prefix="prbm-kernel-"))
     try:
         source, library = folder / "kernel.c", folder / "kernel.so"
-        source.write_text(translation_unit() + text)
+        source.write_text(translation_unit() + text, encoding="utf-8")
         command = [*compiler, *FLAGS, *flags, str(source), "-o", str(library), "-lm"]
         subprocess.run(command, check=True, capture_output=True, text=True)
         return ctypes.CDLL(str(library))

@@ -62,12 +62,12 @@ def _compile(folder: Path, changes: Changes = ()) -> None:
     """Compile the kernel up to the simulation, all functions visible."""
     shutil.copytree(KERNEL, folder)
     for file, old, new in changes:
-        text = (folder / file).read_text()
+        text = (folder / file).read_text(encoding="utf-8")
         assert text.count(old) == 1, f"{old} in {file}"
-        (folder / file).write_text(text.replace(old, new))
-    kernel = (folder / "prbm_fmu.c").read_text().partition("#ifdef PRBM_ENGINE")[0]
+        (folder / file).write_text(text.replace(old, new), encoding="utf-8")
+    kernel = (folder / "prbm_fmu.c").read_text(encoding="utf-8").partition("#ifdef PRBM_ENGINE")[0]
     source, built = folder / "kernel.c", folder / "kernel.so"
-    source.write_text(kernel)
+    source.write_text(kernel, encoding="utf-8")
     flags = [flag for flag in FLAGS if not flag.startswith("-I")]
     if changes:  # A changed kernel runs once and shortly.
         flags.append("-O0")
@@ -88,7 +88,7 @@ def library(changes: Changes = ()) -> ctypes.CDLL:
 @cache
 def _sizes() -> list[int]:
     """Return the numbers of a saved state: scalars, of a stop, and of its contact."""
-    text = (KERNEL / "hybrid" / "snapshot.c").read_text()
+    text = (KERNEL / "hybrid" / "snapshot.c").read_text(encoding="utf-8")
     names = "SCALARS", "PER_STOP_STATE", "PER_CONTACT_STATE"
     return [int(re.search(rf"\b{name} = (\d+)", text)[1]) for name in names]
 

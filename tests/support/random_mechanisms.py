@@ -228,7 +228,8 @@ def starts(mechanism: Mechanism) -> bool:
     M, _ = inertia(system.H, np.diag(system.J), e)
     rows = jacobian(system.spread(np.vstack([system.loops, system.release])), e)
     left, free = (
-        (rows[-1] @ response(M, held, rows[-1:])).item() for held in (rows[:-1], rows[:0])
+        (rows[-1] @ response(M, held, rows[-1:], system.length)).item()
+        for held in (rows[:-1], rows[:0])
     )
     return left > MOBILITY_RATIO_MIN * free
 

@@ -10,7 +10,6 @@ import math
 
 # --- description -------------------------------------------------------------------------------
 JOINT_DISTANCE_RTOL = 1e-9  # Of the size: largest distance of two points that a joint connects.
-MASSLESS_RTOL = 1e-13  # Smallest eigenvalue of the mass matrix, scaled to a unit diagonal.
 INERTIA_RATIO_MIN = (
     1e-12  # Of the largest inertia of a coordinate: the motion of less is round-off.
 )
@@ -18,6 +17,8 @@ DEPENDENT_LOOP_RTOL = 1e-9  # Of the loop Jacobian's largest entry: smaller pivo
 STUB_RTOL = 1e-12  # Of a cantilever's length: excess of the sum of its links that is round-off.
 
 # --- constraints -------------------------------------------------------------------------------
+SINGULAR_RTOL = 1e-12  # Of the largest pivot of a scaled matrix: a smaller one is round-off.
+ROW_RTOL = 1e-9  # Of the size: a constraint whose row is shorter does not depend on the position.
 CONSTRAINT_RTOL = 1e-14  # Of the size: residual of a closed loop, a few roundings of a coordinate.
 CONSTRAINT_STALLED_RTOL = 1e-12  # Of the size: residual accepted when iteration stops improving.
 CONSTRAINT_ITERATIONS_MAX = 20  # Gauss-Newton converges quadratically; three are usual.
@@ -35,18 +36,17 @@ STATICS_GROWTH_MAX = 2.0  # Largest ratio of a load step to an accepted one befo
 STATICS_CONSTRAINT_RTOL = 1e-13  # Of the size: residual of closed loops at an equilibrium.
 STATICS_FORCE_RTOL = 1e-12  # Of the stiffest spring at one radian, or of the load: residual torque.
 STATICS_STEP_ATOL = 1e-8  # rad; Newton step that ends the iteration: the error is its square.
-RELEASE_ROW_RTOL = 1e-9  # Of the size: if its row is shorter, the loops hold the released body.
 RELEASE_LEVER_RTOL = 0.02  # Of the size: a body turns about a point with a shorter lever.
 RELEASE_MODE_RTOL = 1e-6  # Of the size times the largest turn: no motion of a point by a mode.
-RELEASE_MOBILITY_RTOL = 1e-12  # Of the mobility without loops: if less, the loops hold the body.
 ZERO_FREQUENCY_RTOL = 1e-7  # Of the highest frequency: a lower frequency is round-off.
 ZERO_MODE_RTOL = 1e-12  # Of the momenta before and after: a smaller modal momentum is round-off.
-SPRINGLESS_RATE = 2 * math.pi  # rad/s: rate scale of a linkage without springs.
+SPRINGLESS_RATE = 2 * math.pi  # rad/s: rate scale without springs, gravity and initial velocity.
 
 # --- impacts -----------------------------------------------------------------------------------
 COMPLEMENTARITY_RTOL = 1e-10  # Of the largest approach speed: allowed violation.
 PIVOT_RTOL = 1e-11  # Of the largest entry of its column: a smaller pivot is round-off.
 RATIO_RTOL = 1e-12  # Of the largest constant: ratios this close are equal.
+LIMIT_RTOL = 1e-11  # Of the limits of friction: forces of contacts at rest have these errors.
 ROTATION_SWEEPS_MAX = 60  # Sweeps of Jacobi's method; about six are usual.
 PIVOTS_FACTOR = 50  # Pivots of a complementarity problem, for each of its unknowns.
 COVER_FACTOR = 32.0  # Weight of one normal force in the covering vector of a second path.
@@ -58,7 +58,7 @@ REBOUND_RTOL = 1e-12  # Interval of s, the share of restitution, at which bisect
 
 # --- contact modes -----------------------------------------------------------------------------
 TOUCHING_RTOL = 1e-10  # Of the size: stops with smaller gaps join an impact at another stop.
-RELEASE_PENETRATION_ATOL = 1e-9  # m; a wall may be penetrated at release by no more than this.
+RELEASE_PENETRATION_RTOL = 1e-8  # Of the size: largest penetration of a wall at release.
 SETTLE_ITERATIONS_MAX = 10  # Choices of the modes of contacts and projections; two are usual.
 SHORTEST_FLIGHT_RTOL = 5e-7  # Of the period: the height of a shorter bounce is round-off.
 DEPENDENT_FRICTION_RTOL = 1e-4  # Of a contact's free mobility: if less, others carry its load.
@@ -93,8 +93,8 @@ PEAK_REACH_FACTOR = 1.5  # Of half a step, from its middle: no peak if the verte
 PEAK_REFINEMENT_FACTOR = 0.125  # Ratio of the distances of these points.
 
 # --- location of events ------------------------------------------------------------------------
-EVENT_TIME_ATOL = 1e-13  # s; events are located to 1e-12 s, of which projection needs a part.
-EVENT_TIME_FACTOR = 2.0  # Of EVENT_TIME_ATOL: error of the time of an event.
+EVENT_TIME_RTOL = 5e-12  # Of the step: tolerance of the search for the time of an event.
+EVENT_TIME_FACTOR = 2.0  # Of this tolerance: error of the time of an event.
 EVENT_TIME_ULPS = 8.0  # Of the spacing of floating-point numbers at the time: further error of it.
 RELEASE_WATCH_FACTOR = 0.5  # Of the largest stop force in a step: a lower force starts a search.
 LOCATION_ITERATIONS_MAX = 100  # Iterations of Brent's search; about ten are usual.
@@ -126,11 +126,11 @@ NODE_STEP_RTOL = 1e-5  # Of the period: shorter steps are interpolated by their 
 DENSE_FACTOR = 1.0  # Of the tolerance: embedded error up to which the dense output is used.
 INTERPOLATION_FACTOR = 10.0  # Of the tolerance: largest difference of two interpolations.
 NODE_RATIO_MIN = 1 / 6  # Of a step: shortest previous step whose start is a node.
-STEP_MIN_ATOL = 1e-13  # s; shortest step.
+STEP_MIN_RTOL = 1e-20  # Of the period: shortest step.
+LATE_TIME_RTOL = 1e-9  # Of the period: spacing of floating-point times that shortens steps.
 FIRST_STEP_FACTOR = 0.1  # Of the first step that the tolerance allows [Hairer, II.4].
-FIRST_STEP_MIN_ATOL = 1e-10  # s; shortest first step: energies of soft springs are small scales.
+FIRST_STEP_MIN_RTOL = 5e-10  # Of the period: shortest first step; soft springs have small scales.
 FIRST_STEP_EXPONENT = 1 / 6  # Exponent of the tolerance in the first step size.
-FIRST_RATE_MIN = 1e-6  # 1/s: smallest relative rate of the state that the first step assumes.
 STEPS_MAX = 1e9  # Longest steps to one target time; more are a mistake of units.
 
 DEFAULT_EFFORT_MAX = 1000.0  # Integration steps in a step of the default experiment.
@@ -169,3 +169,6 @@ GAUSS_ITERATIONS_MAX = 8  # The nodes of Gauss' quadrature need four iterations 
 WAIST_ATOL = 1e-12  # Of half a panel: a point that is nearer to a waist is at the waist.
 CONCENTRATION_SERIES_MAX = 1e-6  # Of half the waist over the radius: the series has one term.
 STRESS_TIE_RTOL = 1e-9  # Stresses of two sections that differ less are equal apart from round-off.
+SUMMIT_SHARE_MIN = 0.8  # Of the largest stress in a section: stress at a node beside a larger one.
+SUMMIT_NODES_MIN = 3  # Fewer nodes define no polynomial with a maximum between them.
+SUMMIT_STEPS = 3  # Of Newton's method, from the zero of the secant of the slope.

@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.tolerances import (
-    DEPENDENT_FRICTION_RTOL,
     FIRST_RISE_MAX,
     IMPACT_COUNT_MAX,
     SETTLED_FORCE_RTOL,
@@ -274,17 +273,15 @@ def _stop_force(front: Front, stop: int) -> float:
 
 def point_mobility(front: Front, stop: int) -> float:
     """Return the inverse effective mass of a hit point, with that of its wall [1/kg]."""
-    e, M, loops = front.equations.mass_and_loops(front.q)
-    G = front.equations.system.gap_rows.jacobian(e)[[stop]]
-    return contact_modes.mobility(M, loops, G) + front.inputs.mobilities[stop]
+    (e, M, loops), system = front.equations.mass_and_loops(front.q), front.equations.system
+    G = system.gap_rows.jacobian(e)[[stop]]
+    return contact_modes.mobility(M, loops, G, system.length) + front.inputs.mobilities[stop]
 
 
 def _stuck(front: Front, stop: int) -> bool:
     """Return whether other constraints, such as its own friction, hold a hit point at rest."""
-    e, M, loops = front.equations.mass_and_loops(front.q)
-    G = front.equations.system.gap_rows.jacobian(e)[[stop]]
-    left = contact_modes.mobility(M, front.equations.rows.jacobian(e), G)
-    return left <= DEPENDENT_FRICTION_RTOL * contact_modes.mobility(M, loops, G)
+    G = front.equations.system.gap_rows.jacobian(front.e)[[stop]]
+    return not contact_modes.independent(front.equations, front.q, G)
 
 
 def _settled(
@@ -313,7 +310,7 @@ def balance_time(view: StepView, balances: Mapping[int, float]) -> float | None:
         sign = 1.0 if inside(start) > depth else -1.0
         if sign * (inside(end) - depth) < 0.0:
             margin = _margin(inside, sign, depth)
-            times.append(fall_time(margin, start, end))
+            times.append(fall_time(margin, start, end, view.event_time))
     return min(times, default=None)
 
 

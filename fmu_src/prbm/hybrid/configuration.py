@@ -8,10 +8,12 @@ import numpy as np
 
 from ..base.errors import ParameterError
 from ..base.tolerances import (
+    EVENT_TIME_FACTOR,
+    EVENT_TIME_RTOL,
+    EVENT_TIME_ULPS,
     NOMINAL_ANGLE_MIN,
     NOMINAL_STRAIN_FACTOR,
-    RELEASE_PENETRATION_ATOL,
-    SPRINGLESS_RATE,
+    RELEASE_PENETRATION_RTOL,
     STEP_MAX_RTOL,
     TOLERANCE_MAX,
     TOLERANCE_MIN,
@@ -24,7 +26,7 @@ from ..mechanics.assembly import assemble, calculated
 from ..mechanics.contact_state import ContactState
 from ..mechanics.dynamics import Equations
 from ..mechanics.inputs import Inputs
-from ..mechanics.modal import fundamental_frequency
+from ..mechanics.modal import fundamental_frequency, slow_rates
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import value
@@ -39,15 +41,17 @@ class Scales:
     length : float
         Size of the mechanism [m].
     rate : float
-        Fundamental angular frequency; if it is zero, that of the stiffest spring with the largest
-        inertia [rad/s].
+        Fundamental angular frequency; if it is zero, the rate of a fall or of the initial motion
+        (:func:`prbm.mechanics.modal.slow_rates`) [rad/s].
     energy : float
         Torque of the stiffest torsion spring at one radian; without torsion springs, the largest
         inertia times the square of the rate [J].
+    time : float
+        Period of the motion [s].
 
     Examples
     --------
-    >>> scales = Scales(length=0.5, rate=2.0, energy=1e-3)
+    >>> scales = Scales(length=0.5, rate=2.0, energy=1e-3, time=3.0)
     >>> scales.zero_speed
     1e-09
     """
@@ -55,20 +59,16 @@ class Scales:
     length: float
     rate: float
     energy: float
+    time: float
 
     @classmethod
     def of(cls, system: System, omega: float) -> "Scales":
         """Return the scales of a system with a fundamental angular frequency [rad/s], or 0."""
         K, inertia = np.abs(system.K), float(np.abs(system.H).max())
         turns = np.setdiff1d(np.arange(system.n), system.strains)
-        rate = omega or math.sqrt(float(K.max()) / inertia) or SPRINGLESS_RATE
+        rate, fast = (omega, omega) if omega else slow_rates(system)
         energy = float(K[np.ix_(turns, turns)].max()) or inertia * rate**2
-        return cls(system.length, rate, energy)
-
-    @property
-    def time(self) -> float:
-        """Period of the motion [s]."""
-        return 2 * math.pi / self.rate
+        return cls(system.length, rate, energy, 2 * math.pi / fast)
 
     @property
     def zero_speed(self) -> float:
@@ -87,13 +87,21 @@ class Scales:
 
     @property
     def touching(self) -> float:
-        """Gap below which a stop closes together with others [m]."""
+        """Gap below which a stop closes together with others [m].
+
+        A stop that was released too early closes again at this penetration.
+        """
         return TOUCHING_RTOL * self.length
 
     @property
-    def depth(self) -> float:
-        """Penetration at which a stop that was released too early closes again [m]."""
-        return min(self.touching, RELEASE_PENETRATION_ATOL)
+    def penetration(self) -> float:
+        """Largest penetration of a wall at release [m]."""
+        return RELEASE_PENETRATION_RTOL * self.length
+
+    def time_resolution(self, time: float) -> float:
+        """Return the error of the time of an event in the longest step [s]."""
+        located = EVENT_TIME_RTOL * STEP_MAX_RTOL * self.time
+        return EVENT_TIME_FACTOR * located + EVENT_TIME_ULPS * math.ulp(time)
 
     @property
     def step_max(self) -> float:

@@ -4,19 +4,15 @@ The choice depends only on the state at the front: on the forces and acceleratio
 in the modes that are tried.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
-from math import ulp
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from itertools import product
 
 import numpy as np
 
 from ..base.errors import SimulationError
 from ..base.tolerances import (
     DEPENDENT_FRICTION_RTOL,
-    EVENT_TIME_ATOL,
-    EVENT_TIME_FACTOR,
-    EVENT_TIME_ULPS,
     FRICTION_EXCESS_RTOL,
-    RELEASE_PENETRATION_ATOL,
     SETTLE_ITERATIONS_MAX,
 )
 from ..mechanics import contact
@@ -89,7 +85,7 @@ def settle(
     """
     turning = {} if reversing is None else {reversing: _slide_acceleration(front, reversing)}
     gaps, rates = front.gaps_and_rates()
-    near = configuration.scales.touching + RELEASE_PENETRATION_ATOL
+    near = configuration.scales.touching + configuration.scales.penetration
     zero = configuration.scales.zero_speed
     candidates = list(front.contacts.held)
     candidates += [
@@ -180,7 +176,7 @@ def find_holding_stops(
     sliding = equations_holding(scales, front, every).contacts.modes
     equations = equations_holding(scales, front, ())
     slips = [sliding[i].slip for i in every]
-    found = rest_forces(equations, front.time, front.y, every, slips, ())
+    found = rest_forces(scales, equations, front.time, front.y, every, slips, ())
     if found is None:
         return None
     pressing = zip(every, found.normal, strict=True)
@@ -198,7 +194,7 @@ def _least_pressing(scales: Scales, front: Front, stop: int) -> float:
     """
     gaps, _ = front.gaps_and_rates()
     penetration = -gaps[stop] - front.contacts.depth(stop)
-    return scales.zero_acceleration if penetration < scales.depth / 2 else 0.0
+    return scales.zero_acceleration if penetration < scales.touching / 2 else 0.0
 
 
 def _failure(
@@ -222,9 +218,22 @@ def equations_holding(scales: Scales, front: Front, stops: Sequence[int]) -> Equ
     return front.equations.with_contacts(contacts)
 
 
-def mobility(M: Real, held: Real, row: Real) -> float:
+def mobility(M: Real, held: Real, row: Real, length: float) -> float:
     """Return the inverse mass along a row (1, n) while the rows ``held`` (r, n) rest [1/kg]."""
-    return float((row @ contact.response(M, held, row)).item())
+    return float((row @ contact.response(M, held, row, length)).item())
+
+
+def independent(equations: Equations, q: Real, row: Real) -> bool:
+    """Return whether a motion along a row (1, n) is possible while all constraints hold.
+
+    It is not if the row is round-off, or the constraints leave hardly any of its mobility.
+    """
+    (e, M, loops), length = equations.mass_and_loops(q), equations.system.length
+    own = mobility(M, loops, row, length)
+    if own <= contact.least_mobilities(M, row, length).item():
+        return False
+    left = mobility(M, equations.rows.jacobian(e), row, length)
+    return left > DEPENDENT_FRICTION_RTOL * own
 
 
 # --- friction ---------------------------------------------------------------------------------
@@ -241,11 +250,6 @@ def _slide_acceleration(front: Front, contact: int) -> float:
     """Return the sliding acceleration of a contact in its present mode [m/s^2]."""
     a = front.evaluate().a
     return front.equations.slip_acceleration(contact, front.e, front.v, a)
-
-
-def time_resolution(time: float) -> float:
-    """Return the error of the time of an event [s]."""
-    return EVENT_TIME_FACTOR * EVENT_TIME_ATOL + EVENT_TIME_ULPS * ulp(time)
 
 
 def _with_friction(
@@ -276,11 +280,15 @@ def _with_friction(
         If no forces satisfy the laws of all contacts.
     """
     held, every = list(front.contacts.held), sorted(set(candidates))
-    for stops in (held, every) if len(held) < len(every) else (held,):
-        found = _modes_of(configuration.scales, front, stops, every, slipped, turning)
+    rubbing = _with_coefficients(front.equations, every)
+    chosen = (held, every) if len(held) < len(every) else (held,)
+    yielding: tuple[set[int | None], ...] = ({slipped}, {*every, *rubbing})
+    # A contact at its limit sticks if it can; the forces of contacts that can hardly move against
+    # each other may then exceed their limits, which they do not if it slips.
+    for slipping, stops in product(yielding, chosen):
+        found = _modes_of(configuration.scales, front, stops, every, slipping, turning)
         if found is not None:
             return front.with_contacts(found)
-    rubbing = _with_coefficients(front.equations, every)
     raise SimulationError(_failure(configuration, front, {*every, *rubbing}, JAMMED))
 
 
@@ -289,15 +297,16 @@ def _modes_of(
     front: Front,
     stops: Sequence[int],
     every: Sequence[int],
-    slipped: int | None,
+    slipped: Collection[int | None],
     turning: Mapping[int, float],
 ) -> ContactState | None:
     """Return the modes that follow from the forces of ``stops`` and the contacts with friction.
 
-    Return None if no forces satisfy their laws, or if another stop that touches would close.
+    Contacts in ``slipped`` do not stick at the limit of friction.  Return None if no forces satisfy
+    their laws, or if another stop that touches would close.
     """
     contacts, rubbing = front.contacts, _with_coefficients(front.equations, stops)
-    slow = {c: abs(rate) * time_resolution(front.time) for c, rate in turning.items()}
+    slow = {c: abs(rate) * scales.time_resolution(front.time) for c, rate in turning.items()}
     modes = {c: _sliding_mode(scales, front, c, slow.get(c, 0.0)) for c in {*stops, *rubbing}}
     # Contacts that cannot move independently are left out: loops and held stops carry their load.
     at_rest = [c for c in rubbing if modes[c] is FRICTIONLESS and _mobile(front, contacts, c)]
@@ -312,7 +321,7 @@ def _modes_of(
         return contacts
     contacts, slips = contacts.unloaded(), [modes[i].slip for i in stops]
     equations = front.equations.with_contacts(contacts)
-    found = rest_forces(equations, front.time, front.y, stops, slips, at_rest)
+    found = rest_forces(scales, equations, front.time, front.y, stops, slips, at_rest)
     if found is None:
         return None
     for i, press in zip(stops, found.normal, strict=True):
@@ -339,13 +348,10 @@ def _sliding_mode(scales: Scales, front: Front, contact: int, slow: float) -> Co
 
 def _mobile(front: Front, contacts: ContactState, contact: int) -> bool:
     """Return whether a contact can slide while all other held and sticking contacts rest."""
-    e, M, loops = front.equations.mass_and_loops(front.q)
-    row = front.equations.slip_row(contact, e)[None]
+    row = front.equations.slip_row(contact, front.e)[None]
     if contacts.modes[contact].closed:
         contacts = contacts.with_mode(contact, FRICTIONLESS)
-    others = front.equations.with_contacts(contacts)
-    left = mobility(M, others.rows.jacobian(e), row)
-    return left > DEPENDENT_FRICTION_RTOL * mobility(M, loops, row)
+    return independent(front.equations.with_contacts(contacts), front.q, row)
 
 
 def _sticking_or_slipping(
@@ -354,7 +360,7 @@ def _sticking_or_slipping(
     contacts: ContactState,
     at_rest: Sequence[int],
     found: RestForces,
-    slipped: int | None,
+    slipped: Collection[int | None],
 ) -> ContactState:
     """Return the modes, with those of contacts at rest chosen by their forces.
 
@@ -369,7 +375,7 @@ def _sticking_or_slipping(
             continue
         if abs(found.slide[j]) > scales.zero_acceleration:
             mode = ContactMode.slipping(found.slide[j])
-        elif not (at_limit[j] and c == slipped) and _mobile(front, contacts, c):
+        elif not (at_limit[j] and c in slipped) and _mobile(front, contacts, c):
             mode = STICK
         else:
             limited = at_limit[j] and found.limit[j] > 0.0

@@ -14,7 +14,7 @@ from ..base.tolerances import (
     CONSTRAINT_RTOL,
     EVENT_CORRECTION_RTOL,
     EVENT_CORRECTIONS_MAX,
-    EVENT_TIME_ATOL,
+    EVENT_TIME_RTOL,
     FRICTION_EXCESS_RTOL,
     GUARD_INTERVALS,
     LOCATION_ITERATIONS_MAX,
@@ -175,6 +175,11 @@ class StepView:
         sign = 1.0 if guard is gap else -1.0
         return sign * gaps[:, stop], sign * rates[:, stop]
 
+    @property
+    def event_time(self) -> float:
+        """Tolerance of the search for the time of an event [s]."""
+        return EVENT_TIME_RTOL * self.arc.h
+
     def along(self, guard: Guard, contact: int, sign: float = 1.0) -> Scalar:
         """Return a guard of a contact, times a sign, as a function of time."""
         return lambda t: sign * guard(self.equations, contact, t, self.arc.at(t))
@@ -233,34 +238,35 @@ def closing_time(view: StepView, guard: Guard, stop: int) -> float | None:
 
 def _closing_time_between(view: StepView, guard: Guard, stop: int, j: int) -> float | None:
     """Return when a gap closes in an interval at whose end, or within which, it is not positive."""
-    z, depth = view.along(guard, stop), view.scales.depth
+    z, depth = view.along(guard, stop), view.scales.touching
     a, b = view.samples[0][j : j + 2].tolist()
     (gap_a, gap_b), (rate_a, rate_b) = (x[j : j + 2] for x in view.closing(guard, stop))
     closing_rate = _gap_rate if guard is gap else indentation_rate
     if abs(rate_a) <= view.scales.zero_speed and gap_a <= _round_off(view):
         # The stop was released too early, and is pressed again.
-        return _deep_time(z, depth, a, b) if gap_b < min(gap_a, -depth) else None
+        return _deep_time(view, z, a, b) if gap_b < min(gap_a, -depth) else None
     if rate_a > 0.0:
         if rate_b >= 0.0:
             return None  # The gap opens throughout the interval.
-        a = fall_time(view.along(closing_rate, stop), a, b)
+        a = fall_time(view.along(closing_rate, stop), a, b, view.event_time)
         if z(a) <= 0.0:
             return a  # The flight is lower than the resolution of a position.
     elif gap_a <= 0.0:
         # This is an impact only if the penetration increases, at once or over several intervals.
         if gap_b < gap_a - depth:
             return float(a)
-        return _deep_time(z, depth, a, b) if gap_b < min(gap_a, -depth) else None
+        return _deep_time(view, z, a, b) if gap_b < min(gap_a, -depth) else None
     if rate_a < 0.0 < rate_b:
-        b = fall_time(view.along(closing_rate, stop, sign=-1.0), a, b)
+        b = fall_time(view.along(closing_rate, stop, sign=-1.0), a, b, view.event_time)
         if z(b) > 0.0:
             return None
-    return _corrected_time(view, guard, stop, fall_time(z, a, b), earliest=a)
+    t = fall_time(z, a, b, view.event_time)
+    return _corrected_time(view, guard, stop, t, earliest=a)
 
 
-def _deep_time(z: Scalar, depth: float, a: float, b: float) -> float:
-    """Return when a penetration -z reaches a depth [m] between two times."""
-    return fall_time(lambda t: z(t) + depth, a, b)
+def _deep_time(view: StepView, z: Scalar, a: float, b: float) -> float:
+    """Return when a penetration -z shows that a stop is pressed, between two times."""
+    return fall_time(lambda t: z(t) + view.scales.touching, a, b, view.event_time)
 
 
 def _round_off(view: StepView) -> float:
@@ -295,7 +301,7 @@ def _corrected_time(view: StepView, guard: Guard, stop: int, t: float, earliest:
     for _ in range(EVENT_CORRECTIONS_MAX):
         y = equations.project(t, cut.at(t))
         size, rate = guard(equations, stop, t, y), closing_rate(equations, stop, t, y)
-        if rate >= 0.0 or abs(size) <= EVENT_TIME_ATOL * abs(rate):
+        if rate >= 0.0 or abs(size) <= EVENT_TIME_RTOL * cut.h * abs(rate):
             break
         change = -size / rate
         if abs(change) > EVENT_CORRECTION_RTOL * cut.h:
@@ -312,49 +318,51 @@ def reversal_time(view: StepView, guard: Guard, contact: int) -> float | None:
     """
     equations, (times, e, v, _) = view.equations, view.samples
     rows, i = equations.slip_rows(contact)
-    z = equations.contacts.modes[contact].slip * rows.rates(e, v)[:, i]
-    begins = bool(z[0] <= view.scales.zero_speed)
+    speeds = equations.contacts.modes[contact].slip * rows.rates(e, v)[:, i]
+    begins = bool(speeds[0] <= view.scales.zero_speed)
     for j in range(int(begins), GUARD_INTERVALS):
-        if z[j] > 0.0 >= z[j + 1]:
-            return fall_time(view.along(guard, contact), times[j], times[j + 1])
-    return float(times[1]) if begins and z[-1] < 0.0 else None
+        if speeds[j] > 0.0 >= speeds[j + 1]:
+            z = view.along(guard, contact)
+            return fall_time(z, times[j], times[j + 1], view.event_time)
+    return float(times[1]) if begins and speeds[-1] < 0.0 else None
 
 
 def switching_time(view: StepView, guard: Guard, stop: int) -> float | None:
     """Return when the phase of a pressed stop changes."""
     z, arc = view.along(guard, stop), view.arc
     times = (arc.start, arc.start + arc.h / 2, arc.start + arc.h)
-    return _first_fall(z, [(t, z(t)) for t in times])
+    return _first_fall(view, z, [(t, z(t)) for t in times])
 
 
 def release_time(view: StepView, guard: Guard, stop: int) -> float | None:
     """Return when the force of a held stop falls to zero."""
     seen = [(t, _stop_force(view.equations, stop, at)) for t, _, at in view.evaluations]
-    return _first_fall(view.along(guard, stop), seen)
+    return _first_fall(view, view.along(guard, stop), seen)
 
 
 def slip_time(view: StepView, guard: Guard, contact: int) -> float | None:
     """Return when a sticking contact reaches the limit of friction."""
     equations = view.equations
     seen = [(t, _friction_margin(equations, contact, e, at)) for t, e, at in view.evaluations]
-    return _first_fall(view.along(guard, contact), seen)
+    return _first_fall(view, view.along(guard, contact), seen)
 
 
 # --- location ---------------------------------------------------------------------------------
 
 
-def _first_fall(z: Scalar, seen: Sequence[tuple[float, float]]) -> float | None:
+def _first_fall(view: StepView, z: Scalar, seen: Sequence[tuple[float, float]]) -> float | None:
     """Return when z first falls to zero, from pairs of a time and the value of z there."""
     for (a, before), (b, after) in pairwise(seen):
         if after <= 0.0:
-            return fall_time(z, a, b) if before > 0.0 else a
+            return fall_time(z, a, b, view.event_time) if before > 0.0 else a
     return None
 
 
-def fall_time(z: Scalar, a: float, b: float) -> float:
+def fall_time(z: Scalar, a: float, b: float, tolerance: float) -> float:
     """Return when z falls to zero between a, where it is positive, and b, where it is not.
 
-    If round-off has changed the sign at one end of the interval, the result is that end.
+    If round-off has changed the sign at one end of the interval, the result is that end.  The error
+    is at most the tolerance, in the unit of the arguments of z, or their round-off.
 
     Raises
     ------
@@ -363,7 +371,7 @@ def fall_time(z: Scalar, a: float, b: float) -> float:
 
     Examples
     --------
-    >>> round(fall_time(lambda t: 1.0 - t**2, 0.0, 4.0), 12)
+    >>> round(fall_time(lambda t: 1.0 - t**2, 0.0, 4.0, 1e-13), 12)
     1.0
     """
     if z(a) <= 0.0:
@@ -373,7 +381,7 @@ def fall_time(z: Scalar, a: float, b: float) -> float:
     from scipy.optimize import brentq  # imported here: it takes 0.15 s
 
     try:
-        return float(brentq(z, a, b, xtol=EVENT_TIME_ATOL, maxiter=LOCATION_ITERATIONS_MAX))
+        return float(brentq(z, a, b, xtol=tolerance, maxiter=LOCATION_ITERATIONS_MAX))
     except SimulationError:
         raise
     except (RuntimeError, ValueError):

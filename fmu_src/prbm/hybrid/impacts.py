@@ -96,7 +96,7 @@ def receive(front: Front, impulses: Real) -> Front:
     e, M, loops = equations.mass_and_loops(front.q)
     system = equations.system
     rows = np.vstack([forces.load_rows(system, frame, e) for frame in system.pushed])
-    after = front.v + contact.response(M, loops, rows) @ impulses
+    after = front.v + contact.response(M, loops, rows, system.length) @ impulses
     work = float(impulses @ (rows @ (front.v + after))) / 2
     front = front.with_velocities(after, work=work)
     return front.with_contacts(front.contacts.without_friction())
@@ -125,7 +125,8 @@ def _captured(
     evaluation = equations.at(front.time, landed.y)
     e, M, loops = equations.mass_and_loops(landed.q)
     G = configuration.system.gap_rows.jacobian(e)[[stop]]
-    pressing = float(equations.stop_forces(evaluation.lam)[stop]) * mobility(M, loops, G)
+    force = float(equations.stop_forces(evaluation.lam)[stop])
+    pressing = force * mobility(M, loops, G, scales.length)
     return 2.0 * speed < pressing * SHORTEST_FLIGHT_RTOL * scales.time
 
 
@@ -167,8 +168,9 @@ def _impulses_without_friction(
     partners = struck + held
     mobilities = np.array(front.inputs.mobilities)
     G = configuration.system.gap_rows.jacobian(e)[partners]
-    X = contact.response(M, loops, G)
-    W = G @ X + np.diag(mobilities[partners])
+    length = configuration.system.length
+    X = contact.response(M, loops, G, length)
+    W = contact.contact_mobility(M, G, X, length) + np.diag(mobilities[partners])
     u = front.gaps_and_rates()[1][partners]
     restitutions = np.concatenate([restitution, np.zeros(len(held))])
     P = contact.newton(W, np.minimum(u, 0.0), restitutions, configuration.scales.speed)
@@ -198,8 +200,8 @@ def _impulses_with_friction(
     rates = np.concatenate([u[struck], T @ v])
     while True:
         rows = np.vstack([loops, gaps[kept]])
-        X = contact.response(M, rows, both)
-        W = both @ X
+        X = contact.response(M, rows, both, system.length)
+        W = contact.contact_mobility(M, both, X, system.length)
         W[range(k), range(k)] += mobilities
         if k == 1:
             P = np.array(contact.stronge(W, rates, float(mu[0]), float(restitution[0]), speed))

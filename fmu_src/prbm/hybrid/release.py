@@ -3,7 +3,6 @@
 import numpy as np
 
 from ..base.errors import ParameterError
-from ..base.tolerances import RELEASE_PENETRATION_ATOL
 from ..mechanics.contact_state import ContactState
 from ..mechanics.inputs import Inputs
 from ..mechanics.start import start_shape
@@ -79,7 +78,7 @@ def released(configuration: Configuration, inputs: Inputs, time: float) -> Front
             front = preloaded(configuration, front, i)
     for i in contacts.open_stops:
         if (
-            gaps[i] <= RELEASE_PENETRATION_ATOL
+            gaps[i] <= configuration.scales.penetration
             and rates[i] < 0.0
             and not front.contacts.touching[i]
         ):
@@ -95,9 +94,9 @@ def check_walls(configuration: Configuration, front: Front) -> None:
     Raises
     ------
     PenetrationError
-        If a gap is negative by more than ``RELEASE_PENETRATION_ATOL``.
+        If a gap is negative by more than ``RELEASE_PENETRATION_RTOL`` of the size.
     """
     gaps, _ = front.gaps_and_rates()
     for i, stop in enumerate(configuration.mechanism.stops):
-        if gaps[i] < -RELEASE_PENETRATION_ATOL and not stop.compliant:
+        if gaps[i] < -configuration.scales.penetration and not stop.compliant:
             raise PenetrationError(stop.name, -gaps[i], front.inputs.walls[i].position)

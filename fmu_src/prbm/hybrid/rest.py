@@ -10,11 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.tolerances import COMPLEMENTARITY_RTOL
+from ..base.tolerances import COMPLEMENTARITY_RTOL, LIMIT_RTOL
 from ..mechanics import contact
 from ..mechanics.arrays import Real
 from ..mechanics.complementarity import coulomb
 from ..mechanics.dynamics import Equations
+from .configuration import Scales
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,8 @@ class RestForces:
     Parameters
     ----------
     normal : (k,)
-        Acceleration of each gap by its normal force alone [m/s^2].
+        Acceleration of each gap by its normal force, alone or together with its friction: the
+        larger one, in magnitude [m/s^2].  A wedge moves a gap mainly by its friction.
     friction, limit : (m,)
         Friction forces and their limits [N].
     slide : (m,)
@@ -41,6 +43,7 @@ class RestForces:
 
 
 def rest_forces(
+    scales: Scales,
     equations: Equations,
     t: float,
     y: Real,
@@ -50,8 +53,14 @@ def rest_forces(
 ) -> RestForces | None:
     """Return the forces that satisfy the laws of all contacts; None without a solution.
 
+    The laws may be violated by half of the acceleration that is round-off in the choice of modes,
+    and by the round-off of the forces of friction.  These do not vanish with the accelerations, as
+    in a mechanism at rest, where the limits of friction may still be large.
+
     Parameters
     ----------
+    scales : Scales
+        Scales of the mechanism.
     equations : Equations
         Equations in which all stops are open, and friction points at rest have no friction.
     t : float
@@ -77,7 +86,8 @@ def rest_forces(
         for i, sign in zip(stops, slips, strict=True)
     ]
     rows, pushes = np.vstack([G, T]), np.vstack([G - np.reshape(rubs, (-1, n)), T])
-    W = rows @ contact.response(M, loops, pushes)
+    X = contact.response(M, loops, pushes, system.length)
+    W = contact.contact_mobility(M, rows, X, system.length)
     slide = [equations.slip_acceleration(c, e, v, a) for c in at_rest]
     opening = equations.gap_accelerations(t, e, v, a, evaluation.pressure)
     u = np.concatenate([opening[list(stops)], slide])
@@ -86,11 +96,20 @@ def rest_forces(
         0.0 if c in stops else equations.friction_limit(c, e, evaluation.pressure) for c in at_rest
     ])  # fmt: skip
     normal = np.array([list(stops).index(c) if c in stops else -1 for c in at_rest], int)
-    tolerance = COMPLEMENTARITY_RTOL * float(np.abs(u).max(initial=0.0))
+    pulls = fixed * W.diagonal()[k:]
+    tolerance = max(
+        COMPLEMENTARITY_RTOL * float(np.abs(u).max(initial=0.0)),
+        LIMIT_RTOL * float(pulls.max(initial=0.0)),
+        scales.zero_acceleration / 2,
+    )
     P = coulomb(W, u, friction, fixed, normal, tolerance)
     if P is None:
         return None
     limit = fixed + friction * np.append(P[:k], 0.0)[normal]
     sliding = (W @ P + u)[k:]
     sliding[np.abs(sliding) <= tolerance] = 0.0  # Round-off of the forces at the contacts.
-    return RestForces((P * np.diag(W))[:k], P[k:], limit, sliding, np.diag(W)[k:])
+    alone = P[:k] * W.diagonal()[:k]
+    own = normal[:, None] == np.arange(k)  # Friction of a stop.
+    together = alone + ((W[:k, k:].T * P[k:, None]) * own).sum(axis=0)
+    pressing = np.where(P[:k] > 0.0, np.maximum(alone, np.abs(together)), 0.0)
+    return RestForces(pressing, P[k:], limit, sliding, W.diagonal()[k:])

@@ -19,7 +19,7 @@ from ..base.tolerances import (
     STABLE_STEP_FACTOR,
 )
 from ..mechanics.arrays import Real
-from ..mechanics.constraints import Factors, solve_again
+from ..mechanics.constraints import Factors, solve_saddle
 from ..mechanics.dynamics import Equations
 
 
@@ -65,7 +65,7 @@ class FastestMode:
         torques = equations.system.K @ self.direction
         right = np.zeros(len(factors[0]))
         right[: equations.n] = torques
-        x = solve_again(factors, right)[: equations.n]
+        x = solve_saddle(factors, right)[: equations.n]
         energy, response = float(self.direction @ torques), float(x @ torques)
         rate = math.sqrt(response / energy) if energy > 0.0 and response > 0.0 else 0.0
         longest = float(np.abs(x).max())

@@ -17,17 +17,17 @@ import numpy as np
 from ..base.errors import SimulationError
 from ..base.tolerances import (
     CONTACT_ERROR_FACTOR,
-    FIRST_RATE_MIN,
     FIRST_STEP_EXPONENT,
     FIRST_STEP_FACTOR,
-    FIRST_STEP_MIN_ATOL,
+    FIRST_STEP_MIN_RTOL,
     INDENTATION_MIN_RTOL,
+    LATE_TIME_RTOL,
     PROJECTION_FACTOR,
     STEP_ERROR_FACTOR,
     STEP_ERROR_MIN,
     STEP_GROWTH_MAX,
     STEP_MEMORY_EXPONENT,
-    STEP_MIN_ATOL,
+    STEP_MIN_RTOL,
     STEP_ROUNDING_FACTOR,
     STEP_SAFETY_FACTOR,
     STEP_SHRINK_MIN,
@@ -166,7 +166,7 @@ def take_step(
     h = min(wanted, step_limit(front.inputs.walls, t))
     controller = StepSizeController(h, controller.last_error)
     while True:
-        check_size(t, controller.h)
+        check_size(configuration.scales, t, controller.h)
         try:
             step = compute_step(configuration, equations, t, y, controller.h, k1)
             if step.error <= 1.0:
@@ -192,7 +192,7 @@ def fixed_step(configuration: Configuration, front: Front, k1: Real) -> Step:
     """
     t = front.time
     h = min(configuration.step or 0.0, step_limit(front.inputs.walls, t))
-    check_size(t, h)
+    check_size(configuration.scales, t, h)
     step = compute_step(configuration, front.equations, t, front.y, h, k1)
     if not step.error * STEP_ERROR_FACTOR * configuration.tolerance <= 1.0:
         raise SimulationError(
@@ -202,17 +202,18 @@ def fixed_step(configuration: Configuration, front: Front, k1: Real) -> Step:
     return projected(configuration, front.equations, t, step)
 
 
-def check_size(t: float, h: float) -> None:
+def check_size(scales: Scales, t: float, h: float) -> None:
     """Reject a step size h [s] that is too small at a time t [s].
 
     Raises
     ------
     SimulationError
-        If it is below ``STEP_MIN_ATOL``, or smaller than the round-off of t.
+        If it is below ``STEP_MIN_RTOL`` of the period, or smaller than the round-off of t.
     """
-    if h < STEP_MIN_ATOL:
+    late = math.ulp(t) > LATE_TIME_RTOL * scales.time
+    if not late and (t + h == t or h < STEP_MIN_RTOL * scales.time):
         raise SimulationError(
-            f"the step size fell below {STEP_MIN_ATOL:g} s at t = {t:.9g} s: the motion is too "
+            f"the step size fell to {h:.3g} s at t = {t:.9g} s: the motion is too "
             "fast for the model, or links of a loop form a straight line, beyond which they cannot "
             "move; check the inputs and parameters, or add damping.beta"
         )
@@ -229,8 +230,10 @@ def first_step(configuration: Configuration, y: Real, k1: Real) -> float:
     rate = k1[:core] / configuration.scales.of_state(y[:core])
     size = math.sqrt(float(rate @ rate) / len(rate))
     accuracy = math.pow(configuration.tolerance, FIRST_STEP_EXPONENT)
-    longest = FIRST_STEP_FACTOR * accuracy / max(size, FIRST_RATE_MIN)
-    return min(configuration.scales.step_max, max(longest, FIRST_STEP_MIN_ATOL))
+    scales, change = configuration.scales, FIRST_STEP_FACTOR * accuracy
+    if change >= size * scales.step_max:
+        return scales.step_max
+    return max(change / size, FIRST_STEP_MIN_RTOL * scales.time)
 
 
 def compute_step(

@@ -12,10 +12,11 @@ the recent longest communication step, but at most a tenth of the period.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import inf
+from math import inf, ulp
 
 from ..base.tolerances import (
-    EVENT_TIME_ATOL,
+    EVENT_TIME_RTOL,
+    EVENT_TIME_ULPS,
     WALL_FADING_FACTOR,
     WALL_LONGEST_RTOL,
     WALL_PATH_RTOL,
@@ -172,8 +173,10 @@ def step_limit(walls: Sequence[Wall], t: float) -> float:
 
 def arrived(front: Front) -> Front:
     """Return the front with each wall whose cubic has ended replaced by its reference."""
-    walls = tuple(
-        wall.arrived() if wall.span and wall.end - front.time <= EVENT_TIME_ATOL else wall
-        for wall in front.inputs.walls
-    )
+    t, round_off = front.time, EVENT_TIME_ULPS * ulp(front.time)
+
+    def ended(wall: Wall) -> bool:
+        return wall.span > 0.0 and wall.end - t <= EVENT_TIME_RTOL * wall.span + round_off
+
+    walls = tuple(wall.arrived() if ended(wall) else wall for wall in front.inputs.walls)
     return front if walls == front.inputs.walls else front.with_walls(walls)

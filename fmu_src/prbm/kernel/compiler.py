@@ -297,7 +297,7 @@ def _words(text: str) -> list[str]:
 def _version(command: tuple[str, ...]) -> str | None:
     try:
         done = subprocess.run(
-            [*command, "--version"], capture_output=True, text=True, check=True,
+            [*command, "--version"], capture_output=True, encoding="locale", check=True,
             stdin=subprocess.DEVNULL, errors="replace",
         )  # fmt: skip
     except (OSError, subprocess.CalledProcessError):
@@ -403,7 +403,7 @@ def _run(job: Job, folder: Path) -> bytes:
     try:
         done = subprocess.run(
             [*compiler.command, *job.arguments, *libraries], cwd=folder,
-            capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL,
+            capture_output=True, encoding="locale", check=False, stdin=subprocess.DEVNULL,
             errors="replace", env=environment,
         )  # fmt: skip
     except OSError as error:

@@ -235,13 +235,13 @@ def _array(name: str, values: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 def main(arguments: Sequence[str] = ()) -> int:
     """Write ``generated.h``, or check that it is up to date."""
     text = header()
-    stale = not PATH.is_file() or PATH.read_text() != text
+    stale = not PATH.is_file() or PATH.read_text(encoding="utf-8") != text
     if "--check" in arguments:
         if stale:
             print(f"{PATH.name} is stale: run python -m prbm.kernel.header", file=sys.stderr)
         return int(stale)
     if stale:
-        PATH.write_text(text)
+        PATH.write_text(text, encoding="utf-8")
     return 0
 
 

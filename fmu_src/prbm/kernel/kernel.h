@@ -5,8 +5,8 @@
  * by one; all others are compared through the results of whole simulations.
  *
  * The language is C99.  There is no global state, and no memory is allocated after a simulation has
- * been opened.  Of libm only sqrt, fabs, floor, frexp and ldexp are called.  They are exact or
- * correctly rounded, so that the same input gives the same bytes on every platform.
+ * been opened.  Of libm only functions with exact results are called, such as floor and ldexp, so
+ * that the same input gives the same bytes on every platform (tests/kernel/test_symbols.py).
  *
  * Matrices are stored row by row.  A function that can fail returns false and writes a message to a
  * Problem.  SI units and radians everywhere; docs/conventions.md has the signs and symbols.

@@ -157,13 +157,13 @@ static double typical_strain(const Simulation *sim) {
         bool stretches = system->mechanism->coordinates[j].strain >= 0;
         stiffest = stretches ? greater(stiffest, system->K[j * system->n + j]) : stiffest;
     }
-    return sqrt(2.0 * NOMINAL_STRAIN_FACTOR * sim->state.energy / stiffest);
+    return square_root(2.0 * NOMINAL_STRAIN_FACTOR * sim->state.energy / stiffest);
 }
 
 /* The power of ten nearest to a value, as the nominal value in modelDescription.xml. */
 static double nearest_power_of_ten(double value) {
     double power = 1.0; /* Powers of ten are exact up to 1e22. */
-    value /= sqrt(10.0);
+    value /= square_root(10.0);
     if (value <= 1.0) {
         while (value * power * 10.0 <= 1.0) {
             power *= 10.0;

@@ -475,7 +475,7 @@ static bool mobility_change(const Tangent *t, int i, double *result, Problem *pr
     row_jacobian(&gaps, i, at.e, x);
     zeros(r, x + n);
     saddle(n, r, at.M, at.loops, at.loops, kkt);
-    bool ok = solve(size, kkt, x, &sim->scratch, problem);
+    bool ok = solve(n, r, kkt, x, system->length, &sim->scratch, problem);
     if (ok) {
         Tangent u = at_rates(t, x);
         double change = rate_change(&u, &gaps, i) - kinetic_change(&u);

@@ -106,9 +106,9 @@ static void flexure_changes(const Tangent *t, const FreeBody *body, const Sectio
     double *dleft = take(scratch, m), *dright = take(scratch, m);
     face_stresses(system, body, at, left, right);
     face_changes(system, body, at, change, dleft, dright);
-    double place = stress_in(body, left, right).place;
-    int k = (int)(place > 0.0 ? place : -place) - 1;
-    double stress = place > 0.0 ? left[k] : right[k], dstress = place > 0.0 ? dleft[k] : dright[k];
+    Stress found = stress_in(body, left, right);
+    double stress = stress_at(body, left, right, &found);
+    double dstress = stress_at(body, dleft, dright, &found);
     out[STRESS_STRESS_START] = dleft[0];
     out[STRESS_STRESS_END] = dleft[m - 1];
     out[STRESS_STRESS] = stress < 0.0 ? -dstress : dstress;

@@ -16,7 +16,7 @@ from ..base.tolerances import (
     DEPENDENT_LOOP_RTOL,
     INERTIA_RATIO_MIN,
     JOINT_DISTANCE_RTOL,
-    MASSLESS_RTOL,
+    SINGULAR_RTOL,
 )
 from ..mechanism.description import Mechanism
 from ..mechanism.flexure import stub
@@ -24,7 +24,6 @@ from ..mechanism.parts import (
     GROUND,
     Flexure,
     Joint,
-    Point,
     Probe,
     Stop,
     body_of,
@@ -157,9 +156,8 @@ class _Assembler(Collection):
         frames = {body.name: self.frame(body.name, body.name, None) for body in mechanism.bodies}
         self.lines += [(body, "body", self.corners(body), NO_THICKNESS) for body in frames]
         release = mechanism.release
-        along_release, release_c = self.displaced(
-            release.body, release.point, release.direction, e0
-        )
+        released = self.frame(release.body, release.body, release.point)
+        along_release, release_c = self.displaced(released, release.direction, e0)
         return System(
             mechanism=mechanism,
             values=dict(self.values),
@@ -177,6 +175,7 @@ class _Assembler(Collection):
             **self.friction_arrays(d, e0),
             release=along_release,
             release_c=release_c,
+            released=released,
             bodies=frames,
             pushed=tuple(self.frame(f.name, f.body, f.point) for f in mechanism.forces),
             probes=tuple(self.probe(probe) for probe in mechanism.probes),
@@ -210,9 +209,11 @@ class _Assembler(Collection):
 
     def friction_arrays(self, d: int, e0: Complex) -> dict[str, Any]:
         """Return the displacements of friction points along and across their directions."""
-        points = self.mechanism.frictions
-        along = [self.displaced(f.body, f.point, f.direction, e0) for f in points]
-        across = [self.displaced(f.body, f.point, f.direction + 90.0, e0) for f in points]
+        rubbing = [
+            (f.direction, self.frame(f.body, f.body, f.point)) for f in self.mechanism.frictions
+        ]
+        along = [self.displaced(frame, direction, e0) for direction, frame in rubbing]
+        across = [self.displaced(frame, direction + 90.0, e0) for direction, frame in rubbing]
         return {
             "rubs": stacked([B for B, _ in along], d),
             "lifts": stacked([B for B, _ in across], d),
@@ -225,11 +226,8 @@ class _Assembler(Collection):
         A = np.array([p.row(d) for p in places])
         return Outline(name, kind, np.array([p.c for p in places]), A, thickness)
 
-    def displaced(
-        self, body: str, point: Point | None, direction: float, e0: Complex
-    ) -> tuple[Complex, float]:
+    def displaced(self, frame: BodyFrame, direction: float, e0: Complex) -> tuple[Complex, float]:
         """Return B, c of the displacement Re(B E) + c of a point along a direction [m]."""
-        frame = self.frame(body, body, point)
         B = unit(direction).conjugate() * frame.A
         return B, -float((B @ e0).real)
 
@@ -307,7 +305,7 @@ def check_masses(M: Real, names: Sequence[str]) -> None:
     scale = np.sqrt(inertias)
     if np.all(scale > 0.0):
         scaled = M / np.outer(scale, scale)
-        if np.linalg.eigvalsh(scaled)[0] > MASSLESS_RTOL:
+        if np.linalg.eigvalsh(scaled)[0] > SINGULAR_RTOL:
             return
     raise ParameterError(
         "a part that can move has no mass: give the flexures a density and the bodies a mass and "

@@ -16,8 +16,14 @@ at both ends for k >= 1, and the bending energy is diagonal:
     ((q_end - q_start)^2 + sum_k a_k^2/(2 k + 1))/(2 C).
 
 Positions are r = r_start + integral of exp(i theta) dz, with the drawn line z and theta at Gauss
-points of each panel, the *nodes*: exp(i theta) dz/dx is interpolated between them.  The mass is
-distributed to the nodes with the weights of Gauss' quadrature.
+points of each panel, the *nodes*: exp(i theta) dz/dx is interpolated between them.  The values of
+dz/dx at the nodes are changed slightly, so that the integrals of S_0 dz and S_1 dz are exact:
+
+    integral of S_k dz = S_k(end) z(end) - (integral of z P_k ds/EI) / C.
+
+They are the compliances of a straight beam, whose moment is linear under forces at its ends.  In
+the peak of the flexibility of a thin notch Gauss' quadrature alone has errors of some percent.  The
+mass is distributed to the nodes with the weights of Gauss' quadrature.
 
 If the beam stretches, its axial force is uniform.  The strain of a section is the mean strain times
 the axial flexibility 1/EA over its mean.
@@ -32,9 +38,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial.legendre import leggauss, legvander
 
-from ..base.tolerances import FINE_POINTS
+from ..base.tolerances import FINE_POINTS, SUMMIT_NODES_MIN
 from .arrays import Complex, Real
-from .profile import Line, Panel, Sections
+from .profile import Line, Panel, Sections, Straight
 
 
 @lru_cache
@@ -154,6 +160,9 @@ class Cuts(NamedTuple):
         Directions as drawn, in units of the direction of the chord.
     area, modulus : (m,)
         Area [m^2] and section modulus [m^3], at waists divided by the factors of the stress.
+    smooth : range
+        Nodes between which the stress is smooth: those of the straight panel, or of the waist
+        between two fillets; empty for a notch without a waist.
     """
 
     position: Real
@@ -162,6 +171,7 @@ class Cuts(NamedTuple):
     tangent: Complex
     area: Real
     modulus: Real
+    smooth: range
 
 
 @dataclass(frozen=True)
@@ -275,10 +285,13 @@ class Beam:
 
     @property
     def strains(self) -> Real:
-        """Strains of the nodes with the mean strain, (N,) [-]."""
-        (length, flexibility), sections = self._axial(), self._nodes[1]
-        area = sections.width * sections.thickness
-        return length / (self.material.youngs_modulus * area * flexibility)
+        """Strains of the nodes with the mean strain, (N,) [-].
+
+        The sum over the nodes is the elongation.
+        """
+        sections = self._nodes[1]
+        flexibility = 1.0 / (sections.width * sections.thickness)
+        return self._axial()[0] * flexibility / float(abs(self.whole) @ flexibility)
 
     @property
     def axial_rate(self) -> float:
@@ -302,16 +315,33 @@ class Beam:
 
     @cached_property
     def _scale(self) -> complex:
-        """Factor on the tangents of the line: its quadrature ends exactly at the drawn end."""
-        weights, sections = self._nodes
-        steps = sections.dv * self.line.tangent(sections.v)
-        return complex(self.line.chord / (weights @ steps))
+        """Factor on the tangents of the line: their unit is the direction of the chord."""
+        end = self.line.position(np.array([self.line.length]))
+        return complex(self.line.chord / end[0])
+
+    @property
+    def _integrals(self) -> Complex:
+        """Integrals of dz, S_0 dz and S_1 dz over the beam as drawn, (3,) [m]."""
+        shares, _ = self._flexibility()
+        z = self.line.position(self._fine[1].v) * self._scale
+        by_parts = -(shares * z) @ self._polynomials[0][:, :2]
+        by_parts[0] += self.line.chord
+        return np.append(self.line.chord, by_parts)
 
     @cached_property
     def _steps(self) -> Complex:
-        """Changes dz/dx at the nodes as drawn, in units of the direction of the chord, (N,) [m]."""
-        sections = self._nodes[1]
-        result: Complex = sections.dv * self.line.tangent(sections.v) * self._scale
+        """Changes dz/dx at the nodes as drawn, in units of the direction of the chord, (N,) [m].
+
+        They differ from dz/dx by the least change, weighted by |dz|, with which the quadrature of
+        dz, S_0 dz and S_1 dz is exact.
+        """
+        weights, sections = self._nodes
+        drawn = sections.dv * self.line.tangent(sections.v) * self._scale
+        size = abs(drawn)
+        B = np.column_stack([np.ones(len(size)), self.turns[:, 1:3]])
+        missing = self._integrals - (weights * drawn) @ B
+        change = np.linalg.solve(B.T @ ((weights * size)[:, None] * B), missing)
+        result: Complex = drawn + size * (B @ change)
         return result
 
     @cached_property
@@ -387,8 +417,18 @@ class Beam:
         area = sections.width * sections.thickness
         return Cuts(
             position, rank, self._polynomials[1], tangent / abs(tangent), area / pulled,
-            area * sections.thickness / 6 / bent,
+            area * sections.thickness / 6 / bent, self._smooth(rank),
         )  # fmt: skip
+
+    def _smooth(self, rank: Real) -> range:
+        """Return the indices of the cuts at the nodes of the straight panel, by their ranks."""
+        first = 0
+        for panel in self.panels:
+            if isinstance(panel, Straight) and panel.nodes >= SUMMIT_NODES_MIN:
+                start = int(np.searchsorted(rank, first))
+                return range(start, start + panel.nodes)
+            first += panel.nodes
+        return range(0)
 
 
 def _joined(parts: Sequence[Sections]) -> Sections:

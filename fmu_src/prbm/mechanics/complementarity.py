@@ -129,8 +129,9 @@ def coulomb(
     if the forces of the others close them.
 
     Round-off on the path of pivots may lead to forces that violate the laws by more than the
-    tolerance.  They are discarded, and the path of the next covering vector is followed.  If there
-    is no solution, the normal rates are increased by half of the tolerance.
+    tolerance.  They are discarded, and the path of the next covering vector is followed.  Rates up
+    to half of the tolerance are round-off, which would choose the path; they count as zero.  If
+    there is no solution, the normal rates are increased by half of the tolerance.
 
     Parameters
     ----------
@@ -176,6 +177,7 @@ def coulomb(
     for j in range(m):
         if normal[j] >= 0:
             M[size + j, normal[j]] = friction[j] * scale[normal[j]] / scale[k + j]
+    given, u = u, np.where(np.abs(u) <= tolerance / 2, 0.0, u)
     attempts = [(M, u), (M, u + tolerance / 2 * (np.arange(k + m) < k))]
     unloaded = np.flatnonzero(u[:k] >= -tolerance)
     if len(unloaded):
@@ -194,7 +196,7 @@ def coulomb(
                 continue
             P = scale * (spread @ z[:size])
             limit = fixed + friction * np.append(P[:k], 0.0)[normal]
-            if violation(W, u, P, limit) <= tolerance:
+            if violation(W, given, P, limit) <= tolerance:
                 return P
     return None
 

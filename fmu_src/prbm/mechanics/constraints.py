@@ -5,8 +5,10 @@ Sources
 .. [1] E. Eich, SIAM J. Numer. Anal. 30 (1993) 1467 (coordinate projection).
 """
 
+from contextlib import suppress
 from functools import cache
 from types import ModuleType
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,16 +18,34 @@ from ..base.tolerances import (
     CONSTRAINT_ITERATIONS_MAX,
     CONSTRAINT_RTOL,
     CONSTRAINT_STALLED_RTOL,
+    ROW_RTOL,
+    SINGULAR_RTOL,
 )
 from .arrays import Complex, Real
 from .system import Rows, System
-
-Factors = tuple[Real, NDArray[np.int32]]
 
 SINGULAR = (
     "the equations of motion are singular in this shape: two constraints are linearly dependent, "
     "or a part that can move has no mass"
 )
+
+
+class Factors(NamedTuple):
+    """Factors P D kkt D = L U of a saddle-point matrix with its scales D.
+
+    Parameters
+    ----------
+    lu : (n + r, n + r)
+        L and U, of the scaled matrix.
+    pivots : (n + r,) int
+        Exchanges of rows P.
+    scale : (n + r,)
+        Diagonal of D.
+    """
+
+    lu: Real
+    pivots: NDArray[np.int32]
+    scale: Real
 
 
 def saddle(M: Real, columns: Real, rows: Real) -> Real:
@@ -38,19 +58,51 @@ def saddle(M: Real, columns: Real, rows: Real) -> Real:
     return kkt
 
 
-def solve(kkt: Real, right: Real) -> Real:
-    """Solve a saddle-point system; ``right`` may have several columns.
+def scales(kkt: Real, n: int, length: float) -> Real:
+    r"""Return the scales D that make a saddle-point matrix independent of the units.
+
+    The scale of a coordinate is 1/sqrt(M_ii), so that D M D has a unit diagonal.  Where M is a
+    stiffness with a smaller diagonal element, max_j M_ij^2 / max |M| replaces it.  (It is not
+    larger than M_ii if M is positive definite.)  The scale of a row makes its largest element one,
+    diagonal elements included.
+
+    Parameters
+    ----------
+    kkt : (n + r, n + r)
+        Saddle-point matrix.
+    n : int
+        Number of coordinates; they have no unit (angles, logarithmic stretches).
+    length : float
+        Size of the mechanism [m], against which the rows are measured.
+
+    Returns
+    -------
+    (n + r,)
+        Scales.
 
     Raises
     ------
     SimulationError
-        If the matrix is singular: two constraints contradict or repeat each other, or a motion
-        has no mass.
+        If all elements of a row are round-off.
+
+    Examples
+    --------
+    >>> M, row = np.diag([4e-18, 1e-12]), np.array([[0.0, 2e-6]])
+    >>> scales(saddle(M, row, row), 2, 1e-5) * [2e-9, 1e-6, 2.0]
+    array([1., 1., 1.])
     """
-    try:
-        return np.asarray(np.linalg.solve(kkt, right), float)
-    except np.linalg.LinAlgError:
-        raise SimulationError(SINGULAR) from None
+    size = np.abs(kkt)
+    block, rows = size[:n, :n], size[n:, :n]
+    scale = np.empty(len(kkt))
+    most = block.max(initial=0.0) or 1.0
+    square = np.maximum(block.diagonal(), block.max(axis=1, initial=0.0) ** 2 / most)
+    scale[:n] = 1.0 / np.sqrt(np.where(square > 0.0, square, most))
+    if len(rows):
+        if not rows.max(axis=1).min() > ROW_RTOL * length:
+            raise SimulationError(SINGULAR)
+        longest = (rows * scale[:n]).max(axis=1)
+        scale[n:] = 1.0 / np.maximum(longest, np.sqrt(size.diagonal()[n:]))
+    return scale
 
 
 @cache
@@ -61,24 +113,84 @@ def _lapack() -> ModuleType:
     return lapack
 
 
-def factor_and_solve(kkt: Real, right: Real) -> tuple[Real, Factors]:
-    """Solve a saddle-point system and return its factors too, for :func:`solve_again`.
+def factor_saddle(kkt: Real, n: int, length: float) -> Factors:
+    """Factor a saddle-point matrix, or reject it as singular.
+
+    It is singular if a row has vanished, or if a pivot of the scaled matrix, whose elements are
+    near one, is less than ``SINGULAR_RTOL``: its solution would be round-off.
+
+    Parameters
+    ----------
+    kkt, n, length
+        As for :func:`scales`.
 
     Raises
     ------
     SimulationError
-        As :func:`solve`.
+        If the matrix is singular: two constraints contradict or repeat each other, a constraint
+        does not depend on the position, or a motion has no mass.
     """
-    lu, pivots, x, info = _lapack().dgesv(kkt, right)
-    if info != 0:
+    scale = scales(kkt, n, length)
+    lu, pivots, _ = _lapack().dgetrf(kkt * scale * scale[:, None], overwrite_a=True)
+    _check_pivots(np.abs(lu.diagonal()))
+    return Factors(lu, pivots, scale)
+
+
+def _check_pivots(pivots: Real) -> None:
+    """Reject a scaled matrix with these pivots if one of them is round-off."""
+    if not pivots.min() > SINGULAR_RTOL * pivots.max():
         raise SimulationError(SINGULAR)
-    return x, (lu, pivots)
 
 
-def solve_again(factors: Factors, right: Real) -> Real:
-    """Solve with the factors of :func:`factor_and_solve` and another right side."""
-    x: Real = _lapack().dgetrs(*factors, right)[0]
+def _pivots(matrix: Real) -> Real:
+    """Return the magnitudes of the pivots of Gauss' elimination with partial pivoting."""
+    A, found = matrix.copy(), np.zeros(len(matrix))
+    for k in range(len(A)):
+        best = k + int(np.abs(A[k:, k]).argmax())
+        A[[k, best]] = A[[best, k]]
+        found[k] = abs(A[k, k])
+        if not found[k] > 0.0:
+            break
+        A[k + 1 :, k:] -= A[k + 1 :, k : k + 1] / A[k, k] * A[k, k:]
+    return found
+
+
+def solve_saddle(factors: Factors, right: Real) -> Real:
+    """Solve with the factors of :func:`factor_saddle`; ``right`` may have several columns."""
+    scale = factors.scale if right.ndim == 1 else factors.scale[:, None]
+    x: Real = _lapack().dgetrs(factors.lu, factors.pivots, scale * right)[0]
+    return scale * x
+
+
+def solve(kkt: Real, right: Real, n: int, length: float) -> Real:
+    """Solve a saddle-point system as :func:`factor_saddle` and :func:`solve_saddle`, without SciPy.
+
+    Raises
+    ------
+    SimulationError
+        As :func:`factor_saddle`.
+    """
+    scale = scales(kkt, n, length)
+    A = kkt * scale * scale[:, None]
+    _check_pivots(_pivots(A))
+    spread = scale if right.ndim == 1 else scale[:, None]
+    x: Real = spread * np.linalg.solve(A, spread * right)
     return x
+
+
+def cholesky(M: Real) -> Real:
+    """Return the lower triangle L of a mass matrix M = L L^T, or reject M as singular.
+
+    Raises
+    ------
+    SimulationError
+        If a pivot is less than ``SINGULAR_RTOL`` of its diagonal element: a motion has no mass.
+    """
+    with suppress(np.linalg.LinAlgError):
+        L = np.asarray(np.linalg.cholesky(M), float)
+        if np.all(L.diagonal() ** 2 > SINGULAR_RTOL * M.diagonal()):
+            return L
+    raise SimulationError("the modes cannot be computed: a part that can move has no mass")
 
 
 def satisfied(residual: Real, length: float) -> bool:
@@ -126,14 +238,14 @@ def project_positions(system: System, rows: Rows, q: Real, c: Real) -> tuple[Rea
         G = rows.jacobian(e)
         right = np.zeros(n + len(c))
         right[n:] = -s
-        q = q + solve(saddle(system.mass_matrix(e), G, G), right)[:n]
+        q = q + solve(saddle(system.mass_matrix(e), G, G), right, n, system.length)[:n]
     raise SimulationError(
         "the loops of the mechanism could not be closed near this shape: connected parts remain "
         f"{best:.3g} m apart; release nearer to the straight shape, or check the lengths"
     )
 
 
-def project_velocities(M: Real, rows: Real, rates: Real, v: Real) -> Real:
+def project_velocities(M: Real, rows: Real, rates: Real, v: Real, length: float) -> Real:
     """Move v onto rows v + rates = 0 by the change of least kinetic energy.
 
     Parameters
@@ -146,8 +258,15 @@ def project_velocities(M: Real, rows: Real, rates: Real, v: Real) -> Real:
         Prescribed parts of the rates: velocities of walls, or zero [m/s].
     v : (n,)
         Angular velocities [rad/s].
+    length : float
+        Size of the mechanism [m].
+
+    Raises
+    ------
+    SimulationError
+        As :func:`factor_saddle`.
     """
     n = len(v)
     right = np.zeros(n + len(rows))
     right[n:] = -(rows @ v + rates)
-    return v + solve(saddle(M, rows, rows), right)[:n]
+    return v + solve(saddle(M, rows, rows), right, n, length)[:n]

@@ -27,6 +27,8 @@ from ..base.tolerances import (
     COMPLEMENTARITY_RTOL,
     IMPULSE_RANK_RTOL,
     REBOUND_RTOL,
+    ROW_RTOL,
+    SINGULAR_RTOL,
     WEDGED_RTOL,
     ZERO_SPEED_RTOL,
 )
@@ -48,7 +50,7 @@ WEDGED_SEVERAL = (
 )
 
 
-def response(M: Real, held: Real, rows: Real) -> Real:
+def response(M: Real, held: Real, rows: Real, length: float) -> Real:
     """Return the changes of velocity by unit impulses along the rows, (n, k) [rad/s per N s].
 
     Parameters
@@ -59,16 +61,70 @@ def response(M: Real, held: Real, rows: Real) -> Real:
         Rows whose rates do not change: loops, held stops [m/rad].
     rows : (k, n)
         Directions of the impulses [m/rad].
+    length : float
+        Size of the mechanism [m].
+
+    Raises
+    ------
+    SimulationError
+        As :func:`prbm.mechanics.constraints.factor_saddle`.
 
     Examples
     --------
-    >>> response(np.diag([2.0]), np.zeros((0, 1)), np.array([[1.0]])).item()
+    >>> response(np.diag([2.0]), np.zeros((0, 1)), np.array([[1.0]]), 1.0).item()
     0.5
     """
     n, k = len(M), len(rows)
     right = np.zeros((n + len(held), k), order="F")
     right[:n] = rows.T
-    return constraints.solve(constraints.saddle(M, held, held), right)[:n]
+    return constraints.solve(constraints.saddle(M, held, held), right, n, length)[:n]
+
+
+def least_mobilities(M: Real, rows: Real, length: float) -> Real:
+    """Return the mobilities below which no motion along the rows is possible, (k,) [1/kg].
+
+    They are ``SINGULAR_RTOL`` of the mobilities without constraints, which the diagonal of M
+    estimates, and at least those of rows that are round-off.
+
+    Parameters
+    ----------
+    M : (n, n)
+        Mass matrix [kg m^2].
+    rows : (k, n)
+        Directions [m/rad].
+    length : float
+        Size of the mechanism [m].
+
+    Examples
+    --------
+    >>> least_mobilities(np.diag([2.0, 4.0]), np.array([[1.0, 2.0], [0.0, 1e-12]]), 1.0)
+    array([1.5e-12, 2.5e-19])
+    """
+    inertias = M.diagonal()
+    free = SINGULAR_RTOL * np.asarray((rows**2 / inertias).sum(axis=1), float)
+    return np.maximum(free, (ROW_RTOL * length) ** 2 / float(inertias.max()))
+
+
+def contact_mobility(M: Real, rows: Real, X: Real, length: float) -> Real:
+    """Return the inverse mass in contact space, W = rows X, (k, k) [1/kg].
+
+    Directions in which no motion is possible leave round-off in W, which is removed.
+
+    Parameters
+    ----------
+    M : (n, n)
+        Mass matrix [kg m^2].
+    rows : (k, n)
+        Directions [m/rad].
+    X : (n, k)
+        Changes of velocity by unit impulses, as :func:`response` returns them.
+    length : float
+        Size of the mechanism [m].
+    """
+    W: Real = rows @ X
+    immobile = np.abs(W.diagonal()) <= least_mobilities(M, rows, length)
+    W[immobile] = W[:, immobile] = 0.0
+    return W
 
 
 def newton(W: Real, u: Real, restitution: Real, speed: float = 0.0) -> Real:

@@ -264,7 +264,8 @@ class Equations:
         for i in self.slipping_stops:
             share = -self.stop_friction[i] * self.contacts.modes[i].slip
             kkt[:n, n + self.hold_row(i)] += share * self.slip_row(i, e)
-        x, factors = constraints.factor_and_solve(kkt, right)
+        factors = constraints.factor_saddle(kkt, n, self.system.length)
+        x = constraints.solve_saddle(factors, right)
         return Evaluation(x[:n], -x[n:], M, factors, pressure)
 
     def mass_and_loops(self, q: Real) -> tuple[Complex, Real, Real]:
@@ -337,7 +338,8 @@ class Equations:
         result = y.copy()
         result[:n] = q
         M = self.system.mass_matrix(e)
-        result[n : 2 * n] = constraints.project_velocities(M, rows, rates, y[n : 2 * n])
+        v = constraints.project_velocities(M, rows, rates, y[n : 2 * n], self.system.length)
+        result[n : 2 * n] = v
         return result
 
     def project_near(self, t: float, y: Real, factors: constraints.Factors) -> Real:
@@ -362,7 +364,7 @@ class Equations:
         right = np.zeros(n + len(c))
         right[n : n + r] = -self.positions.values(system.directions(y[:n]), c[:r])
         result = y.copy()
-        result[:n] += constraints.solve_again(factors, right)[:n]
+        result[:n] += constraints.solve_saddle(factors, right)[:n]
         e = system.directions(result[:n])
         residual = self.positions.values(e, c[:r])
         if not constraints.satisfied(residual, system.length):
@@ -371,7 +373,7 @@ class Equations:
         if self.moving_walls:
             rates[self.first_hold : r] += self.held_motions(t)[1]
         right[n:] = -rates
-        result[n : 2 * n] += constraints.solve_again(factors, right)[:n]
+        result[n : 2 * n] += constraints.solve_saddle(factors, right)[:n]
         return result
 
     # -- stops --

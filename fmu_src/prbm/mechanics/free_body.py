@@ -36,6 +36,8 @@ class SectionLoads(NamedTuple):
     area, modulus : (m,)
         Area [m^2] and section modulus [m^3] of each section, at waists divided by the factors of
         the stress (:func:`prbm.mechanics.profile.concentration`).
+    smooth : range
+        Sections at nodes between which the stress is a smooth function of the position.
     """
 
     name: str
@@ -46,6 +48,7 @@ class SectionLoads(NamedTuple):
     bending: Real
     area: Real
     modulus: Real
+    smooth: range
 
 
 @dataclass(frozen=True)
@@ -95,6 +98,8 @@ class FreeBody:
         Area [m^2] and section modulus [m^3] of the sections, as in :class:`SectionLoads`.
     beyond : (m, p)
         Share of each mass point that lies beyond a section, seen from the near end [-].
+    smooth : range
+        As in :class:`SectionLoads`: sections counted from the start of the flexure.
     """
 
     name: str
@@ -114,6 +119,7 @@ class FreeBody:
     area: Real
     modulus: Real
     beyond: Real
+    smooth: range
 
     def section_loads(
         self, e: Complex, deflection: Real, strained: Real, loads: Complex, far: complex
@@ -147,7 +153,7 @@ class FreeBody:
         bending = np.concatenate([[-moments[0]], (self.bends @ strain)[order], [moments[1]]])
         return SectionLoads(
             self.name, forces, moments, self.position[order], tension[order], bending,
-            self.area[order], self.modulus[order],
+            self.area[order], self.modulus[order], self.smooth,
         )  # fmt: skip
 
 
@@ -257,6 +263,7 @@ def of_links(
         beyond=shares_beyond(
             ranks, np.array([-1.0, *(2.0 * i + 1.0 for i in range(n + 1)), np.inf])
         ),
+        smooth=range(0),
     )
 
 
@@ -329,6 +336,7 @@ def of_beam(
             if forwards
             else shares_beyond(nodes - 1 - ranks, nodes - 1 - cuts.rank[::-1])
         ),
+        smooth=cuts.smooth,
     )
 
 

@@ -1,10 +1,12 @@
 r"""Small vibrations about a static shape, and the effect of an impact on the fundamental mode."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.tolerances import ZERO_FREQUENCY_RTOL, ZERO_MODE_RTOL
+from ..base.tolerances import SPRINGLESS_RATE, ZERO_FREQUENCY_RTOL, ZERO_MODE_RTOL
+from ..mechanism.parts import value
 from . import constraints
 from .arrays import Complex, Real
 from .forces import field_row, springs
@@ -59,8 +61,10 @@ def _modes(system: System, q: Real, B: Complex, lam: Real, w: Complex) -> Modes:
     M = system.mass_matrix(e)
     K_t = tangent_stiffness(system.K, w, B, lam, e, system.arm, system.Phi)
     rows = system.loop_rows.jacobian(e)
-    Z = np.linalg.qr(rows.T, mode="complete")[0][:, len(rows) :]
-    L = np.linalg.cholesky(Z.T @ M @ Z)
+    # Coordinates of unit inertia make the basis Z independent of how the inertias differ.
+    scale = 1.0 / np.sqrt(M.diagonal())
+    Z = scale[:, None] * np.linalg.qr((rows * scale).T, mode="complete")[0][:, len(rows) :]
+    L = constraints.cholesky(Z.T @ M @ Z)
     omega2, y = np.linalg.eigh(np.linalg.solve(L, np.linalg.solve(L, Z.T @ K_t @ Z).T))
     frequency = np.sign(omega2) * np.sqrt(np.abs(omega2)) / (2 * np.pi)
     return Modes(frequency, Z @ np.linalg.solve(L.T, y), M)
@@ -74,6 +78,29 @@ def fundamental_frequency(system: System) -> float:
     frequency = modes(system, equilibrium(system)).frequency
     lowest = float(frequency[0])
     return lowest if lowest > ZERO_FREQUENCY_RTOL * float(np.abs(frequency).max()) else 0.0
+
+
+def slow_rates(system: System) -> tuple[float, float]:
+    """Return the rates of a mechanism without a fundamental frequency [rad/s].
+
+    The first is the scale of velocities.  About an unstable equilibrium it is the rate of the most
+    unstable mode.  If a motion deforms no spring and lifts no weight, it is the larger of the rates
+    sqrt(g/L) and u/L of a fall and of the motion at the release, with the size L, gravity g and the
+    speed u of the released body; without both, the lowest angular frequency that is not zero.
+
+    The second is the scale of times: the same, or the lowest angular frequency if it is larger and
+    the mechanism is not unstable.
+    """
+    frequency = modes(system, equilibrium(system)).frequency
+    least = ZERO_FREQUENCY_RTOL * float(np.abs(frequency).max())
+    if frequency[0] < -least:
+        return (-2 * math.pi * float(frequency[0]),) * 2
+    speed = abs(value(system.mechanism.release, "velocity", system.values))
+    fall = math.sqrt(abs(system.gravity) / system.length)
+    acting = 2 * math.pi * frequency[frequency > least]
+    lowest = float(acting[0]) if len(acting) else 0.0
+    rate = max(fall, speed / system.length) or lowest or SPRINGLESS_RATE
+    return rate, max(rate, lowest)
 
 
 def fundamental_at(system: System, q: Real) -> tuple[Real, Real]:
@@ -105,7 +132,8 @@ def modes_at(system: System, q: Real) -> Modes:
     w = field_row(system.spread(system.S), system.gravity)
     load = springs(system.K, q - system.q0) + system.Phi.pull((w * e).real)
     right = np.concatenate([load, np.zeros(len(B))])
-    lam = -constraints.solve(constraints.saddle(M, rows, rows), right)[system.n :]
+    kkt = constraints.saddle(M, rows, rows)
+    lam = -constraints.solve(kkt, right, system.n, system.length)[system.n :]
     return _modes(system, q, B, lam, w)
 
 

@@ -329,3 +329,24 @@ class Line:
         steepest = 0.5 * math.pi * self.rise / L
         wave: Complex = 1.0 + 1j * steepest * np.sin(math.pi / L * v)
         return wave
+
+    def position(self, v: Real) -> Complex:
+        """Return the integral of the tangent from the start to positions v, (m,) [m].
+
+        Examples
+        --------
+        >>> Line(5.0, rise=3.0).position(np.array([0.0, 4.0])).round(12).tolist()
+        [0j, (4+3j)]
+        """
+        L = self.length
+        if self.curvature:
+            half = 0.5 * self.curvature * v
+            arc: Complex = np.sin(half) / (0.5 * self.curvature) * np.exp(1j * (half - self._half))
+            return arc
+        wave: Complex = v + 1j * self.rise * np.sin(0.5 * math.pi / L * v) ** 2
+        return wave
+
+    @property
+    def _half(self) -> float:
+        """Half of the angle of the arc [rad]."""
+        return 0.5 * self.curvature * self.length

@@ -19,8 +19,7 @@ import numpy as np
 from ..base.errors import EquilibriumError, ParameterError, SimulationError
 from ..base.tolerances import (
     RELEASE_LEVER_RTOL,
-    RELEASE_MOBILITY_RTOL,
-    RELEASE_ROW_RTOL,
+    ROW_RTOL,
     STATICS_CONSTRAINT_RTOL,
     STATICS_FORCE_RTOL,
     STATICS_GROWTH_MAX,
@@ -33,7 +32,7 @@ from ..base.tolerances import (
     STATICS_TURN_MAX,
     STATICS_TURN_MIN,
 )
-from . import constraints, contact
+from . import constraints
 from .arrays import Complex, Real, Whole
 from .direction_map import DirectionMap
 from .forces import field_row, force_row, springs
@@ -123,8 +122,9 @@ def equilibrium(
 ) -> Equilibrium:
     """Return the shape under gravity and loads, free or with the released body held.
 
-    Gravity, loads and displacement are raised together from the straight, unloaded shape, so that
-    the shape found is the one that the mechanism reaches when it is loaded slowly.
+    Gravity, loads and displacement are raised together from the straight, unloaded shape, and the
+    shape is followed.  It is the one that the mechanism reaches when it is loaded slowly, unless it
+    buckles or snaps on the way: the stability of the shapes is not tested.
 
     Parameters
     ----------
@@ -151,9 +151,13 @@ def equilibrium(
         turns about the point that is to be displaced.
     """
     w, moment = _loads(system, loads or {})
+    loaded = bool(displacement) or np.any(w) or np.any(moment)
+    open_by = system.loop_rows.values(system.directions(system.q0))
+    closed = np.abs(open_by).max(initial=0.0) <= STATICS_CONSTRAINT_RTOL * system.length
+    if closed and near is None and not loaded:
+        return Equilibrium(system.q0, np.zeros(len(system.loops)), 0.0, w)
     if displacement is not None:
-        moved = displacement != 0.0 or np.any(w) or np.any(moment)
-        if moved and held_by_loops(system):  # The matrix of the balance would be singular.
+        if held_by_loops(system):  # The matrix of the balance would be singular.
             raise EquilibriumError(f"{_given(system, displacement)}: {immobile(system)}")
         if displacement != 0.0 and turns_about_point(system):
             raise EquilibriumError(f"{_given(system, displacement)}: {_about(system)}")
@@ -197,7 +201,8 @@ def _follow(system: System, given: Callable[[float], _Given], state: Real) -> tu
     done, step, growth = 0.0, 1.0, STATICS_GROWTH_MAX
     while done < 1.0:
         target = min(1.0, done + step)
-        step, turn, ratio = target - done, math.inf, STATICS_SHRINK
+        # The difference of target and done may be rounded to more than the smallest step.
+        step, turn, ratio = min(step, 1.0 - done), math.inf, STATICS_SHRINK
         held, w, moment = given(target)
         trial = _newton(system, held, (w, moment), state)
         if trial is not None and _holds(system, held, trial):
@@ -262,7 +267,8 @@ def _newton(
         K_t = tangent_stiffness(system.K, w, B, lam, e, system.arm, system.Phi)
         kkt = constraints.saddle(K_t, rows, rows)
         try:
-            change = constraints.solve(kkt, np.concatenate([torque, -open_by]))
+            right = np.concatenate([torque, -open_by])
+            change = constraints.solve(kkt, right, n, system.length)
         except SimulationError:
             return state if balanced else None
         change[n:] *= -1.0
@@ -291,11 +297,6 @@ def _unreachable(system: System, displacement: float | None, loaded: bool, done:
             "raised in proportion: reduce the loads, or stiffen the flexures"
         )
     if displacement is None:
-        if not system.gravity:
-            return (
-                "no static equilibrium was found: the straight shape is not in equilibrium, or the "
-                "flexures are too weak to hold it"
-            )
         return (
             "no static equilibrium under gravity was found: the flexures are too weak for this "
             "load; reduce gravity or the masses, or stiffen the flexures"
@@ -304,9 +305,17 @@ def _unreachable(system: System, displacement: float | None, loaded: bool, done:
         f"{_given(system, displacement)} cannot be reached: no equilibrium was found beyond "
         f"{done * displacement + 0.0:.4g} {_unit(system)}"
     )
+    if not system.gravity:  # The shape does not depend on the size of the stiffness.
+        pins = (
+            ""
+            if done
+            else (
+                "; if a body or a flexure turns freely on pins, nothing holds it without gravity: "
+                "clamp an end of it, or add gravity"
+            )
+        )
+        return f"{where}; release closer to the straight shape{pins}"
     units = "" if done else "; or check the units of youngs_modulus and thickness"
-    if not system.gravity:
-        return f"{where}; release closer to the straight shape{units}"
     return (
         f"{where} (gravity raised in proportion); release closer to the straight shape, or reduce "
         f"gravity across the motion{units}"
@@ -327,7 +336,7 @@ def held_by_loops(system: System) -> bool:
     """Return whether the loops keep the released body, as drawn, from moving along the release."""
     e = system.directions(system.q0)
     along = system.gradient(system.holding_row(system.q0)[None], e)
-    return _left_by_loops(system, e, along) <= RELEASE_ROW_RTOL * system.length
+    return _left_by_loops(system, e, along) <= ROW_RTOL * system.length
 
 
 def turns_about_point(system: System) -> bool:
@@ -343,7 +352,8 @@ def turns_about_point(system: System) -> bool:
     loops = system.loop_rows.jacobian(e)
     try:
         kkt = constraints.saddle(system.K, loops, loops)
-        response = constraints.solve(kkt, np.append(row, np.zeros(len(loops))))[: system.n]
+        right = np.append(row, np.zeros(len(loops)))
+        response = constraints.solve(kkt, right, system.n, system.length)[: system.n]
     except SimulationError:  # A body without a spring, for instance on a pin.
         return False
     turn = abs(float(response[system.released.j]))
@@ -391,8 +401,8 @@ def _on_pivot(system: System, name: str) -> bool:
     e, frame = system.directions(system.q0), system.bodies[name]
     both = system.gradient(np.vstack([system.release, -1j * system.release]), e)
     turn = np.eye(system.n)[[frame.j]]
-    return _left_by_loops(system, e, both) <= RELEASE_ROW_RTOL * system.length and (
-        _left_by_loops(system, e, turn) > RELEASE_ROW_RTOL
+    return _left_by_loops(system, e, both) <= ROW_RTOL * system.length and (
+        _left_by_loops(system, e, turn) > ROW_RTOL
     )
 
 
@@ -428,11 +438,11 @@ def release_velocity(system: System, q: Real, speed: float) -> Real:
     e = system.directions(q)
     M = system.mass_matrix(e)
     rows = system.gradient(np.vstack([system.loops, system.release]), e)
-    loops, row = rows[:-1], rows[-1:]
-    left, free = ((row @ contact.response(M, held, row)).item() for held in (loops, loops[:0]))
-    if left <= RELEASE_MOBILITY_RTOL * free:
-        remedy = "give another release.point, or release another body"
-        raise ParameterError(f"release.velocity = {speed:g} m/s: {_immovable(system, remedy)}")
     rates = np.zeros(len(rows))
     rates[-1] = -speed
-    return constraints.project_velocities(M, rows, rates, np.zeros(system.n))
+    try:
+        return constraints.project_velocities(M, rows, rates, np.zeros(system.n), system.length)
+    except SimulationError:
+        remedy = "give another release.point, or release another body"
+        why = _immovable(system, remedy)
+        raise ParameterError(f"release.velocity = {speed:g} m/s: {why}") from None

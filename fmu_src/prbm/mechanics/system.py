@@ -273,6 +273,8 @@ class System:
         Displacement along and to the left of the direction of each friction point [m].
     release, release_c : (d,) complex, float
         Displacement of the released point along the direction of the release [m].
+    released : BodyFrame
+        The released point.
     bodies : dict of BodyFrame
         The bodies by name: their centres of mass.
     pushed : tuple of BodyFrame
@@ -321,6 +323,7 @@ class System:
     lifts_c: Real
     release: Complex
     release_c: float
+    released: BodyFrame
     bodies: Mapping[str, BodyFrame]
     pushed: tuple[BodyFrame, ...]
     probes: tuple[BodyFrame, ...]
@@ -469,11 +472,6 @@ class System:
     def spread(self, B: Complex) -> Complex:
         """Return rows with the column of each arm repeated for its stretch."""
         return B[..., self.arm] if len(self.stretches) else B
-
-    @property
-    def released(self) -> BodyFrame:
-        """The released body, at its centre of mass."""
-        return self.bodies[self.mechanism.release.body]
 
     def holding(self, amount: float) -> tuple[Complex, float]:
         """Return B, c of the constraint Re(B E) + c = 0 that holds the released body.

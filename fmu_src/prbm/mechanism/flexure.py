@@ -19,8 +19,8 @@ springs are n EI/L between links.  At each end that is clamped or free, a spring
 the last link with the body.
 
 With axial compliance, one link of a flexure stretches with the stiffness EA/L: the middle one.  If
-the number of links is even, it is the one after the middle, counted from the start.  In a chain
-all links stretch, each with the stiffness n EA/L.
+the number of links is even, it is the one after the middle, counted from the clamp.  In a chain all
+links stretch, each with the stiffness n EA/L.
 
 A beam has no coefficients either: its bending moment is a polynomial, see
 :mod:`prbm.mechanics.beam`.  A free end of a beam is the same as a clamp.
@@ -337,7 +337,9 @@ def segments(
     if model.links:
         axial = [model.links * EA / L] * len(links)
     else:
-        axial = [EA / L if i == len(links) // 2 else 0.0 for i in range(len(links))]
+        from_clamp = len(links) // 2
+        middle = from_clamp if ends[0] == CLAMP else len(links) - 1 - from_clamp
+        axial = [EA / L if i == middle else 0.0 for i in range(len(links))]
     return Segments(tuple(lengths), tuple(rates), tuple(rods), tuple(lumps), tuple(axial))
 
 

@@ -337,8 +337,8 @@ static bool check_ratio(const System *system, const double *M, Problem *problem)
                 part_of(m, heavy), most);
 }
 
-static bool check_masses(const System *system, const Complex *e0, Scratch *scratch,
-                         Problem *problem) {
+/* Check the mass matrix, and derive the least mobility of a row from it. */
+static bool check_masses(System *system, const Complex *e0, Scratch *scratch, Problem *problem) {
     size_t mark = scratch->used, n = (size_t)system->n;
     double *M = take(scratch, n * n), *w = take(scratch, n);
     double *scale = take(scratch, n);
@@ -347,9 +347,12 @@ static bool check_masses(const System *system, const Complex *e0, Scratch *scrat
         scratch->used = mark;
         return false;
     }
+    double row = ROW_RTOL * system->length;
+    system->least_mobility = HUGE_VAL;
     bool regular = true;
     for (size_t i = 0; i < n; i++) {
-        scale[i] = sqrt(M[i * n + i]);
+        system->least_mobility = lesser(system->least_mobility, row * row / M[i * n + i]);
+        scale[i] = square_root(M[i * n + i]);
         regular = regular && scale[i] > 0.0;
     }
     for (size_t i = 0; regular && i < n * n; i++) {
@@ -360,7 +363,7 @@ static bool check_masses(const System *system, const Complex *e0, Scratch *scrat
             scratch->used = mark;
             return false;
         }
-        regular = w[0] > MASSLESS_RTOL;
+        regular = w[0] > SINGULAR_RTOL;
     }
     scratch->used = mark;
     if (!regular) {
@@ -385,7 +388,7 @@ static double choose_row(int k, int r, int n, double *rows, int *loop) {
     loop[best] = loop[k];
     loop[k] = chosen;
     exchange(n, rows + k * n, rows + best * n);
-    return sqrt(most);
+    return square_root(most);
 }
 
 /* Find the loops with linearly dependent rows by Gram-Schmidt orthogonalisation with pivoting. */

@@ -68,14 +68,14 @@ PRBM void orthogonal(int m, int order, const double *u, const double *weights, d
     for (int k = 0; k <= order; k++) {
         double a = 0.0, square = 0.0;
         for (int i = 0; i < m; i++) {
-            P[i * (order + 1) + k] = p[i] / sqrt(2 * k + 1);
+            P[i * (order + 1) + k] = p[i] / square_root(2 * k + 1);
             a += weights[i] * (u[i] * p[i] * p[i]);
         }
         for (int i = 0; i < m; i++) {
             before[i] = (u[i] - a) * p[i] - b * before[i];
             square += weights[i] * (before[i] * before[i]);
         }
-        b = sqrt(square);
+        b = square_root(square);
         for (int i = 0; i < m; i++) {
             double following = before[i] / b;
             before[i] = p[i];
@@ -96,7 +96,8 @@ typedef struct {
 
 enum {
     SECTION_DOUBLES = sizeof(Section) / sizeof(double),
-    CUT_DOUBLES = sizeof(Cut) / sizeof(double)
+    CUT_DOUBLES = sizeof(Cut) / sizeof(double),
+    MOMENTS = 3 /* Integrals over the beam that are exact: of dz, S_0 dz and S_1 dz. */
 };
 
 PRBM size_t beam_size(int order, int nodes, int panels) {
@@ -105,7 +106,7 @@ PRBM size_t beam_size(int order, int nodes, int panels) {
     size_t cuts = N + CUTS_BESIDE_NODES;
     size_t arrays = N * (n + 2 * N + 5) + n + cuts * (CUT_DOUBLES + n);
     return arrays + N * (SECTION_DOUBLES + 6) + Q * (SECTION_DOUBLES + n + 5) + n +
-           cuts * (SECTION_DOUBLES + n + 5);
+           cuts * (SECTION_DOUBLES + n + 5) + 6 * MOMENTS;
 }
 
 static Section *take_sections(Scratch *scratch, int count) {
@@ -145,9 +146,32 @@ static Fine fine_points(const Beam *beam, Scratch *scratch) {
 
 /* --- bending and stretch ---------------------------------------------------------------------- */
 
-/* Set the integrals of the polynomials up to the nodes, the polynomials at the cuts, and the rates.
- * The cuts follow the fine points, with the weight 0. */
-static void set_bending(Beam *beam, const Fine *fine, const Section *cuts, Scratch *scratch) {
+/* Return the factor on the tangents of the line: their unit is the direction of the chord. */
+static Complex direction_factor(Line line) {
+    Complex end = position(line, line_length(line));
+    return scaled(line.chord / (end.re * end.re + end.im * end.im), conjugate(end));
+}
+
+/* Compute the integrals of dz, S_0 dz and S_1 dz over the beam as drawn, by parts. */
+static void set_integrals(const Beam *beam, const Fine *fine, const double *shares, const double *P,
+                          Complex *sums) {
+    Complex factor = direction_factor(beam->line);
+    sums[0] = sums[1] = complex_of(beam->line.chord, 0.0);
+    sums[2] = complex_of(0.0, 0.0);
+    for (int i = 0; i < fine->count; i++) {
+        Complex z = product(position(beam->line, fine->sections[i].v), factor);
+        for (int k = 0; k < MOMENTS - 1; k++) {
+            double share = shares[i] * P[i * (beam->order + 1) + k];
+            sums[k + 1] = minus(sums[k + 1], scaled(share, z));
+        }
+    }
+}
+
+/* Set the integrals of the polynomials up to the nodes, the polynomials at the cuts, the rates, and
+ * the integrals over the beam, moments (MOMENTS,).  The cuts follow the fine points, with the
+ * weight 0. */
+static void set_bending(Beam *beam, const Fine *fine, const Section *cuts, Complex *moments,
+                        Scratch *scratch) {
     int n = beam->order + 1, Q = fine->count, all = Q + beam->cut_count, node = 0, interval = 0;
     double *u = take(scratch, (size_t)all), *shares = take(scratch, (size_t)all), total = 0.0;
     double *P = take_matrix(scratch, all, n), *sums = take(scratch, (size_t)n);
@@ -166,6 +190,7 @@ static void set_bending(Beam *beam, const Fine *fine, const Section *cuts, Scrat
     }
     orthogonal(all, beam->order, u, shares, P, scratch);
     copy(beam->cut_count * n, P + Q * n, beam->moments);
+    set_integrals(beam, fine, shares, P, moments);
     zeros(n, sums);
     for (int p = 0; p < beam->panel_count; p++) {
         for (int k = 0; k <= beam->panels[p].nodes; k++, interval++) {
@@ -183,38 +208,67 @@ static void set_bending(Beam *beam, const Fine *fine, const Section *cuts, Scrat
 }
 
 static void set_stretch(Beam *beam, const Fine *fine, const Section *sections) {
-    double length = 0.0, flexibility = 0.0;
+    double length = 0.0, flexibility = 0.0, elongation = 0.0;
     for (int i = 0; i < fine->count; i++) {
         length += fine->ds[i];
         flexibility += fine->ds[i] / area_of(fine->sections[i]);
     }
-    flexibility /= beam->youngs_modulus;
     for (int i = 0; i < beam->nodes; i++) {
-        double area = area_of(sections[i]);
-        beam->strains[i] = length / (beam->youngs_modulus * area * flexibility);
+        elongation += modulus(beam->whole[i]) / area_of(sections[i]);
     }
-    beam->axial_rate = length * length / flexibility;
+    for (int i = 0; i < beam->nodes; i++) {
+        beam->strains[i] = length / area_of(sections[i]) / elongation;
+    }
+    beam->axial_rate = length * length / (flexibility / beam->youngs_modulus);
 }
 
 /* --- masses and positions --------------------------------------------------------------------- */
 
-/* Set the masses, the radii of gyration, and the lengths for the end and for the nodes.  The
- * quadrature of the line ends exactly at the end that is drawn: return its factor on tangents. */
-static Complex set_nodes(Beam *beam, const Section *sections, const double *x,
-                         const double *weights, Scratch *scratch) {
+/* Change the steps dz/dx (N,) at the nodes by the least amount, weighted by |dz|, with which the
+ * quadrature of dz, S_0 dz and S_1 dz gives the moments (MOMENTS,), which are overwritten. */
+static void correct_steps(const Beam *beam, const double *weights, Complex *moments,
+                          Complex *steps) {
+    double gram[MOMENTS * MOMENTS] = {0.0}, B[MOMENTS] = {1.0}, re[MOMENTS], im[MOMENTS];
+    for (int i = 0; i < beam->nodes; i++) {
+        double size = weights[i] * modulus(steps[i]);
+        copy(MOMENTS - 1, beam->S + i * (beam->order + 1), B + 1);
+        for (int k = 0; k < MOMENTS; k++) {
+            moments[k] = minus(moments[k], scaled(weights[i] * B[k], steps[i]));
+            add_scaled(MOMENTS, size * B[k], B, gram + k * MOMENTS);
+        }
+    }
+    for (int k = 0; k < MOMENTS; k++) {
+        re[k] = moments[k].re;
+        im[k] = moments[k].im;
+    }
+    cholesky(MOMENTS, gram);
+    forward(MOMENTS, gram, re);
+    backward(MOMENTS, gram, re);
+    forward(MOMENTS, gram, im);
+    backward(MOMENTS, gram, im);
+    for (int i = 0; i < beam->nodes; i++) {
+        double size = modulus(steps[i]);
+        copy(MOMENTS - 1, beam->S + i * (beam->order + 1), B + 1);
+        Complex change = {dot(MOMENTS, B, re), dot(MOMENTS, B, im)};
+        steps[i] = plus(steps[i], scaled(size, change));
+    }
+}
+
+/* Set the masses, the radii of gyration, and the lengths for the end and for the nodes. */
+static void set_nodes(Beam *beam, const Section *sections, const double *x, const double *weights,
+                      Complex *moments, Scratch *scratch) {
     int N = beam->nodes, first = 0;
-    Complex *steps = take_complex(scratch, N, 1), sum = {0.0, 0.0};
+    Complex *steps = take_complex(scratch, N, 1), factor = direction_factor(beam->line);
     double *lengths = take(scratch, (size_t)N);
     for (int i = 0; i < N; i++) {
         double area = area_of(sections[i]);
         beam->masses[i] = beam->density * area * (weights[i] * arc(beam, sections[i]));
-        beam->radii[i] = 0.5 * sections[i].thickness / sqrt(3.0);
-        steps[i] = scaled(sections[i].dv, tangent(beam->line, sections[i].v));
-        sum = plus(sum, scaled(weights[i], steps[i]));
+        beam->radii[i] = 0.5 * sections[i].thickness / square_root(3.0);
+        Complex along = product(tangent(beam->line, sections[i].v), factor);
+        steps[i] = scaled(sections[i].dv, along);
     }
-    Complex factor = scaled(beam->line.chord / (sum.re * sum.re + sum.im * sum.im), conjugate(sum));
+    correct_steps(beam, weights, moments, steps);
     for (int i = 0; i < N; i++) {
-        steps[i] = product(steps[i], factor);
         beam->whole[i] = scaled(weights[i], steps[i]);
     }
     for (int p = 0; p < beam->panel_count; p++) {
@@ -229,7 +283,6 @@ static Complex set_nodes(Beam *beam, const Section *sections, const double *x,
         }
         first += nodes;
     }
-    return factor;
 }
 
 /* --- cuts ------------------------------------------------------------------------------------- */
@@ -244,12 +297,16 @@ static void add_cut(Beam *beam, Section *sections, const Panel *panel, double x,
 /* Set the ranks of the cuts and their sections.  x (N,) are the nodes. */
 static void collect_cuts(Beam *beam, const double *x, Section *sections) {
     int i = 0, last = beam->panel_count - 1;
-    beam->cut_count = 0;
+    beam->cut_count = beam->smooth = beam->smooth_count = 0;
     add_cut(beam, sections, &beam->panels[0], -1.0, -1.0);
     for (int p = 0; p <= last; p++) {
         const Panel *panel = &beam->panels[p];
         double waist = 2.0; /* beyond the panel */
         bool ahead = waist_at(panel, &waist);
+        if (!panel->round && panel->nodes >= SUMMIT_NODES_MIN) {
+            beam->smooth = beam->cut_count;
+            beam->smooth_count = panel->nodes;
+        }
         for (int k = 0; k <= panel->nodes; k++) {
             if (ahead && (k == panel->nodes || x[i] > waist)) {
                 add_cut(beam, sections, panel, waist, i - 0.5);
@@ -282,9 +339,9 @@ static double arc_lengths(const Beam *beam, const Fine *fine, double *places) {
 }
 
 /* Set the cuts.  A beam with waists is straight: v is the arc length. */
-static void set_cuts(Beam *beam, const Fine *fine, const Section *sections, Complex factor,
-                     Scratch *scratch) {
+static void set_cuts(Beam *beam, const Fine *fine, const Section *sections, Scratch *scratch) {
     double *places = take(scratch, (size_t)beam->nodes);
+    Complex factor = direction_factor(beam->line);
     double length = arc_lengths(beam, fine, places);
     for (int k = 0; k < beam->cut_count; k++) {
         Cut *cut = &beam->cuts[k];
@@ -326,11 +383,12 @@ PRBM void set_beam(Beam *beam, Scratch *scratch) {
         }
     }
     Fine fine = fine_points(beam, scratch);
-    set_stretch(beam, &fine, sections);
-    Complex factor = set_nodes(beam, sections, x, weights, scratch);
     Section *cuts = take_sections(scratch, N + CUTS_BESIDE_NODES);
+    Complex *moments = take_complex(scratch, MOMENTS, 1);
     collect_cuts(beam, x, cuts);
-    set_cuts(beam, &fine, cuts, factor, scratch);
-    set_bending(beam, &fine, cuts, scratch);
+    set_cuts(beam, &fine, cuts, scratch);
+    set_bending(beam, &fine, cuts, moments, scratch);
+    set_nodes(beam, sections, x, weights, moments, scratch);
+    set_stretch(beam, &fine, sections);
     scratch->used = mark;
 }

@@ -33,6 +33,7 @@ typedef struct {
     int cut_count;
     Cut *cuts;         /* (cut_count,) from the start */
     double *moments;   /* (cut_count, order + 1) polynomials of the bending moment at the cuts */
+    int smooth, smooth_count; /* first cut, and number, of the nodes with a smooth stress */
 } Beam;
 
 /* Compute the nodes and weights (count,) of Gauss' quadrature from -1 to 1. */

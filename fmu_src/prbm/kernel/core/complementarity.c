@@ -248,6 +248,7 @@ PRBM bool coulomb(int k, int m, const double *W, const double *u, const double *
     int size = k + 3 * m;
     double *scale = take(scratch, (size_t)(k + m)), *M = take_matrix(scratch, size, size);
     double *q = take(scratch, (size_t)size), *limit = take(scratch, (size_t)m);
+    double *rates = take(scratch, (size_t)(k + m)); /* without round-off */
     bool solved = false;
     int first = 1; /* The first attempt leaves contacts out, if there are any. */
     for (int i = 0; i < k; i++) {
@@ -255,12 +256,13 @@ PRBM bool coulomb(int k, int m, const double *W, const double *u, const double *
     }
     for (int i = 0; i < k + m; i++) {
         double mobility = fabs(W[i * (k + m) + i]);
-        scale[i] = mobility > 0.0 ? 1.0 / sqrt(mobility) : 1.0;
+        rates[i] = fabs(u[i]) <= tolerance / 2 ? 0.0 : u[i];
+        scale[i] = mobility > 0.0 ? 1.0 / square_root(mobility) : 1.0;
     }
     for (int attempt = first; !solved && attempt < 3; attempt++) {
-        set_problem(k, m, W, u, friction, fixed, normal, scale, M, q);
+        set_problem(k, m, W, rates, friction, fixed, normal, scale, M, q);
         if (attempt == 0) {
-            leave_out(k, size, u, tolerance, M, q);
+            leave_out(k, size, rates, tolerance, M, q);
         }
         /* If only round-off excludes a solution: normal rates larger by half of the tolerance. */
         for (int i = 0; attempt == 2 && i < k; i++) {

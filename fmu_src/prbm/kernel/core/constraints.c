@@ -159,15 +159,83 @@ PRBM void saddle(int n, int r, const double *M, const double *columns, const dou
     }
 }
 
-PRBM bool solve(int size, double *kkt, double *right, Scratch *scratch, Problem *problem) {
+/* The scale of a coordinate is 1/sqrt(M_ii); where M is a stiffness with a smaller diagonal
+ * element, max_j M_ij^2 / max |M| replaces it.  The scale of a row makes its
+ * largest element one, diagonal elements included. */
+PRBM bool scales(int n, int r, const double *kkt, double length, double *scale) {
+    int size = n + r;
+    double most = 0.0;
+    for (int i = 0; i < n; i++) {
+        const double *row = kkt + i * size;
+        double longest = 0.0;
+        for (int j = 0; j < n; j++) {
+            longest = fabs(row[j]) > longest ? fabs(row[j]) : longest;
+        }
+        scale[i] = longest;
+        most = longest > most ? longest : most;
+    }
+    most = most > 0.0 ? most : 1.0;
+    for (int i = 0; i < n; i++) {
+        double square = greater(fabs(kkt[i * size + i]), scale[i] * scale[i] / most);
+        scale[i] = 1.0 / square_root(square > 0.0 ? square : most);
+    }
+    for (int k = n; k < size; k++) {
+        const double *row = kkt + k * size;
+        double longest = 0.0, scaled = 0.0;
+        for (int j = 0; j < n; j++) {
+            double entry = fabs(row[j]);
+            longest = entry > longest ? entry : longest;
+            scaled = entry * scale[j] > scaled ? entry * scale[j] : scaled;
+        }
+        if (!(longest > ROW_RTOL * length)) {
+            return false;
+        }
+        scale[k] = 1.0 / greater(scaled, square_root(fabs(row[k])));
+    }
+    return true;
+}
+
+PRBM ScaledFactors take_factors(Scratch *scratch, int size, double *kkt) {
+    ScaledFactors factors = {size, kkt, take(scratch, (size_t)size), take_integers(scratch, size)};
+    return factors;
+}
+
+PRBM bool factor_saddle(int n, int r, double length, const ScaledFactors *factors,
+                        Problem *problem) {
+    int size = factors->size;
+    double *lu = factors->lu;
+    bool regular = scales(n, r, lu, length, factors->scale);
+    for (int i = 0; regular && i < size; i++) {
+        const double own = factors->scale[i], *ALONE scale = factors->scale;
+        double *ALONE row = lu + i * size;
+        for (int j = 0; j < size; j++) {
+            row[j] *= own * scale[j];
+        }
+    }
+    regular = regular && lu_factor(size, lu, factors->pivots);
+    return regular || fail(problem, "%s", SINGULAR);
+}
+
+PRBM void solve_saddle(const ScaledFactors *factors, double *right) {
+    for (int i = 0; i < factors->size; i++) {
+        right[i] *= factors->scale[i];
+    }
+    lu_solve(factors->size, factors->lu, factors->pivots, right);
+    for (int i = 0; i < factors->size; i++) {
+        right[i] *= factors->scale[i];
+    }
+}
+
+PRBM bool solve(int n, int r, double *kkt, double *right, double length, Scratch *scratch,
+                Problem *problem) {
     size_t mark = scratch->used;
-    int *pivot = (int *)take(scratch, (size_t)size);
-    bool regular = lu_factor(size, kkt, pivot);
+    ScaledFactors factors = take_factors(scratch, n + r, kkt);
+    bool regular = factor_saddle(n, r, length, &factors, problem);
     if (regular) {
-        lu_solve(size, kkt, pivot, right);
+        solve_saddle(&factors, right);
     }
     scratch->used = mark;
-    return regular || fail(problem, "%s", SINGULAR);
+    return regular;
 }
 
 /* --- projection ------------------------------------------------------------------------------- */
@@ -197,7 +265,7 @@ PRBM bool project_positions(const System *system, const Rows *rows, double *q, c
             for (size_t k = 0; k < r; k++) {
                 right[n + k] = -s[k];
             }
-            ok = solve((int)size, kkt, right, scratch, problem);
+            ok = solve((int)n, (int)r, kkt, right, length, scratch, problem);
             for (size_t i = 0; ok && i < n; i++) {
                 q[i] += right[i];
             }
@@ -215,8 +283,8 @@ PRBM bool project_positions(const System *system, const Rows *rows, double *q, c
 }
 
 PRBM bool project_velocities(int n, int r, const double *M, const double *rows,
-                             const double *rates, double *v, double *impulses, Scratch *scratch,
-                             Problem *problem) {
+                             const double *rates, double *v, double *impulses, double length,
+                             Scratch *scratch, Problem *problem) {
     size_t mark = scratch->used, size = (size_t)(n + r);
     double *kkt = take(scratch, size * size), *right = take(scratch, size);
     memset(right, 0, (size_t)n * sizeof *right);
@@ -227,7 +295,7 @@ PRBM bool project_velocities(int n, int r, const double *M, const double *rows,
     for (size_t k = (size_t)n; impulses && k < size; k++) {
         kkt[k * size + k] -= impulses[k - (size_t)n];
     }
-    bool regular = solve((int)size, kkt, right, scratch, problem);
+    bool regular = solve(n, r, kkt, right, length, scratch, problem);
     for (int i = 0; regular && i < n; i++) {
         v[i] += right[i];
     }

@@ -35,8 +35,28 @@ PRBM void jacobian(const Rows *rows, const Complex *e, double *result); /* (coun
 /* Set kkt (n + r, n + r) to [[M, columns^T], [rows, 0]]. */
 PRBM void saddle(int n, int r, const double *M, const double *columns, const double *rows,
                  double *kkt);
-/* Solve a saddle-point system by LU; right (n + r,) is replaced by the solution. */
-PRBM bool solve(int size, double *kkt, double *right, Scratch *scratch, Problem *problem);
+/* A factored saddle-point matrix P D kkt D = L U, with scales D that make it independent of the
+ * units. */
+typedef struct {
+    int size;
+    double *lu, *scale; /* (size, size), (size,) */
+    int *pivots;        /* (size,) */
+} ScaledFactors;
+
+/* Compute the scales (n + r,) of a saddle-point matrix.  Return false if all elements of a row are
+ * round-off in a mechanism of a length [m]. */
+PRBM bool scales(int n, int r, const double *kkt, double length, double *scale);
+/* Allocate factors of a saddle-point matrix (n + r, n + r) kkt. */
+PRBM ScaledFactors take_factors(Scratch *scratch, int size, double *kkt);
+/* Factor the matrix that factors->lu contains.  Fail if a row has vanished, or a pivot is
+ * round-off. */
+PRBM bool factor_saddle(int n, int r, double length, const ScaledFactors *factors,
+                        Problem *problem);
+/* Replace right (n + r,) by the solution. */
+PRBM void solve_saddle(const ScaledFactors *factors, double *right);
+/* Solve a saddle-point system; kkt is overwritten, right (n + r,) replaced by the solution. */
+PRBM bool solve(int n, int r, double *kkt, double *right, double length, Scratch *scratch,
+                Problem *problem);
 /* Project q (n,) onto the rows with the constants c (count,), and set e to the directions of q. */
 PRBM bool project_positions(const System *system, const Rows *rows, double *q, const double *c,
                             Complex *e, Scratch *scratch, Problem *problem);
@@ -44,8 +64,8 @@ PRBM bool project_positions(const System *system, const Rows *rows, double *q, c
  * NULL.  On entry it has the mobilities [1/kg] of the walls: an impulse P changes the rate of its
  * row by mobility times P.  On return it has the impulses [N s]. */
 PRBM bool project_velocities(int n, int r, const double *M, const double *rows,
-                             const double *rates, double *v, double *impulses, Scratch *scratch,
-                             Problem *problem);
+                             const double *rates, double *v, double *impulses, double length,
+                             Scratch *scratch, Problem *problem);
 PRBM int seen_from(const Rows *rows, int i);
 PRBM Complex seen_value(const Rows *rows, int i, const Complex *e);
 PRBM Complex swing(const Rows *rows, int i, const Complex *e, const double *v);

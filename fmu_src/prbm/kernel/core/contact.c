@@ -10,23 +10,51 @@
 #include "core/matrix.h"
 
 PRBM bool response(int n, int r, int k, const double *M, const double *held, const double *rows,
-                   double *X, Scratch *scratch, Problem *problem) {
+                   double length, double *X, Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
     int size = n + r;
     double *kkt = take_matrix(scratch, size, size), *right = take(scratch, (size_t)size);
-    bool solved = true;
+    ScaledFactors factors = take_factors(scratch, size, kkt);
+    saddle(n, r, M, held, held, kkt);
+    bool solved = factor_saddle(n, r, length, &factors, problem);
     for (int j = 0; solved && j < k; j++) {
-        saddle(n, r, M, held, held, kkt);
         for (int i = 0; i < size; i++) {
             right[i] = i < n ? rows[j * n + i] : 0.0;
         }
-        solved = solve(size, kkt, right, scratch, problem);
+        solve_saddle(&factors, right);
         for (int i = 0; i < n; i++) {
             X[i * k + j] = right[i];
         }
     }
     scratch->used = used;
     return solved;
+}
+
+PRBM double least_mobility(int n, const double *M, const double *row, double length) {
+    double free = 0.0, heaviest = 0.0, round_off = ROW_RTOL * length;
+    for (int j = 0; j < n; j++) {
+        free += row[j] * row[j] / M[j * n + j];
+        heaviest = greater(heaviest, M[j * n + j]);
+    }
+    return greater(SINGULAR_RTOL * free, round_off * round_off / heaviest);
+}
+
+PRBM void contact_mobility(int n, int k, const double *M, const double *rows, const double *X,
+                           double length, double *W) {
+    for (int a = 0; a < k; a++) {
+        for (int b = 0; b < k; b++) {
+            W[a * k + b] = 0.0;
+            for (int j = 0; j < n; j++) {
+                W[a * k + b] += rows[a * n + j] * X[j * k + b];
+            }
+        }
+    }
+    for (int a = 0; a < k; a++) {
+        double least = least_mobility(n, M, rows + a * n, length);
+        for (int b = 0; fabs(W[a * k + a]) <= least && b < k; b++) {
+            W[a * k + b] = W[b * k + a] = 0.0;
+        }
+    }
 }
 
 /* --- without friction ------------------------------------------------------------------------- */
@@ -118,7 +146,7 @@ static double impulse_to_end(double u_n, double du_n, double work_left) {
     if (root < 0.0) {
         return -u_n / du_n;
     }
-    double total = u_n + sqrt(root);
+    double total = u_n + square_root(root);
     return total > 0.0 ? 2.0 * work_left / total : HUGE_VAL;
 }
 
@@ -203,7 +231,7 @@ PRBM bool stronge(const double *W, const double *u, double friction, double rest
                   double speed, double *P_n, double *P_t, Problem *problem) {
     Hit hit = {.nn = W[0], .nt = W[1], .tt = W[3], .friction = friction, .u_n = u[0], .u_t = u[1]};
     /* Magnitude of the sliding speed that corresponds to the closing rate. */
-    double slide = hit.nn > 0.0 ? fabs(hit.u_n) * sqrt(hit.tt / hit.nn) : 0.0;
+    double slide = hit.nn > 0.0 ? fabs(hit.u_n) * square_root(hit.tt / hit.nn) : 0.0;
     double small_n = ZERO_SPEED_RTOL * fabs(hit.u_n);
     double small_t = ZERO_SPEED_RTOL * (fabs(hit.u_t) + slide);
     double work = compress(&hit);

@@ -589,6 +589,7 @@ SIZED bool factor_motion(int even, const Equations *q, Evaluation *result) {
         return false;
     }
     result->factors.Z_columns = result->factors.Z;
+    result->factors.least = q->system->least_mobility;
     if (q->slipping_stops > 0) {
         set_columns(q, result);
     }

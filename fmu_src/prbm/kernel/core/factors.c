@@ -1,4 +1,6 @@
 /* Factors of a saddle-point matrix, block by block, for repeated solution. */
+#include <math.h>
+
 #include "core/factors.h"
 #include "core/matrix.h"
 #include "core/vectors.h"
@@ -9,7 +11,8 @@ static inline int first_column(int apart, int row) {
 }
 
 /* Factor M = L D L^T from its lower triangle, with ones on the diagonal of L; inverse is 1/D.
- * Return false if M is not positive definite. */
+ * Return false if M is not positive definite: a pivot may not be round-off of its diagonal
+ * element. */
 SHARED bool factor_any(int size, int apart, const double *ALONE M, double *ALONE L,
                        double *ALONE inverse) {
     for (int i = 0; i < size; i++) {
@@ -29,7 +32,7 @@ SHARED bool factor_any(int size, int apart, const double *ALONE M, double *ALONE
             pivot -= share * L[i * size + j];
             L[i * size + j] = share;
         }
-        if (!(pivot > 0.0)) {
+        if (!(pivot > SINGULAR_RTOL * M[i * size + i])) {
             return false;
         }
         inverse[i] = 1.0 / pivot;
@@ -63,7 +66,7 @@ SHARED bool factor_known(int size, int apart, const double *ALONE M, double *ALO
                 L[i * size + j] = share;
             }
         }
-        if (!(pivot > 0.0)) {
+        if (!(pivot > SINGULAR_RTOL * M[i * size + i])) {
             return false;
         }
         inverse[i] = 1.0 / pivot;
@@ -75,16 +78,18 @@ RARE bool factor(int size, const double *M, double *L, double *inverse) {
     return factor_any(size, 0, M, L, inverse);
 }
 
-/* Limits of the products of pivots in small_factor, beyond which they may underflow or overflow. */
+/* Limits in small_factor: of the products of pivots, beyond which they may underflow or overflow,
+ * and of the sum of the diagonal elements over their pivots. */
 #define LEAST_MULTIPLE 1e-280
 #define LARGEST_MULTIPLE 1e280
+#define LARGEST_RATIO (1.0 / SINGULAR_RTOL)
 
 /* Factor M, of a size up to SMALL, like factor_any, but with all divisions at the end, so that they
  * overlap in time.  Elimination without divisions computes w_k = w_0 w_1 ... w_(k-1) D_k on the
  * diagonal, with w_0 = D_0, and w_k L_ik below it.  Return false if M is not positive definite, or
  * if a product may underflow or overflow; factor may then succeed. */
 SHARED bool small_factor(int size, const double *ALONE M, double *ALONE L, double *ALONE inverse) {
-    double w[SMALL][SMALL], multiple = 1.0;
+    double w[SMALL][SMALL], multiple = 1.0, ratios = 0.0;
     bool safe;
     UNROLLED
     for (int i = 0; i < size; i++) {
@@ -120,7 +125,11 @@ SHARED bool small_factor(int size, const double *ALONE M, double *ALONE L, doubl
             }
         }
     }
-    return safe;
+    UNROLLED
+    for (int k = 0; k < size; k++) {
+        ratios += inverse[k] * M[k * size + k];
+    }
+    return safe && ratios < LARGEST_RATIO; /* If one is too large, factor rejects M. */
 }
 
 /* Copy the values of a block to its place in a vector, in pairs if start is even. */
@@ -228,10 +237,11 @@ static void backward_all(const Factors *factors, double *x) {
 }
 
 /* Compute the lower triangle of S = Z D^-1 Z^T, with the D of M, and factor S = L_S D_S L_S^T.
- * L_S (r, r) and 1/D_S (r,) are stored behind S. */
+ * L_S (r, r) and 1/D_S (r,) are stored behind S.  Return false if S is singular. */
 SIZED bool schur_of_size(int r, int even, Factors *factors) {
     const double *Z = factors->Z, *inverse = factors->inverse;
     double *S = factors->S, *L = S + r * r;
+    bool rows = true;
     Lanes sum[SMALL * SMALL][SUMS] = {{NO_LANES}};
     UNROLLED_BY_LANES
     for (int j = 0; j < even; j += LANES) {
@@ -250,25 +260,52 @@ SIZED bool schur_of_size(int r, int even, Factors *factors) {
     UNROLLED
     for (int i = 0; i < r * r; i++) {
         S[i] = total(sum[i]);
+        rows = rows && (i % (r + 1) != 0 || S[i] > factors->least);
     }
-    return small_factor(r, S, L, L + r * r) || factor(r, S, L, L + r * r);
+    return rows && (small_factor(r, S, L, L + r * r) || factor(r, S, L, L + r * r));
 }
 
-/* Compute S, and factor it by LU: for an S that is larger than SMALL, or not symmetric because a
- * stop slides and the columns differ from the rows. */
+/* Return Z_i D^-1 column. */
+static double metric_product(const Factors *factors, int i, const double *column) {
+    const double *row = factors->Z + i * factors->even;
+    double sum = 0.0;
+    for (int j = 0; j < factors->even; j++) {
+        sum += row[j] * factors->inverse[j] * column[j];
+    }
+    return sum;
+}
+
+/* Compute S, scale it by the lengths of the rows Z, and factor it by LU: for an S that is larger
+ * than SMALL, or not symmetric because a stop slides and the columns differ from the rows.  The
+ * scales (r,) are stored behind S. */
 static bool factor_unsymmetric(Factors *factors) {
     int even = factors->even, r = factors->r;
+    double *scale = factors->S + r * r;
+    bool rows = true;
     for (int i = 0; i < r; i++) {
+        double square = metric_product(factors, i, factors->Z + i * even);
+        rows = rows && square > factors->least;
+        scale[i] = 1.0 / square_root(square);
+    }
+    for (int i = 0; i < r && rows; i++) {
         for (int k = 0; k < r; k++) {
-            const double *row = factors->Z + i * even, *column = factors->Z_columns + k * even;
-            double sum = 0.0;
-            for (int j = 0; j < even; j++) {
-                sum += row[j] * factors->inverse[j] * column[j];
-            }
-            factors->S[i * r + k] = sum;
+            double sum = metric_product(factors, i, factors->Z_columns + k * even);
+            factors->S[i * r + k] = scale[i] * sum * scale[k];
         }
     }
-    return lu_factor(r, factors->S, factors->pivots);
+    return rows && lu_factor(r, factors->S, factors->pivots);
+}
+
+/* Solve S lam = b with the factors of factor_unsymmetric.  On entry lam contains b. */
+static void unsymmetric_multipliers(const Factors *factors, double *lam) {
+    const double *scale = factors->S + factors->r * factors->r;
+    for (int k = 0; k < factors->r; k++) {
+        lam[k] *= scale[k];
+    }
+    lu_solve(factors->r, factors->S, factors->pivots, lam);
+    for (int k = 0; k < factors->r; k++) {
+        lam[k] *= scale[k];
+    }
 }
 
 /* Compute and factor S for vectors of the padded length even. */
@@ -337,7 +374,7 @@ SIZED void constrain_of_size(int r, int even, const Factors *factors, double *AL
     if (factors->symmetric) {
         multipliers_of_size(r, factors->S, lam);
     } else {
-        lu_solve(r, factors->S, factors->pivots, lam);
+        unsymmetric_multipliers(factors, lam);
     }
     UNROLLED_BY_LANES
     for (int j = 0; j < even; j += LANES) {

@@ -12,14 +12,16 @@ typedef struct {
     double *L;                  /* lower triangles of the blocks, consecutive */
     double *inverse;            /* (even,) 1/D */
     double *Z, *Z_columns;      /* (r, even); Z_columns = L^-1 columns^T, Z itself if symmetric */
-    double *S;                  /* (r, r), and memory for its factor */
+    double *S;                  /* (r, r), and memory for its factor, or its scales */
     int *pivots;                /* (r,) */
+    double least;               /* square of the shortest row Z that is not round-off */
     bool symmetric;             /* S is symmetric and small: factor L D L^T, else LU */
 } Factors;
 
 typedef enum { BACKWARD, FORWARD } Substitution;
 
-/* Compute S from Z and Z_columns, and factor it. */
+/* Compute S from Z and Z_columns, and factor it.  Return false if S is singular, or a row is
+ * round-off. */
 PRBM bool factor_schur(Factors *factors);
 /* Solve with existing factors.  The right sides x (even,) and lam (r,) are replaced by the solution
  * and the multipliers. */

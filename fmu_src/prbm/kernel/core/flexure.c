@@ -50,10 +50,11 @@ PRBM int links_of(const FlexureType *model, int type_at_start, int type_at_end) 
     return type_at_start == FREE || type_at_end == FREE ? model->pivots - 1 : model->pivots;
 }
 
-/* Every link of a chain stretches; of other flexures, link n / 2, rounded down: the middle one, or
- * the one after the middle. */
-PRBM bool stretches(const FlexureType *model, int i, int n) {
-    return model->axial && (model->links > 0 || i == n / 2);
+/* Every link of a chain stretches; of other flexures, link n / 2 from a clamp, rounded down: the
+ * middle one, or the one after the middle. */
+PRBM bool stretches(const FlexureType *model, int type_at_start, int i, int n) {
+    int middle = type_at_start == CLAMP ? n / 2 : n - 1 - n / 2;
+    return model->axial && (model->links > 0 || i == middle);
 }
 
 /* Set the segments of a chain of equal links. */
@@ -134,7 +135,7 @@ PRBM bool segments(const FlexureType *model, const double *gamma, const double *
     }
     for (int i = 0; i < n; i++) {
         double stiffness = (model->links > 0 ? model->links : 1) * EA / L;
-        result->axial[i] = stretches(model, i, n) ? stiffness : 0.0;
+        result->axial[i] = stretches(model, type_at_start, i, n) ? stiffness : 0.0;
     }
     return true;
 }

@@ -22,7 +22,7 @@ PRBM void reverse(int count, double *x);
 /* Return the number of links of a flexure.  The types of its ends are CLAMP, PIN or FREE. */
 PRBM int links_of(const FlexureType *model, int type_at_start, int type_at_end);
 /* Return whether link i of the n links, counted from 0, stretches. */
-PRBM bool stretches(const FlexureType *model, int i, int n);
+PRBM bool stretches(const FlexureType *model, int type_at_start, int i, int n);
 /* Compute the segments of a flexure with the length L [m], the bending stiffness EI [N m^2], the
  * mass [kg] and the axial stiffness EA [N].  Return false if the links are longer than the flexure.
  * result points to memory for the arrays. */

@@ -144,6 +144,7 @@ PRBM void keep_links(System *system, const Step *step, const Segments *pieces, C
     const double identity[4] = {1.0, 0.0, 0.0, 1.0};
     body->order = 0;
     body->sections = n + 3;
+    body->smooth = body->smooth_count = 0;
     body->arm_count = 2;
     body->arms[0] = owners[0];
     body->arms[1] = owners[n + 1];
@@ -226,6 +227,8 @@ PRBM void keep_beam(System *system, const Step *step, const Beam *beam, Complex 
     int N = beam->nodes, terms = beam->order + 1, stride = kind->axial ? 2 : 1;
     body->order = beam->order;
     body->sections = beam->cut_count;
+    body->smooth = beam->smooth;
+    body->smooth_count = beam->smooth_count;
     body->arm_count = N;
     body->angles[0] = ends[0];
     body->angles[1] = ends[1];

@@ -41,7 +41,7 @@ static Addition beam_addition(const FlexureType *kind, const Flexure *flexure) {
 static Addition links_addition(const Mechanism *m, const Flexure *flexure) {
     int links = link_count(m, flexure), strains = 0;
     for (int k = 0; k < links; k++) {
-        strains += stretches(kind_of(m, flexure), k, links);
+        strains += stretches(kind_of(m, flexure), flexure->type_at_start, k, links);
     }
     Addition result = {links, strains, links, strains, links + strains + 1, 2 * links + 4,
                        links + strains};
@@ -245,7 +245,7 @@ static void add_coordinates(const Mechanism *m, Walk *walk, Step *step) {
     int count = flexure ? link_count(m, flexure) : 0;
     for (int k = 0; k < count; k++) {
         int i = step->backwards ? count - 1 - k : k;
-        add_link(walk, stretches(kind_of(m, flexure), i, count));
+        add_link(walk, stretches(kind_of(m, flexure), flexure->type_at_start, i, count));
     }
     if (!step->closes) {
         add_body_direction(walk, add_body_angle(walk, far));

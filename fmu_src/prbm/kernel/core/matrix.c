@@ -73,13 +73,16 @@ PRBM void exchange(int n, double *a, double *b) {
 
 /* The diagonal of U is stored inverted, for lu_solve. */
 PRBM bool lu_factor(int n, double *a, int *pivot) {
+    double least = HUGE_VAL, most = 0.0;
     for (int k = 0; k < n; k++) {
         double *row = a + k * n;
         pivot[k] = largest_below(n, a, k);
         if (pivot[k] != k) {
             exchange(n, row, a + pivot[k] * n);
         }
-        if (!(fabs(row[k]) > 0.0)) {
+        least = lesser(least, fabs(row[k]));
+        most = greater(most, fabs(row[k]));
+        if (!(least > SINGULAR_RTOL * most)) {
             return false;
         }
         row[k] = 1.0 / row[k];
@@ -118,10 +121,10 @@ PRBM bool cholesky(int n, double *a) {
             row[j] = (row[j] - dot(j, row, a + j * n)) * a[j * n + j];
         }
         double square = row[i] - dot(i, row, row);
-        if (!(square > 0.0)) {
+        if (!(square > SINGULAR_RTOL * row[i])) {
             return false;
         }
-        row[i] = 1.0 / sqrt(square);
+        row[i] = 1.0 / square_root(square);
     }
     return true;
 }
@@ -145,8 +148,8 @@ PRBM void backward(int n, const double *a, double *b) {
  * its two solutions the smaller angle is chosen. */
 static void small_rotation(double pp, double pq, double qq, double *c, double *s) {
     double slope = (qq - pp) / (2.0 * pq);
-    double t = (slope >= 0.0 ? 1.0 : -1.0) / (fabs(slope) + sqrt(1.0 + slope * slope));
-    *c = 1.0 / sqrt(1.0 + t * t);
+    double t = (slope >= 0.0 ? 1.0 : -1.0) / (fabs(slope) + square_root(1.0 + slope * slope));
+    *c = 1.0 / square_root(1.0 + t * t);
     *s = t * *c;
 }
 
@@ -172,7 +175,7 @@ static bool orthogonalise(int k, int n, double *g, double *v) {
                 double *p = g + i * n, *q = g + j * n;
                 double pp = dot(n, p, p), pq = dot(n, p, q), qq = dot(n, q, q);
                 bool small = pp <= noise * noise || qq <= noise * noise;
-                if (small || !(fabs(pq) > n * DBL_EPSILON * sqrt(pp) * sqrt(qq))) {
+                if (small || !(fabs(pq) > n * DBL_EPSILON * square_root(pp) * square_root(qq))) {
                     continue;
                 }
                 double c, s;
@@ -204,7 +207,7 @@ static void wide(int m, int n, const double *a, double *g) {
 }
 
 static double norm(int n, const double *x) {
-    return sqrt(dot(n, x, x));
+    return square_root(dot(n, x, x));
 }
 
 /* Compute the singular values s (k,), k = min(m, n), of a = sum s_i v_i u_i^T.  If m > n, a^T
@@ -269,7 +272,7 @@ static bool jacobi_sweeps(int n, double *a, double *z) {
         turned = false;
         for (int p = 0; p < n; p++) {
             for (int q = p + 1; q < n; q++) {
-                double size = sqrt(fabs(a[p * n + p])) * sqrt(fabs(a[q * n + q]));
+                double size = square_root(fabs(a[p * n + p])) * square_root(fabs(a[q * n + q]));
                 if (fabs(a[p * n + q]) > 0.25 * DBL_EPSILON * size + negligible) {
                     jacobi_rotation(n, a, z, p, q);
                     turned = true;
@@ -326,7 +329,7 @@ static void householder(int n, double *x) {
         x[i] /= length;
     }
     x[0] += x[0] >= 0.0 ? 1.0 : -1.0;
-    double scale = 1.0 / sqrt(fabs(x[0])); /* |x|^2 = 2 |x_0| */
+    double scale = 1.0 / square_root(fabs(x[0])); /* |x|^2 = 2 |x_0| */
     for (int i = 0; i < n; i++) {
         x[i] *= scale;
     }

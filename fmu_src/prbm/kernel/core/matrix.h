@@ -8,11 +8,12 @@ PRBM double dot(int n, const double *a, const double *b);
 PRBM void copy(int n, const double *from, double *to);
 PRBM void zeros(int n, double *x);
 PRBM void add_scaled(int n, double a, const double *x, double *y); /* y += a x */
-/* Factorise by LU with partial pivoting, in place; false if a pivot is zero or NaN. */
+/* Factorise by LU with partial pivoting, in place; false if a pivot is NaN, or so small beside the
+ * largest that it is round-off.  The elements of a should be scaled. */
 PRBM bool lu_factor(int n, double *a, int *pivot);
 PRBM void lu_solve(int n, const double *a, const int *pivot, double *b);
-/* Factorise a symmetric matrix as L L^T by Cholesky's method; false if a pivot is not positive. 
- * The lower triangle is read and overwritten by L; the diagonal is stored inverted. */
+/* Factorise a symmetric matrix as L L^T by Cholesky's method; false if a pivot is not positive, or
+ * round-off of its diagonal element.  The lower triangle is read and overwritten by L; the diagonal is stored inverted. */
 PRBM bool cholesky(int n, double *a);
 PRBM void forward(int n, const double *a, double *b);  /* b := L^-1 b */
 PRBM void backward(int n, const double *a, double *b); /* b := L^-T b */

@@ -85,13 +85,28 @@ static void gravity_row(const System *system, Complex *w) {
     spread(system, 1, w, w);
 }
 
-/* Compute a basis Z (n, k) of the motions that the loops allow. */
-static void tangent_space(const System *system, const Complex *e, double *Z, Scratch *scratch) {
+/* Compute a basis Z (n, k) of the motions that the loops allow.  It is orthonormal in coordinates of
+ * unit inertia, so that it does not depend on how the inertias differ. */
+static void tangent_space(const System *system, const Complex *e, const double *M, double *Z,
+                          Scratch *scratch) {
     size_t used = scratch->used;
-    double *rows = take_matrix(scratch, system->r, system->n);
-    Rows loops = plain_rows(system, system->r, system->loops, system->loops_c);
+    int n = system->n, r = system->r, k = n - r;
+    double *rows = take_matrix(scratch, r, n);
+    Rows loops = plain_rows(system, r, system->loops, system->loops_c);
     jacobian(&loops, e, rows);
-    null_space(system->r, system->n, rows, Z, scratch);
+    for (int j = 0; j < n; j++) {
+        double scale = 1.0 / square_root(M[j * n + j]);
+        for (int i = 0; i < r; i++) {
+            rows[i * n + j] *= scale;
+        }
+    }
+    null_space(r, n, rows, Z, scratch);
+    for (int j = 0; j < n; j++) {
+        double scale = 1.0 / square_root(M[j * n + j]);
+        for (int i = 0; i < k; i++) {
+            Z[j * k + i] *= scale;
+        }
+    }
     scratch->used = used;
 }
 
@@ -111,13 +126,13 @@ static bool modes_about(const System *system, const double *q, int r, const Comp
     mass_matrix(system, e, M, scratch);
     gravity_row(system, w);
     tangent_stiffness(system, r, w, B, lam, e, K_t);
-    tangent_space(system, e, Z, scratch);
+    tangent_space(system, e, M, Z, scratch);
     congruent(n, k, Z, K_t, K_z, scratch);
     congruent(n, k, Z, M, M_z, scratch);
     bool found = generalised_eigen(k, K_z, M_z, frequency, reduced, scratch, problem);
     for (int j = 0; found && j < k; j++) {
         double omega2 = frequency[j];
-        frequency[j] = (omega2 < 0.0 ? -1.0 : 1.0) * sqrt(fabs(omega2)) / FULL_TURN;
+        frequency[j] = (omega2 < 0.0 ? -1.0 : 1.0) * square_root(fabs(omega2)) / FULL_TURN;
         for (int i = 0; i < n; i++) {
             phi[i * k + j] = 0.0;
             for (int l = 0; l < k; l++) {
@@ -145,18 +160,57 @@ PRBM bool modes(const System *system, const Equilibrium *shape, double *frequenc
     return found;
 }
 
+/* Compute the frequencies (k,) about the equilibrium under gravity. */
+static bool resting_frequencies(const System *system, double *frequencies, Scratch *scratch,
+                                Problem *problem) {
+    size_t used = scratch->used;
+    int n = system->n, r = system->r;
+    Equilibrium shape = {take(scratch, (size_t)n), take(scratch, (size_t)r), 0.0};
+    double *phi = take_matrix(scratch, n, n - r);
+    bool found = equilibrium(system, false, 0.0, &shape, scratch, problem) &&
+                 modes(system, &shape, frequencies, phi, scratch, problem);
+    scratch->used = used;
+    return found;
+}
+
 /* The frequency is 0 if the equilibrium under gravity is unstable. */
 PRBM bool fundamental_frequency(const System *system, double *frequency, Scratch *scratch,
                                 Problem *problem) {
     size_t used = scratch->used;
-    int n = system->n, r = system->r, k = n - r;
-    Equilibrium shape = {take(scratch, (size_t)n), take(scratch, (size_t)r), 0.0};
-    double *frequencies = take(scratch, (size_t)k), *phi = take_matrix(scratch, n, k);
-    bool found = equilibrium(system, false, 0.0, &shape, scratch, problem) &&
-                 modes(system, &shape, frequencies, phi, scratch, problem);
+    int k = system->n - system->r;
+    double *frequencies = take(scratch, (size_t)k);
+    bool found = resting_frequencies(system, frequencies, scratch, problem);
     if (found) {
         bool bends = frequencies[0] > ZERO_FREQUENCY_RTOL * largest(k, frequencies);
         *frequency = bends ? frequencies[0] : 0.0;
+    }
+    scratch->used = used;
+    return found;
+}
+
+/* The scale of velocities is the rate of the most unstable mode; otherwise, if a motion deforms no
+ * spring and lifts no weight, that of a fall or of the motion at the release, or the lowest angular
+ * frequency above 0.  The scale of times is the same, or that frequency if it is larger. */
+PRBM bool slow_rates(const System *system, double *rate, double *fast, Scratch *scratch,
+                     Problem *problem) {
+    size_t used = scratch->used;
+    int k = system->n - system->r, j = 0;
+    double *frequencies = take(scratch, (size_t)k);
+    bool found = resting_frequencies(system, frequencies, scratch, problem);
+    if (found) {
+        double least = ZERO_FREQUENCY_RTOL * largest(k, frequencies);
+        double speed = fabs(evaluate(system->mechanism->release.velocity, system->values));
+        double fall = square_root(modulus(system->gravity) / system->length);
+        while (j < k && !(frequencies[j] > least)) {
+            j++;
+        }
+        double lowest = j < k ? FULL_TURN * frequencies[j] : 0.0;
+        *rate = greater(fall, speed / system->length);
+        *rate = *rate > 0.0 ? *rate : lowest > 0.0 ? lowest : SPRINGLESS_RATE;
+        *fast = greater(*rate, lowest);
+        if (frequencies[0] < -least) {
+            *rate = *fast = -FULL_TURN * frequencies[0];
+        }
     }
     scratch->used = used;
     return found;
@@ -184,7 +238,7 @@ static bool resting_multipliers(const System *system, const double *q, const Com
     add_loads(system, w, e, right);
     zeros(r, right + n);
     saddle(n, r, M, rows, rows, kkt);
-    bool found = solve(size, kkt, right, scratch, problem);
+    bool found = solve(n, r, kkt, right, system->length, scratch, problem);
     for (int i = 0; i < r; i++) {
         lam[i] = -right[n + i];
     }

@@ -9,6 +9,10 @@ PRBM bool modes(const System *system, const Equilibrium *shape, double *frequenc
                 Scratch *scratch, Problem *problem);
 PRBM bool fundamental_frequency(const System *system, double *frequency, Scratch *scratch,
                                 Problem *problem);
+/* Compute the rates [rad/s] of a mechanism without a fundamental frequency: the scales of velocities
+ * and of times. */
+PRBM bool slow_rates(const System *system, double *rate, double *fast, Scratch *scratch,
+                     Problem *problem);
 /* Compute the fundamental mode phi (n,) and the mass matrix M (n, n) at a shape. */
 PRBM bool fundamental_at(const System *system, const double *q, double *phi, double *M,
                          Scratch *scratch, Problem *problem);

@@ -252,6 +252,12 @@ PRBM double phase(Complex z) {
 
 /* --- checks ----------------------------------------------------------------------------------- */
 
+PRBM double spacing(double x) {
+    int exponent;
+    (void)frexp(x, &exponent);
+    return x != 0.0 ? ldexp(1.0, exponent - 53) : ldexp(1.0, -1074);
+}
+
 PRBM bool finite_number(double x) {
     return x - x == 0.0;
 }
@@ -304,7 +310,7 @@ PRBM Complex scaled(double x, Complex a) {
 }
 
 PRBM double modulus(Complex a) {
-    return sqrt(a.re * a.re + a.im * a.im);
+    return square_root(a.re * a.re + a.im * a.im);
 }
 
 PRBM Complex unit(double degrees) {

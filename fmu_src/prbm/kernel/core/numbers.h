@@ -2,7 +2,23 @@
 #ifndef PRBM_NUMBERS_H
 #define PRBM_NUMBERS_H
 
+#include <math.h>
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
+
 #include "core/platform.h"
+
+/* Return the square root, rounded once.  The function sqrt of some C libraries (MinGW) computes with
+ * more digits and rounds twice; without optimization a compiler calls it. */
+static inline double square_root(double x) {
+#if defined(__SSE2__)
+    __m128d pair = _mm_set_sd(x);
+    return _mm_cvtsd_f64(_mm_sqrt_sd(pair, pair));
+#else
+    return sqrt(x);
+#endif
+}
 
 typedef struct {
     double re, im;
@@ -19,6 +35,7 @@ PRBM double natural_log(double x);                          /* x > 0 */
 PRBM double exponential(double x);
 PRBM double power(double x, double y);                      /* x^y for x > 0 */
 PRBM double phase(Complex z);                               /* as cmath.phase, in (-pi, pi] */
+PRBM double spacing(double x); /* The distance from the next floating-point number. */
 PRBM bool finite_number(double x);
 PRBM double largest(int n, const double *x);                /* max |x_i|; 0 if n = 0 */
 PRBM double greater(double a, double b); /* b unless a > b. */

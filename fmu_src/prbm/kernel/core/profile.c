@@ -14,21 +14,22 @@ static double hyperbolic_cosine(double x) {
 }
 
 static double inverse_sine(double x) {
-    return phase(complex_of(sqrt(1.0 - x * x), x));
+    return phase(complex_of(square_root(1.0 - x * x), x));
 }
 
 static double inverse_cosine(double x) {
-    return phase(complex_of(x, sqrt(1.0 - x * x)));
+    return phase(complex_of(x, square_root(1.0 - x * x)));
 }
 
 static double inverse_hyperbolic_sine(double x) {
-    double root = sqrt(1.0 + x * x);
+    double root = square_root(1.0 + x * x);
     return x < 0.0 ? -natural_log(root - x) : natural_log(root + x);
 }
 
 /* Set tau at the start and the end of a round panel; return the factor c w. */
 static double round_range(const Panel *panel, double *first, double *last) {
-    double pole = 2.0 * inverse_hyperbolic_sine(sqrt(panel->thickness[0] / (4.0 * panel->axes[1])));
+    double ratio = panel->thickness[0] / (4.0 * panel->axes[1]);
+    double pole = 2.0 * inverse_hyperbolic_sine(square_root(ratio));
     double scale = NOTCH_PEAK_FACTOR * pole;
     *first = inverse_hyperbolic_sine(panel->angles[0] / scale);
     *last = inverse_hyperbolic_sine(panel->angles[1] / scale);
@@ -50,7 +51,8 @@ PRBM bool waist_at(const Panel *panel, double *x) {
 }
 
 PRBM void concentration(double thickness, double radius, double *pulled, double *bent) {
-    double x = 0.5 * thickness / radius, root = sqrt(x), angle = phase(complex_of(1.0, root));
+    double x = 0.5 * thickness / radius, root = square_root(x);
+    double angle = phase(complex_of(1.0, root));
     *pulled = 2.0 * (x + 1.0) * root / ((x + 1.0) * angle + root);
     if (x < CONCENTRATION_SERIES_MAX) {
         *bent = 1.0 + 2.0 * x / 5;
@@ -156,7 +158,7 @@ PRBM double line_length(Line line) {
     if (half != 0.0) {
         return line.chord * inverse_sine(half) / half;
     }
-    return sqrt(line.chord * line.chord - line.rise * line.rise);
+    return square_root(line.chord * line.chord - line.rise * line.rise);
 }
 
 PRBM Complex tangent(Line line, double v) {
@@ -170,4 +172,19 @@ PRBM Complex tangent(Line line, double v) {
     double angle = HALF_TURN / L * v;
     unit_vectors(1, &angle, &e);
     return complex_of(1.0, 0.5 * HALF_TURN * line.rise / L * e.im);
+}
+
+PRBM Complex position(Line line, double v) {
+    double L = line_length(line);
+    Complex e;
+    if (line.curvature != 0.0) {
+        double half = 0.5 * line.curvature * v, turned = half - 0.5 * line.curvature * L;
+        unit_vectors(1, &half, &e);
+        double chord = e.im / (0.5 * line.curvature);
+        unit_vectors(1, &turned, &e);
+        return scaled(chord, e);
+    }
+    double angle = 0.5 * HALF_TURN / L * v;
+    unit_vectors(1, &angle, &e);
+    return complex_of(v, line.rise * (e.im * e.im));
 }

@@ -54,5 +54,7 @@ PRBM bool notch_panels(const char *name, const Notch *notch, double L, int nodes
 PRBM double line_length(Line line);
 /* Return dz/dv at a position, turned by the same angle everywhere [-]. */
 PRBM Complex tangent(Line line, double v);
+/* Return the integral of the tangent from the start to a position [m]. */
+PRBM Complex position(Line line, double v);
 
 #endif

@@ -45,8 +45,8 @@ PRBM bool project_with_impulses(const Equations *equations, double t, double *y,
     if (ok) {
         jacobian(&q->active, e, rows);
         mass_matrix(q->system, e, M, scratch);
-        ok = project_velocities((int)n, q->r, M, rows, rates, y + n, impulses, scratch,
-                                   problem);
+        ok = project_velocities((int)n, q->r, M, rows, rates, y + n, impulses, q->system->length,
+                                scratch, problem);
     }
     scratch->used = mark;
     return ok;

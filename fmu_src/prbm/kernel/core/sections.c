@@ -272,6 +272,82 @@ PRBM void face_stresses(const System *system, const FreeBody *body, const Sectio
     }
 }
 
+PRBM void differences(int m, const double *x, double *c) {
+    for (int k = 1; k < m; k++) {
+        for (int i = m - 1; i >= k; i--) {
+            c[i] = (c[i] - c[i - 1]) / (x[i] - x[i - k]);
+        }
+    }
+}
+
+PRBM Jet polynomial(int m, const double *x, const double *c, double s) {
+    Jet at = {0.0, 0.0, 0.0};
+    for (int i = m - 1; i >= 0; i--) {
+        double apart = s - x[i];
+        at.bend = at.bend * apart + 2.0 * at.slope;
+        at.slope = at.slope * apart + at.value;
+        at.value = at.value * apart + c[i];
+    }
+    return at;
+}
+
+PRBM bool summit(int m, const double *x, const double *c, double sign, double low, double high,
+                 double *s) {
+    double rise = polynomial(m, x, c, low).slope, fall;
+    if (!(sign * rise > 0.0) || !(sign * (fall = polynomial(m, x, c, high).slope) < 0.0)) {
+        return false;
+    }
+    *s = low + rise / (rise - fall) * (high - low);
+    for (int step = 0; step < SUMMIT_STEPS; step++) {
+        Jet at = polynomial(m, x, c, *s);
+        if (!(sign * at.bend < 0.0)) {
+            return true;
+        }
+        *s = lesser(greater(*s - at.slope / at.bend, low), high);
+    }
+    return true;
+}
+
+/* Position of section k, counted from the start. */
+static double section_position(const FreeBody *body, int k) {
+    return body->position[body->forwards ? k : body->sections - 1 - k];
+}
+
+/* Set the positions x and the divided differences c of a face at the nodes. */
+static void set_polynomial(const FreeBody *body, const double *face, double *x, double *c) {
+    for (int i = 0; i < body->smooth_count; i++) {
+        x[i] = section_position(body, body->smooth + i);
+        c[i] = face[body->smooth + i];
+    }
+    differences(body->smooth_count, x, c);
+}
+
+/* Raise the largest stress to that of a face between the nodes.  side: the sign of its place. */
+static void raise_between(const FreeBody *body, const double *face, double side, double least,
+                          Stress *found) {
+    double x[NODES_MAX], c[NODES_MAX], s;
+    int m = 0; /* none are set */
+    for (int k = body->smooth; k < body->smooth + body->smooth_count; k++) {
+        if (fabs(face[k]) < least) {
+            continue;
+        }
+        if (m == 0) {
+            m = body->smooth_count;
+            set_polynomial(body, face, x, c);
+        }
+        double sign = face[k] < 0.0 ? -1.0 : 1.0;
+        double low = section_position(body, k - 1), high = section_position(body, k + 1);
+        if (summit(m, x, c, sign, low, high, &s)) {
+            double size = sign * polynomial(m, x, c, s).value;
+            if (size > (1.0 + STRESS_TIE_RTOL) * found->largest) {
+                found->largest = size;
+                found->place = side * (k + 1);
+                found->position = s;
+            }
+        }
+    }
+}
+
 PRBM Stress stress_in(const FreeBody *body, const double *left, const double *right) {
     int m = body->sections, k = 0;
     double most = 0.0;
@@ -283,9 +359,23 @@ PRBM Stress stress_in(const FreeBody *body, const double *left, const double *ri
         k++;
     }
     bool on_left = fabs(left[k]) >= (1.0 - STRESS_TIE_RTOL) * fabs(right[k]);
-    double position = body->position[body->forwards ? k : m - 1 - k];
-    Stress result = {left[0], left[m - 1], most, on_left ? k + 1 : -(k + 1), position};
-    return result;
+    Stress found = {left[0], left[m - 1], most, on_left ? k + 1 : -(k + 1),
+                    section_position(body, k)};
+    raise_between(body, left, 1.0, SUMMIT_SHARE_MIN * most, &found);
+    raise_between(body, right, -1.0, SUMMIT_SHARE_MIN * most, &found);
+    return found;
+}
+
+PRBM double stress_at(const FreeBody *body, const double *left, const double *right,
+                      const Stress *found) {
+    double x[NODES_MAX], c[NODES_MAX];
+    const double *face = found->place > 0.0 ? left : right;
+    int k = (int)fabs(found->place) - 1;
+    if (found->position == section_position(body, k)) {
+        return face[k];
+    }
+    set_polynomial(body, face, x, c);
+    return polynomial(body->smooth_count, x, c, found->position).value;
 }
 
 PRBM Stress *take_stresses(Scratch *scratch, int count) {

@@ -6,8 +6,13 @@
 #include "core/dynamics.h"
 #include "core/flexure.h"
 
-/* Stress of the left face at start and end, the largest magnitude with the number of its section
- * (from 1 at the start, negative for the right face), and its position. */
+/* A polynomial and its first two derivatives at a point. */
+typedef struct {
+    double value, slope, bend;
+} Jet;
+
+/* Stress of the left face at start and end, the largest magnitude with the number of its section or
+ * of one beside it (from 1 at the start, negative for the right face), and its position. */
 typedef struct {
     double start, end, largest, place, position;
 } Stress;
@@ -37,7 +42,18 @@ PRBM void face_stresses(const System *system, const FreeBody *body, const Sectio
 /* Compute the changes of these stresses along a change of the state. */
 PRBM void face_changes(const System *system, const FreeBody *body, const SectionState *at,
                        const SectionState *change, double *left, double *right);
+/* Replace values c (m,) at points x (m,) by their divided differences. */
+PRBM void differences(int m, const double *x, double *c);
+/* Compute a polynomial at s from its divided differences. */
+PRBM Jet polynomial(int m, const double *x, const double *c, double s);
+/* Find a maximum (sign 1) or minimum (-1) of a polynomial between low and high; false: none. */
+PRBM bool summit(int m, const double *x, const double *c, double sign, double low, double high,
+                 double *s);
 PRBM Stress stress_in(const FreeBody *body, const double *left, const double *right);
+/* Return the stress, or its change, at the face and the position of the largest one, from those of
+ * the faces in the sections. */
+PRBM double stress_at(const FreeBody *body, const double *left, const double *right,
+                      const Stress *found);
 /* Take working memory for the stress of several flexures. */
 PRBM Stress *take_stresses(Scratch *scratch, int count);
 /* Compute the stress of all flexures whose stress is an output. */

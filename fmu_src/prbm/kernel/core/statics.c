@@ -36,7 +36,9 @@ PRBM void stack_holding(const System *system, double amount, Complex *B, double 
             B[r * d + k] = complex_of(0.0, 0.0);
         }
         double angle = system->q0[system->released.j] + amount;
-        B[r * d + arm] = complex_of(-system->length * sin(angle), -system->length * cos(angle));
+        Complex e;
+        unit_vectors(1, &angle, &e);
+        B[r * d + arm] = complex_of(-system->length * e.im, -system->length * e.re);
         c[r] = 0.0;
     }
 }
@@ -119,7 +121,7 @@ static bool newton_step(const Balance *balance, const Complex *e, double *torque
     for (int i = 0; i < r; i++) {
         change[n + i] = -open_by[i];
     }
-    bool solved = solve(size, kkt, change, scratch, &ignored);
+    bool solved = solve(n, r, kkt, change, balance->system->length, scratch, &ignored);
     double turn = solved ? largest(n, change) : HUGE_VAL;
     double share = lesser(1.0, STATICS_TURN_MAX / greater(turn, STATICS_TURN_MIN));
     for (int i = 0; solved && i < size; i++) {
@@ -199,7 +201,7 @@ static bool turns_about_point(const System *system, Scratch *scratch) {
     zeros(size, response);
     copy(n, rows + r * n, response);
     Problem ignored; /* A body without a spring, for instance on a pin. */
-    bool solved = solve(size, kkt, response, scratch, &ignored);
+    bool solved = solve(n, r, kkt, response, system->length, scratch, &ignored);
     double lever = RELEASE_LEVER_RTOL * system->length * fabs(response[system->released.j]);
     bool about = solved && fabs(dot(n, rows + r * n, response)) < lever;
     scratch->used = used;
@@ -220,26 +222,29 @@ static bool displaceable(const System *system, double displacement, Scratch *scr
                 displacement, m->bodies[m->release.body - 1].name);
 }
 
+static bool heavy(const System *system) {
+    return system->gravity.re != 0.0 || system->gravity.im != 0.0;
+}
+
 static bool unreachable(const System *system, bool held, double displacement, double done,
                         Problem *problem) {
-    bool heavy = system->gravity.re != 0.0 || system->gravity.im != 0.0;
     if (!held) {
-        return fail(problem, "%s",
-                    heavy ? "no static equilibrium under gravity was found: the flexures are too "
-                            "weak for this load; reduce gravity or the masses, or stiffen the "
-                            "flexures"
-                          : "no static equilibrium was found: the straight shape is not in "
-                            "equilibrium, or the flexures are too weak to hold it");
+        return fail(problem,
+                    "no static equilibrium under gravity was found: the flexures are too weak for "
+                    "this load; reduce gravity or the masses, or stiffen the flexures");
     }
     const char *name = turns(system) ? "angle" : "displacement";
     const char *unit_name = turns(system) ? "rad" : "m";
+    const char *hint = heavy(system) ? "; or check the units of youngs_modulus and thickness"
+                             : "; if a body or a flexure turns freely on pins, nothing holds it "
+                               "without gravity: clamp an end of it, or add gravity";
     return fail(problem,
                 "release.%s = %g %s cannot be reached: no equilibrium was found beyond %.4g %s%s; "
                 "release closer to the straight shape%s%s",
                 name, displacement, unit_name, done * displacement + 0.0, unit_name,
-                heavy ? " (gravity raised in proportion)" : "",
-                heavy ? ", or reduce gravity across the motion" : "",
-                done > 0.0 ? "" : "; or check the units of youngs_modulus and thickness");
+                heavy(system) ? " (gravity raised in proportion)" : "",
+                heavy(system) ? ", or reduce gravity across the motion" : "",
+                done > 0.0 ? "" : hint);
 }
 
 /* Return whether a shape is held at an amount, and not half a turn or more away.  The sine that
@@ -262,7 +267,8 @@ static bool load_slowly(const System *system, bool held, double displacement, do
     bool going = true;
     while (done < 1.0 && going) {
         double target = lesser(1.0, done + step), turn = HUGE_VAL, ratio = STATICS_SHRINK;
-        step = target - done;
+        /* The difference of target and done may be rounded to more than the smallest step. */
+        step = lesser(step, 1.0 - done);
         copy(size, state, trial);
         if (loaded(system, held, displacement, target, trial, scratch) &&
             holds(system, held, target * displacement, trial)) {
@@ -285,6 +291,17 @@ static bool load_slowly(const System *system, bool held, double displacement, do
     return done >= 1.0 || unreachable(system, held, displacement, done, problem);
 }
 
+/* Return whether the loops are closed in the shape as drawn. */
+static bool drawn_closed(const System *system, Scratch *scratch) {
+    size_t used = scratch->used;
+    double *open_by = take(scratch, (size_t)system->r);
+    Rows loops = plain_rows(system, system->r, system->loops, system->loops_c);
+    scalars(&loops, system->e0, open_by);
+    bool closed = largest(system->r, open_by) <= STATICS_CONSTRAINT_RTOL * system->length;
+    scratch->used = used;
+    return closed;
+}
+
 PRBM bool equilibrium(const System *system, bool held, double displacement, Equilibrium *shape,
                       Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
@@ -292,36 +309,15 @@ PRBM bool equilibrium(const System *system, bool held, double displacement, Equi
     double *state = take(scratch, (size_t)n + (size_t)r + 1);
     zeros(n + r + 1, state);
     copy(n, system->q0, state);
-    bool found = (!held || displaceable(system, displacement, scratch, problem)) &&
-                 load_slowly(system, held, displacement, state, scratch, problem);
+    bool straight = !heavy(system) && !(held && displacement != 0.0) && drawn_closed(system, scratch);
+    bool found = straight || ((!held || displaceable(system, displacement, scratch, problem)) &&
+                              load_slowly(system, held, displacement, state, scratch, problem));
     copy(n, state, shape->q);
     copy(r, state + n, shape->lam);
     /* The constraint of an angle is the rotation times the size. */
     shape->force = turns(system) ? system->length * state[n + r] : state[n + r];
     scratch->used = used;
     return found;
-}
-
-/* Check that the loops allow the released body to move; its row is the last of rows (r, n). */
-static bool releasable(const System *system, const double *M, int r, const double *rows,
-                       double speed, Scratch *scratch, Problem *problem) {
-    size_t used = scratch->used;
-    int n = system->n;
-    const double *row = rows + (r - 1) * n;
-    double *left = take(scratch, (size_t)n), *free = take(scratch, (size_t)n);
-    bool ok = response(n, r - 1, 1, M, rows, row, left, scratch, problem) &&
-              response(n, 0, 1, M, rows, row, free, scratch, problem);
-    double share = ok ? dot(n, row, left) / dot(n, row, free) : 0.0;
-    scratch->used = used;
-    if (ok && !(share > RELEASE_MOBILITY_RTOL)) {
-        const Mechanism *m = system->mechanism;
-        return fail(problem,
-                    "release.velocity = %g m/s: the body %s cannot move along the direction of the "
-                    "release; choose another direction or body, or let flexures stretch "
-                    "(axial = true)",
-                    speed, m->bodies[m->release.body - 1].name);
-    }
-    return ok;
 }
 
 PRBM bool release_velocity(const System *system, const double *q, double speed, double *v,
@@ -342,8 +338,13 @@ PRBM bool release_velocity(const System *system, const double *q, double speed, 
     jacobian(&held, e, rows);
     zeros(r, rates);
     rates[r - 1] = -speed;
-    bool found = releasable(system, M, r, rows, speed, scratch, problem) &&
-                 project_velocities(n, r, M, rows, rates, v, NULL, scratch, problem);
+    Problem singular; /* The loops do not allow the released body to move. */
+    bool found = project_velocities(n, r, M, rows, rates, v, NULL, system->length, scratch,
+                                    &singular);
     scratch->used = used;
-    return found;
+    return found || fail(problem,
+                         "release.velocity = %g m/s: the body %s cannot move along the direction "
+                         "of the release; choose another direction or body, or let flexures "
+                         "stretch (axial = true)",
+                         speed, system->mechanism->bodies[system->mechanism->release.body - 1].name);
 }

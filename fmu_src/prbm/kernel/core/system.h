@@ -40,6 +40,7 @@ typedef struct {
     int order;              /* of the polynomial of a beam; links: 0 */
     int first, count, stub; /* mass points; the last ones, of the stub beyond a closed loop */
     int sections, arm_count;
+    int smooth, smooth_count; /* first section from the start, and number, of nodes of a beam */
     double *position, *area, *modulus; /* (sections,) */
     double *ranks, *section_ranks;     /* (count,), (sections,) order along the flexure */
     int *tangents;          /* (sections, 2) directions, FIXED or TURNED - coordinate */
@@ -143,6 +144,7 @@ typedef struct {
     double *calculated;       /* gamma0 of the flexure types with several pivots */
     Complex anchor, gravity;
     double length;
+    double least_mobility;    /* of the shortest row that is not round-off [1/kg] */
 } System;
 
 PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memory);

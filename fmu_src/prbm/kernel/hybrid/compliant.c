@@ -185,7 +185,7 @@ static bool raise_reference(Simulation *sim, int stop, double rate, double inver
     double depth = contact_depth(law, acceleration / (inverse_mass * (1.0 + law->damping)));
     double rise = acceleration * depth * law->exponent / ((law->exponent + 1.0) * speed * speed);
     if (rise <= FIRST_RISE_MAX) {
-        set_phase(sim, stop, PHASE_PRESSED, speed * sqrt(1.0 + 2.0 * rise), 0.0);
+        set_phase(sim, stop, PHASE_PRESSED, speed * square_root(1.0 + 2.0 * rise), 0.0);
     }
     return true;
 }
@@ -353,15 +353,13 @@ static bool is_stuck(Simulation *sim, int stop, bool *result, Problem *problem) 
     if (q->r == q->system->r) {
         return true; /* There are no constraints but the loops. */
     }
-    double left = 0.0, own = 0.0, *G = take(&sim->scratch, (size_t)n);
-    double *held = take_matrix(&sim->scratch, q->r, n);
+    double *G = take(&sim->scratch, (size_t)n), *held = take_matrix(&sim->scratch, q->r, n);
     Inertia at = inertia_at(sim, sim->state.front);
     Rows gaps = gap_rows(q->system);
     row_jacobian(&gaps, stop, at.e, G);
     jacobian(&q->active, at.e, held);
-    bool ok = mobility(sim, &at, q->r, held, G, &left, problem) &&
-              mobility(sim, &at, q->system->r, at.loops, G, &own, problem);
-    *result = left <= DEPENDENT_FRICTION_RTOL * own;
+    bool moves = true, ok = independent(sim, &at, q->r, held, G, &moves, problem);
+    *result = !moves;
     sim->scratch.used = mark;
     return ok;
 }
@@ -455,9 +453,9 @@ static bool rest_of_contact(Simulation *sim, int stop, double depth, double rate
     }
     double stiffness = contact_tangent(law, depth);
     rest->elastic = elastic_force(law, depth);
-    rest->time = 0.5 * TWO_PI / sqrt(stiffness * inverse_mass);
-    double speed = (rest->force - rest->elastic) * sqrt(inverse_mass / stiffness);
-    rest->calm = rest->force > 0.0 && sqrt(rate * rate + speed * speed) < least;
+    rest->time = 0.5 * TWO_PI / square_root(stiffness * inverse_mass);
+    double speed = (rest->force - rest->elastic) * square_root(inverse_mass / stiffness);
+    rest->calm = rest->force > 0.0 && square_root(rate * rate + speed * speed) < least;
     return true;
 }
 
@@ -569,7 +567,7 @@ PRBM double contact_error(Simulation *sim, double h) {
             double rate = (dot(n, row, error + n) + error[give + 1]) / speed;
             squares[part] = d * d + rate * rate;
         }
-        double size = sqrt(squares[0] + squares[1]);
+        double size = square_root(squares[0] + squares[1]);
         worst = greater(worst, size > 0.0 ? squares[0] / size : size);
     }
     sim->scratch.used = mark;

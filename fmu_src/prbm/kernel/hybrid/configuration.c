@@ -2,6 +2,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/modal.h"
 #include "hybrid/configuration.h"
 
 PRBM double zero_speed(const Configuration *configuration) {
@@ -15,18 +16,22 @@ PRBM double zero_acceleration(const Configuration *configuration) {
 }
 
 PRBM double closing_depth(const Configuration *configuration) {
-    return lesser(TOUCHING_RTOL * configuration->scales.length, RELEASE_PENETRATION_ATOL);
+    return TOUCHING_RTOL * configuration->scales.length;
 }
 
-/* The scale of rates is the fundamental angular frequency; if it is zero, that of the stiffest
- * spring with the largest inertia.  The scale of energies is the torque of the stiffest torsion
- * spring at one radian; without torsion springs, the largest inertia times the square of the
- * rate. */
-PRBM void set_scales(Configuration *configuration, double frequency) {
+PRBM double release_penetration(const Configuration *configuration) {
+    return RELEASE_PENETRATION_RTOL * configuration->scales.length;
+}
+
+/* The scale of rates is the fundamental angular frequency; if it is zero, the rate of a fall or of
+ * the initial motion.  The scale of energies is the torque of the stiffest torsion spring at one
+ * radian; without torsion springs, the largest inertia times the square of the rate. */
+PRBM bool set_scales(Configuration *configuration, double frequency, Scratch *scratch,
+                     Problem *problem) {
     const System *system = &configuration->system;
     Scales *scales = &configuration->scales;
     int n = system->n;
-    double torsion = 0.0, stiffest = largest(n * n, system->K), heaviest = 0.0;
+    double torsion = 0.0, heaviest = 0.0;
     const Coordinate *coordinates = system->mechanism->coordinates;
     for (int i = 0; i < n * n; i++) {
         bool turns = coordinates[i / n].strain < 0 && coordinates[i % n].strain < 0;
@@ -35,12 +40,13 @@ PRBM void set_scales(Configuration *configuration, double frequency) {
     for (int i = 0; i < system->d * system->d; i++) {
         heaviest = greater(heaviest, modulus(system->H[i]));
     }
-    double spring_rate = stiffest > 0.0 ? sqrt(stiffest / heaviest) : SPRINGLESS_RATE;
-    configuration->omega = TWO_PI * frequency;
+    double fast = configuration->omega = scales->rate = TWO_PI * frequency;
+    if (frequency == 0.0 && !slow_rates(system, &scales->rate, &fast, scratch, problem)) {
+        return false;
+    }
     scales->length = system->length;
-    scales->rate = configuration->omega > 0.0 ? configuration->omega : spring_rate;
     scales->energy = torsion > 0.0 ? torsion : heaviest * (scales->rate * scales->rate);
-    scales->time = TWO_PI / scales->rate;
+    scales->time = TWO_PI / fast;
     int first = system->mechanism->first_extra, count = system->mechanism->state_count;
     configuration->controlled = (double)first;
     for (int j = first; j < count; j++) {
@@ -52,6 +58,7 @@ PRBM void set_scales(Configuration *configuration, double frequency) {
         configuration->least[j] = angle ? 1.0 : j < 2 * n ? scales->rate : scales->energy;
         configuration->share[j] = angle ? 0.0 : 1.0;
     }
+    return true;
 }
 
 PRBM bool take_values(Simulation *sim, Problem *problem) {

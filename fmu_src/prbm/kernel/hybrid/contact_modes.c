@@ -198,7 +198,7 @@ static bool is_mobile(Simulation *sim, int contact, const ContactMode *modes, bo
     size_t mark = sim->scratch.used, bytes = (size_t)contact_count(sim) * sizeof *modes;
     const System *system = system_of(sim);
     const Equations *q = &sim->trial.equations;
-    double left = 0.0, own = 0.0, *row = take(&sim->scratch, (size_t)system->n);
+    double *row = take(&sim->scratch, (size_t)system->n);
     ContactMode others[CONTACTS_MAX];
     Inertia at = inertia_at(sim, sim->state.front);
     memcpy(others, modes, bytes);
@@ -209,9 +209,7 @@ static bool is_mobile(Simulation *sim, int contact, const ContactMode *modes, bo
     tangential_row(system, contact, at.e, row);
     double *held = take_matrix(&sim->scratch, q->r, system->n);
     jacobian(&q->active, at.e, held);
-    bool ok = mobility(sim, &at, q->r, held, row, &left, problem) &&
-              mobility(sim, &at, system->r, at.loops, row, &own, problem);
-    *result = left > DEPENDENT_FRICTION_RTOL * own;
+    bool ok = independent(sim, &at, q->r, held, row, result, problem);
     sim->scratch.used = mark;
     return ok;
 }
@@ -259,9 +257,10 @@ static bool mode_of_forces(Simulation *sim, const RestForces *found, int j, int 
 
 /* Choose the modes of contacts at rest by their forces.  If contacts can stick only together, those
  * with friction below its limit stick, because they are independent of each other; the others have
- * friction at its limit, or none. */
+ * friction at its limit, or none.  If yielding, no contact sticks at its limit. */
 static bool stick_or_slip(Simulation *sim, const RestContacts *rest, const RestForces *found,
-                          const FrictionEvent *event, ContactMode *modes, Problem *problem) {
+                          const FrictionEvent *event, bool yielding, ContactMode *modes,
+                          Problem *problem) {
     enum { BELOW_LIMIT, NO_FRICTION, AT_LIMIT };
     double zero = zero_acceleration(&sim->configuration);
     bool ok = true;
@@ -272,7 +271,7 @@ static bool stick_or_slip(Simulation *sim, const RestContacts *rest, const RestF
             bool at_limit = size >= found->limit[j] - slack;
             int order = at_limit ? AT_LIMIT : size <= slack ? NO_FRICTION : BELOW_LIMIT;
             if (order == turn && modes[contact] != CONTACT_OPEN) {
-                bool slipped = event->slips && event->contact == contact;
+                bool slipped = yielding || (event->slips && event->contact == contact);
                 ok = mode_of_forces(sim, found, j, contact, at_limit, slipped, modes, problem);
             }
         }
@@ -333,8 +332,8 @@ static bool friction_jams(const Simulation *sim, const HoldingSet *touching, Pro
 /* Choose the modes by the forces of some stops and of the contacts with friction.  *agree is false
  * if no forces satisfy their laws, or if another stop that touches would close. */
 static bool modes_by_forces(Simulation *sim, const HoldingSet *stops, const HoldingSet *touching,
-                            const FrictionEvent *event, ContactMode *modes, bool *agree,
-                            Problem *problem) {
+                            const FrictionEvent *event, bool yielding, ContactMode *modes,
+                            bool *agree, Problem *problem) {
     const System *system = system_of(sim);
     const double *q = sim->state.front, *v = q + system->n;
     ContactMode sliding[CONTACTS_MAX];
@@ -367,7 +366,7 @@ static bool modes_by_forces(Simulation *sim, const HoldingSet *stops, const Hold
         bool pressed = found.normal[k] > least_pressing(sim, i, q);
         modes[i] = pressed ? closed : CONTACT_OPEN;
     }
-    if (!stick_or_slip(sim, &rest, &found, event, modes, problem)) {
+    if (!stick_or_slip(sim, &rest, &found, event, yielding, modes, problem)) {
         return false;
     }
     try_contacts(sim, modes);
@@ -375,19 +374,20 @@ static bool modes_by_forces(Simulation *sim, const HoldingSet *stops, const Hold
 }
 
 /* Choose the modes of all contacts with friction: first with the stops that hold if contacts at
- * rest are frictionless; if that fails, with all stops that touch. */
+ * rest are frictionless; if that fails, with all stops that touch.  A contact at its limit sticks if
+ * it can; the forces of contacts that can hardly move against each other may then exceed their
+ * limits, which they do not if it slips. */
 static bool settle_friction(Simulation *sim, const HoldingSet *holding, const HoldingSet *touching,
                             const FrictionEvent *event, ContactMode *modes, Problem *problem) {
     ContactMode first[CONTACTS_MAX];
     size_t bytes = (size_t)contact_count(sim) * sizeof *modes;
     bool agree = false;
     memcpy(first, modes, bytes);
-    if (!modes_by_forces(sim, holding, touching, event, modes, &agree, problem)) {
-        return false;
-    }
-    if (!agree && holding->count < touching->count) {
+    for (int turn = 0; !agree && turn < 4; turn++) {
+        const HoldingSet *stops = turn % 2 == 0 ? holding : touching;
         memcpy(modes, first, bytes);
-        if (!modes_by_forces(sim, touching, touching, event, modes, &agree, problem)) {
+        if ((turn % 2 == 0 || holding->count < touching->count) &&
+            !modes_by_forces(sim, stops, touching, event, turn >= 2, modes, &agree, problem)) {
             return false;
         }
     }
@@ -396,16 +396,10 @@ static bool settle_friction(Simulation *sim, const HoldingSet *holding, const Ho
 
 /* --- all contacts ----------------------------------------------------------------------------- */
 
-/* The distance of x from the next floating-point number. */
-static double spacing(double x) {
-    int exponent;
-    (void)frexp(x, &exponent);
-    return ldexp(1.0, exponent - 53);
-}
-
 /* The error of the time of an event [s]. */
-static double time_resolution(double time) {
-    return EVENT_TIME_FACTOR * EVENT_TIME_ATOL + EVENT_TIME_ULPS * spacing(time);
+static double time_resolution(const Simulation *sim, double time) {
+    double located = EVENT_TIME_RTOL * STEP_MAX_RTOL * sim->configuration.scales.time;
+    return EVENT_TIME_FACTOR * located + EVENT_TIME_ULPS * spacing(time);
 }
 
 /* Compute the sliding acceleration of a contact in its present mode [m/s^2]. */
@@ -437,7 +431,7 @@ static bool friction_event(Simulation *sim, const Event *event, FrictionEvent *r
     result->slips = event->kind == EVENT_SLIP;
     bool ok = result->slips ||
               slide_acceleration(sim, event->contact, &result->rate, problem);
-    result->slow = fabs(result->rate) * time_resolution(sim->state.front_time);
+    result->slow = fabs(result->rate) * time_resolution(sim, sim->state.front_time);
     return ok;
 }
 
@@ -447,7 +441,7 @@ static int resting_candidates(Simulation *sim, const int *touching, int touching
     size_t mark = sim->scratch.used;
     const System *system = system_of(sim);
     const double *v = sim->state.front + system->n;
-    double near = TOUCHING_RTOL * system->length + RELEASE_PENETRATION_ATOL;
+    double near = TOUCHING_RTOL * system->length + release_penetration(&sim->configuration);
     double bound = zero_speed(&sim->configuration), t = sim->state.front_time;
     int count = 0;
     Complex *e = directions_at(sim, sim->state.front);

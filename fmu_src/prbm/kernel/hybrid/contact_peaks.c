@@ -115,7 +115,7 @@ static double largest_of_cubic(double h, double a, double u, double b, double w)
     double c3 = 2.0 * (a - b) / h + u + w, c2 = 3.0 * (b - a) / h - 2.0 * u - w;
     double best = greater(a, b), root = c2 * c2 - 3.0 * c3 * u;
     if (root > 0.0) { /* s = t/h at the maximum: 3 c3 s^2 + 2 c2 s + u = 0. */
-        double s = u / (sqrt(root) - c2);
+        double s = u / (square_root(root) - c2);
         double value = a + h * s * (u + s * (c2 + s * c3));
         best = s > 0.0 && s < 1.0 ? greater(best, value) : best;
     }

@@ -311,6 +311,7 @@ static double locate(const ArcGuard *guard, double a, double b) {
         return b;
     }
     Bracket x = {a, b, a, fa, fb, fa, b - a, b - a};
+    const double tolerance = EVENT_TIME_RTOL * guard->search->sim->state.arc.h;
     int iterations = 0;
     for (; iterations < LOCATION_ITERATIONS_MAX && x.fb != 0.0; iterations++) {
         if ((x.fb > 0.0) == (x.f_other > 0.0)) {
@@ -322,7 +323,7 @@ static double locate(const ArcGuard *guard, double a, double b) {
             x.a = x.b, x.b = x.other, x.other = x.a;
             x.fa = x.fb, x.fb = x.f_other, x.f_other = x.fa;
         }
-        double close = 0.5 * EVENT_TIME_ATOL + 4.5e-16 * fabs(x.b);
+        double close = 0.5 * tolerance + 4.5e-16 * fabs(x.b);
         double half = 0.5 * (x.other - x.b);
         if (fabs(half) <= close) {
             break;
@@ -366,7 +367,7 @@ static bool polish_impact(const Search *search, double apex, double *time) {
         double distance = sign * gap(&sim->equations, stop, t, e, extra_states(sim, y));
         double speed = sign * gap_rate(&sim->equations, stop, t, e, y + n, extra_states(sim, y));
         double change = -distance / speed;
-        if (speed >= 0.0 || fabs(distance) <= EVENT_TIME_ATOL * fabs(speed) ||
+        if (speed >= 0.0 || fabs(distance) <= EVENT_TIME_RTOL * located->h * fabs(speed) ||
             fabs(change) > EVENT_CORRECTION_RTOL * located->h) {
             break; /* Converged, or grazing, where the time by the dense output is better. */
         }

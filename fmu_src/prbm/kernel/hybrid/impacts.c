@@ -30,23 +30,26 @@ PRBM bool mobility(Simulation *sim, const Inertia *at, int r, const double *held
                    const double *row, double *result, Problem *problem) {
     size_t mark = sim->scratch.used;
     int n = system_of(sim)->n;
-    double *X = take(&sim->scratch, (size_t)n);
-    bool ok = response(n, r, 1, at->M, held, row, X, &sim->scratch, problem);
+    double *X = take(&sim->scratch, (size_t)n), length = system_of(sim)->length;
+    bool ok = response(n, r, 1, at->M, held, row, length, X, &sim->scratch, problem);
     *result = ok ? dot(n, row, X) : 0.0;
     sim->scratch.used = mark;
     return ok;
 }
 
-/* The inverse mass in contact space, W = rows X (k, k), of rows (k, n) and their response X. */
-PRBM void contact_mobility(int k, int n, const double *rows, const double *X, double *W) {
-    for (int a = 0; a < k; a++) {
-        for (int b = 0; b < k; b++) {
-            W[a * k + b] = 0.0;
-            for (int j = 0; j < n; j++) {
-                W[a * k + b] += rows[a * n + j] * X[j * k + b];
-            }
-        }
+/* Find whether a motion along a row is possible while the rows held (r, n), loops among them, hold.
+ * It is not if the row is round-off, or they leave hardly any of its mobility. */
+PRBM bool independent(Simulation *sim, const Inertia *at, int r, const double *held,
+                      const double *row, bool *result, Problem *problem) {
+    const System *system = system_of(sim);
+    double left = 0.0, own = 0.0;
+    bool ok = mobility(sim, at, system->r, at->loops, row, &own, problem);
+    *result = ok && own > least_mobility(system->n, at->M, row, system->length);
+    if (*result) {
+        ok = mobility(sim, at, r, held, row, &left, problem);
+        *result = left > DEPENDENT_FRICTION_RTOL * own;
     }
+    return ok;
 }
 
 /* Compute the velocities after = v + X P. */
@@ -102,10 +105,11 @@ static bool impulses_without_friction(Simulation *sim, const Approach *approach,
         rates[a] = lesser(approach->rates[i], 0.0);
         eps[a] = a < hits->struck_count ? hits->restitution[a] : 0.0;
     }
-    if (!response(n, system->r, k, at->M, at->loops, G, X, &sim->scratch, problem)) {
+    if (!response(n, system->r, k, at->M, at->loops, G, system->length, X, &sim->scratch,
+                  problem)) {
         return false;
     }
-    contact_mobility(k, n, G, X, W);
+    contact_mobility(n, k, at->M, G, X, system->length, W);
     for (int a = 0; a < k; a++) {
         W[a * k + a] += sim->equations.inputs.mobilities[partner(hits, a)];
     }
@@ -212,10 +216,10 @@ static bool impulses_with_friction(Simulation *sim, const Approach *approach, Hi
     double *rates = take(&sim->scratch, 2 * (size_t)k), *P = take(&sim->scratch, 2 * (size_t)k);
     double *reaction = take(&sim->scratch, (size_t)r);
     impact_rows(sim, approach, hits, *kept_count, kept, rows, GT, rates);
-    if (!response(n, r, 2 * k, at->M, rows, GT, X, &sim->scratch, problem)) {
+    if (!response(n, r, 2 * k, at->M, rows, GT, system->length, X, &sim->scratch, problem)) {
         return false;
     }
-    contact_mobility(2 * k, n, GT, X, W);
+    contact_mobility(n, 2 * k, at->M, GT, X, system->length, W);
     for (int a = 0; a < k; a++) {
         W[a * 2 * k + a] += sim->equations.inputs.mobilities[hits->struck[a]];
     }
@@ -618,7 +622,8 @@ static bool apply_impulses(Simulation *sim, int i, const double *P, Problem *pro
     double *after = take(&sim->scratch, (size_t)n);
     Inertia at = inertia_at(sim, front);
     load_rows(system, &system->pushed[i], at.e, rows, &sim->scratch);
-    bool ok = response(n, system->r, LOADS, at.M, at.loops, rows, X, &sim->scratch, problem);
+    bool ok = response(n, system->r, LOADS, at.M, at.loops, rows, system->length, X,
+                       &sim->scratch, problem);
     if (ok) {
         add_impulses(LOADS, n, v, X, P, after);
         for (int k = 0; k < LOADS; k++) {

@@ -13,13 +13,13 @@ typedef struct {
 PRBM Inertia inertia_at(Simulation *sim, const double *q);
 PRBM bool mobility(Simulation *sim, const Inertia *at, int r, const double *held,
                    const double *row, double *result, Problem *problem);
+PRBM bool independent(Simulation *sim, const Inertia *at, int r, const double *held,
+                      const double *row, bool *result, Problem *problem);
 PRBM void report_impact(const Simulation *sim, int i, const double *q, const double *v,
                         const double *after);
 PRBM bool impact(Simulation *sim, int hit, Problem *problem);
 PRBM bool impulses_changed(const Simulation *sim);
 PRBM const double *given_impulses(const Simulation *sim);
 PRBM bool receive_impulses(Simulation *sim, Problem *problem);
-
-PRBM void contact_mobility(int k, int n, const double *rows, const double *X, double *W);
 
 #endif

@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "hybrid/configuration.h"
 #include "hybrid/impacts.h"
 #include "hybrid/rest.h"
 #include "hybrid/simulation.h"
@@ -66,6 +67,31 @@ static void rest_laws(const Simulation *sim, const RestContacts *rest, const Com
     }
 }
 
+/* The acceleration of gap i by its normal force, alone or together with its friction: the larger
+ * one, in magnitude.  A wedge moves a gap mainly by its friction. */
+static double pressing(int k, int m, int i, const double *W, const double *P, const int *normal) {
+    int size = k + m;
+    double alone = P[i] * W[i * size + i], together = alone;
+    for (int j = 0; j < m; j++) {
+        together += normal[j] == i ? W[i * size + k + j] * P[k + j] : 0.0;
+    }
+    return greater(alone, fabs(together));
+}
+
+/* Return the violation of the laws that is accepted: half of the acceleration that is round-off in
+ * the choice of modes, and the round-off of the forces of friction.  These do not vanish with the
+ * accelerations u, as in a mechanism at rest, where the limits of friction may still be large. */
+static double accepted_violation(const Simulation *sim, int k, int m, const double *W,
+                                 const double *u, const double *fixed) {
+    int size = k + m;
+    double pull = 0.0;
+    for (int j = 0; j < m; j++) {
+        pull = greater(pull, fixed[j] * W[(k + j) * size + k + j]);
+    }
+    double laws = greater(COMPLEMENTARITY_RTOL * largest(size, u), LIMIT_RTOL * pull);
+    return greater(laws, zero_acceleration(&sim->configuration) / 2.0);
+}
+
 PRBM bool rest_forces(Simulation *sim, const double *q, const double *v,
                       const RestContacts *rest, RestForces *found, Problem *problem) {
     size_t mark = sim->scratch.used;
@@ -84,20 +110,21 @@ PRBM bool rest_forces(Simulation *sim, const double *q, const double *v,
                                  &sim->trial.evaluation, problem);
     rest_rows(sim, rest, at.e, rows, pushes);
     ok = ok &&
-         response(n, system->r, size, at.M, at.loops, pushes, X, &sim->scratch, problem);
+         response(n, system->r, size, at.M, at.loops, pushes, system->length, X, &sim->scratch,
+                  problem);
     found->solved = false;
     if (ok) {
-        contact_mobility(size, n, rows, X, W);
+        contact_mobility(n, size, at.M, rows, X, system->length, W);
         rest_accelerations(sim, rest, at.e, v, rows, u);
         rest_laws(sim, rest, at.e, friction, fixed, normal);
-        tolerance = COMPLEMENTARITY_RTOL * largest(size, u);
+        tolerance = accepted_violation(sim, k, m, W, u, fixed);
         found->solved =
             coulomb(k, m, W, u, friction, fixed, normal, tolerance, P, &sim->scratch);
     }
     for (int i = 0; found->solved && i < size; i++) {
         int j = i - k;
         if (i < k) {
-            found->normal[i] = P[i] * W[i * size + i];
+            found->normal[i] = P[i] > 0.0 ? pressing(k, m, i, W, P, normal) : 0.0;
             continue;
         }
         found->friction[j] = P[i];

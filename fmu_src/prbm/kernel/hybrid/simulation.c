@@ -407,7 +407,7 @@ static bool check_walls(Simulation *sim, Problem *problem) {
         if (sim->configuration.mechanism->stops[i].compliant && distance < 0.0) {
             continue; /* A preload. */
         }
-        if (distance < -RELEASE_PENETRATION_ATOL) {
+        if (distance < -release_penetration(&sim->configuration)) {
             double wall = sim->state.walls[i].position;
             const char *name = sim->configuration.mechanism->stops[i].name;
             return fail(problem,
@@ -415,7 +415,7 @@ static bool check_walls(Simulation *sim, Problem *problem) {
                         "the hit point is at %.6g m; move the stop or release further back",
                         name, -distance, name, wall, wall - distance);
         }
-        if (struck < 0 && distance <= RELEASE_PENETRATION_ATOL &&
+        if (struck < 0 && distance <= release_penetration(&sim->configuration) &&
             gap_rate(&sim->equations, i, t, e, front + n, NULL) < 0.0) {
             struck = i;
         }
@@ -456,8 +456,10 @@ PRBM bool start_motion(Simulation *sim, double start_time, double tolerance, Sim
                                problem)) {
         return false;
     }
+    if (!set_scales(configuration, state->frequency, &sim->scratch, problem)) {
+        return false;
+    }
     state->tolerance = lesser(state->tolerance, TOLERANCE_USED_MAX);
-    set_scales(configuration, state->frequency);
     clear_peaks(sim);
     state->started = release_mechanism(sim, problem) && restart_peaks(sim, problem);
     return state->started;

@@ -222,9 +222,10 @@ static bool rebuild(Simulation *sim, Problem *problem) {
     }
     configuration->assembled = assemble(&configuration->system, sim->state.acting_values,
                                         &sim->scratch, problem);
-    set_scales(configuration, sim->state.frequency);
+    bool ok = configuration->assembled &&
+              set_scales(configuration, sim->state.frequency, &sim->scratch, problem);
     set_inputs(sim);
-    return configuration->assembled;
+    return ok;
 }
 
 PRBM void keep_backup(Simulation *sim) {

@@ -33,7 +33,7 @@ PRBM void refine_fastest(Simulation *sim) {
     solve_again(&stepping->evaluation.factors, x, stepping->multipliers);
     double energy = dot(n, state->fastest, stepping->torques);
     double response = dot(n, x, stepping->torques), longest = largest(n, x);
-    state->fastest_rate = energy > 0.0 && response > 0.0 ? sqrt(response / energy) : 0.0;
+    state->fastest_rate = energy > 0.0 && response > 0.0 ? square_root(response / energy) : 0.0;
     for (int j = 0; j < n && longest > 0.0; j++) {
         state->fastest[j] = x[j] / longest;
     }
@@ -79,7 +79,7 @@ PRBM double stable_step(const Simulation *sim) {
     double rate = sim->state.fastest_rate;
     double damping = sim->equations.beta * (rate * rate) + sim->equations.mass_damping;
     if (damping > 2.0 * rate) {
-        rate = 0.5 * (damping + sqrt(damping * damping - 4.0 * (rate * rate)));
+        rate = 0.5 * (damping + square_root(damping * damping - 4.0 * (rate * rate)));
     }
     return rate > 0.0 ? STABLE_STEP_FACTOR / rate : HUGE_VAL;
 }

@@ -28,7 +28,7 @@ static double error_norm(const Simulation *sim, const double *x, const double *y
         Lanes ratio = lanes_at(x + j) / larger(lanes_at(least + j), lanes_at(share + j) * size);
         sum[SUM_OF(j)] += ratio * ratio;
     }
-    return sqrt(total(sum) / sim->configuration.controlled);
+    return square_root(total(sum) / sim->configuration.controlled);
 }
 
 /* --- step sizes ------------------------------------------------------------------------------- */
@@ -42,8 +42,10 @@ static double first_step(const Simulation *sim) {
     const State *state = &sim->state;
     double size = error_norm(sim, state->k1, state->front, state->front);
     double allowed = FIRST_STEP_FACTOR * power(state->tolerance, FIRST_STEP_EXPONENT);
-    double wanted = allowed / greater(size, FIRST_RATE_MIN);
-    return lesser(longest_step(sim), greater(wanted, FIRST_STEP_MIN_ATOL));
+    if (allowed >= size * longest_step(sim)) {
+        return longest_step(sim);
+    }
+    return greater(allowed / size, FIRST_STEP_MIN_RTOL * sim->configuration.scales.time);
 }
 
 /* A step size rounded to four binary digits, so that round-off in the errors does not change it. */
@@ -73,15 +75,18 @@ static bool next(StepSizeController *controller, double error) {
     return true;
 }
 
-static bool check_step_size(const State *state, double h, Problem *problem) {
-    if (h < STEP_MIN_ATOL) {
+static bool check_step_size(const Simulation *sim, double h, Problem *problem) {
+    const State *state = &sim->state;
+    double t = state->front_time, period = sim->configuration.scales.time;
+    bool late = spacing(t) > LATE_TIME_RTOL * period;
+    if (!late && (t + h == t || h < STEP_MIN_RTOL * period)) {
         return fail(problem,
-                    "the step size fell below %g s at t = %.9g s: the motion is too fast for the "
+                    "the step size fell to %.3g s at t = %.9g s: the motion is too fast for the "
                     "model, or links of a loop form a straight line, beyond which they cannot "
                     "move; check the inputs and parameters, or add damping.beta",
-                    STEP_MIN_ATOL, state->front_time);
+                    h, t);
     }
-    if (state->front_time + h == state->front_time) {
+    if (t + h == t) {
         return fail(problem,
                     "at t = %.9g s a step of %.3g s is smaller than the rounding error of the "
                     "time: start the simulation at a time nearer to zero",
@@ -104,7 +109,7 @@ static double step_error(Simulation *sim, double h, Problem *problem) {
     errors_of(ny, arc->k, h, stepping->error, stepping->coarse_error);
     double fine = error_norm(sim, stepping->error, arc->y, stepping->end);
     double coarse = error_norm(sim, stepping->coarse_error, arc->y, stepping->end);
-    double size = sqrt(fine * fine + coarse * coarse);
+    double size = square_root(fine * fine + coarse * coarse);
     double error = size > 0.0 ? fine * fine / size : size;
     if (sim->equations.pressed_count > 0) {
         error = greater(error, contact_error(sim, h) / CONTACT_ERROR_FACTOR);
@@ -137,7 +142,7 @@ PRBM double difference(Simulation *sim, const double *y, const double *z) {
 PRBM bool check_projection(Simulation *sim, double t, const double *y, const double *projected,
                            Problem *problem) {
     double size = difference(sim, y, projected);
-    double most = PROJECTION_FACTOR * sqrt(sim->state.tolerance);
+    double most = PROJECTION_FACTOR * square_root(sim->state.tolerance);
     if (!(size <= most)) {
         return fail(problem,
                     "at t = %.9g s closing the loops would change the motion by %.3g of its size, "
@@ -191,7 +196,7 @@ static bool find_step(Simulation *sim, double longest, double *h, Problem *probl
     copy(ny, state->k1, state->arc.k);
     do {
         *h = controller.h;
-        if (!check_step_size(state, *h, problem)) {
+        if (!check_step_size(sim, *h, problem)) {
             return false;
         }
     } while (!next(&controller, projected_error(sim, *h, problem)));

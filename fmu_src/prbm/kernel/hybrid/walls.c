@@ -96,7 +96,8 @@ PRBM double follow_cubics(Simulation *sim) {
     for (int i = 0; i < system_of(sim)->s; i++) {
         Wall *wall = &sim->state.walls[i];
         double left = wall->since + wall->span - sim->state.front_time;
-        if (wall->span > 0.0 && left <= EVENT_TIME_ATOL) {
+        double round_off = EVENT_TIME_ULPS * spacing(sim->state.front_time);
+        if (wall->span > 0.0 && left <= EVENT_TIME_RTOL * wall->span + round_off) {
             wall->offset = wall->excess = wall->span = 0.0;
             set_contacts(sim, sim->state.modes); /* The acceleration of the wall has changed. */
         }
