@@ -90,12 +90,12 @@ def test_the_command_prints_a_map_for_each_stiffness(tmp_path, capsys):
     line = "impact-map PRBDM2R --wall-positions 0 --offsets 0 4 mm "
     assert cli.main(shlex.split(line + "--stiffness 1e6 N/m")) == cli.MISTAKE
     assert "need --method compliant" in capsys.readouterr().err
-    line += f"--way compliant --stiffness 1e6 1e7 N/m --out {tmp_path}"
+    line += f"--way compliant --stiffness 1e6 1e7 N/m --out {shlex.quote(str(tmp_path))}"
     assert cli.main(shlex.split(line)) == cli.OK
     printed = capsys.readouterr().out
     assert "2R, 1e+06 N/m" in printed
     assert "2R, 1e+07 N/m" in printed
-    assert len((tmp_path / "PRBDM2R-impact-map.csv").read_text().splitlines()) == 5
+    assert len((tmp_path / "PRBDM2R-impact-map.csv").read_text(encoding="utf-8").splitlines()) == 5
 
 
 @pytest.mark.parametrize(
@@ -114,8 +114,10 @@ def test_the_unit_of_the_stiffness_has_the_present_exponent(
     law = 'law = "compliant"\nstiffness = 1e9\nexponent = 1.5\n'
     text = shipped()["PRBDM"].read_text("utf-8").replace("[[stops]]\n", "[[stops]]\n" + law)
     file.write_text(text, "utf-8")
-    line = f"impact-map {file} --method compliant --wall-positions 0 --offsets 0 --speed 0.3 "
-    status = cli.main(shlex.split(f"{line} --set stop.exponent={exponent} --stiffness {texts}"))
+    line = f"impact-map {shlex.quote(str(file))} --method compliant --wall-positions 0 --offsets 0 "
+    status = cli.main(
+        shlex.split(f"{line} --speed 0.3 --set stop.exponent={exponent} --stiffness {texts}")
+    )
     written = capsys.readouterr()
     assert status == (cli.OK if labels else cli.MISTAKE)
     assert all(label in written.out for label in labels)

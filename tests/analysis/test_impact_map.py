@@ -3,6 +3,7 @@
 import csv
 import io
 import itertools
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +19,7 @@ from prbm.mechanics.assembly import assemble
 from prbm.mechanics.contact import response as impulse_response
 from prbm.mechanics.kinetics import inertia
 from prbm.mechanics.modal import modes, modes_at
+from prbm.mechanism.parts import Release
 from prbm.plots import impact_map as figures
 from support import mechanism
 
@@ -54,7 +56,7 @@ def test_algebraic_restitution_equals_that_of_an_impulse(model, axial):
     assert system.gap_rows.values(e)[0] - 7e-3 == pytest.approx(0.0, abs=1e-10)
     found = modes(system, shape)
     v = found.shape[:, 0]
-    X = impulse_response(M, loops, G)
+    X = impulse_response(M, loops, G, system.length)
     after = v - 1.6 * X[:, 0] * float(G[0] @ v) / float(G[0] @ X[:, 0])
     C = impact_map.algebraic(m, [-7e-3], [3e-3], WEIGHTLESS).restitution.item()
     assert pytest.approx(-(v @ M @ after), abs=1e-9) == C
@@ -101,6 +103,19 @@ def test_the_closed_form_is_rejected_if_the_body_turns_or_others_move(name, wall
     with pytest.raises(ParameterError, match=message) as error:
         impact_map.closed_form(m, [wall], [offset])
     assert "choose another method" in str(error.value)
+
+
+@pytest.mark.parametrize("release", [Release("tip", 90.0), Release("tip", angle=0.0)])
+def test_the_path_of_a_body_is_that_of_the_shapes_that_touch_neighbouring_walls(release):
+    """The rejection states its rotation per length of path, times the radius of gyration."""
+    model = replace(mechanism("Cantilever"), release=release)
+    wall, system = 15e-3, assemble(model, model.values())
+    frame, tip = system.bodies["tip"], model.bodies[0]
+    low, high = (impact_shape(system, 0, wall + change).q for change in (-1e-5, 1e-5))
+    path = abs(frame.A @ (system.directions(high) - system.directions(low)))
+    share = 100 * abs(high[frame.j] - low[frame.j]) * math.sqrt(tip.inertia / tip.mass) / path
+    with pytest.raises(ParameterError, match=f"tip turns.* by {share:.3g} % of the path"):
+        impact_map.closed_form(model, [wall], [0.0])
 
 
 def test_the_closed_form_is_rejected_if_a_long_lever_amplifies_the_rotation():
@@ -235,7 +250,9 @@ def test_a_wall_that_no_held_shape_touches_is_an_error(gap, message):
 
 def test_a_map_is_written_and_drawn(tmp_path):
     one = impact_map.algebraic(guide(), **CORNERS, values=WEIGHTLESS, label="2R")
-    rows = list(csv.reader(io.StringIO(one.write(tmp_path / "map.csv").read_text())))
+    rows = list(
+        csv.reader(io.StringIO(one.write(tmp_path / "map.csv").read_text(encoding="utf-8")))
+    )
     assert len(rows) == 10
     assert all(len(row) == len(rows[0]) for row in rows)
     assert sum(map(float, rows[1][4:])) == pytest.approx(1.0, abs=5e-6)

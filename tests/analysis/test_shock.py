@@ -17,6 +17,7 @@ from prbm.mechanics.statics import equilibrium, free_displacement
 from support import ROOT
 
 ACCELEROMETER = ROOT / "examples" / "shock" / "accelerometer.toml"
+QUOTED = shlex.quote(str(ACCELEROMETER))
 
 
 def accelerometer():
@@ -168,7 +169,7 @@ def test_mistakes_are_rejected(options, words, capsys):
 
 @pytest.mark.slow
 def test_the_command_prints_hits_stress_and_level_and_writes_files(tmp_path, capsys):
-    line = f"shock {ACCELEROMETER} --duration 0.5ms --out {tmp_path} --stop-time 1ms"
+    line = f"shock {QUOTED} --duration 0.5ms --out {shlex.quote(str(tmp_path))} --stop-time 1ms"
     assert run(f'{line} --peak "500 g"') == cli.OK
     printed = capsys.readouterr().out
     assert "impacts at bump_left" in printed
@@ -187,10 +188,10 @@ def test_a_record_replaces_the_pulse(tmp_path, capsys):
     t = np.linspace(0.0, 0.5e-3, 201)
     a = 500 * 9.80665 * np.sin(np.pi * t / 0.5e-3)
     rows = "\n".join(f"{x!r},{y!r}" for x, y in zip(t.tolist(), a.tolist(), strict=True))
-    record.write_text(f"time [s],a [m/s2]\n{rows}\n")
-    assert run(f"shock {ACCELEROMETER} --record {record} --stop-time 1ms") == cli.OK
+    record.write_text(f"time [s],a [m/s2]\n{rows}\n", encoding="utf-8")
+    assert run(f"shock {QUOTED} --record {shlex.quote(str(record))} --stop-time 1ms") == cli.OK
     of_record = capsys.readouterr().out.splitlines()[1:]
-    line = f'shock {ACCELEROMETER} --peak "500 g" --duration 0.5ms --stop-time 1ms'
+    line = f'shock {QUOTED} --peak "500 g" --duration 0.5ms --stop-time 1ms'
     assert run(line) == cli.OK
     of_pulse = capsys.readouterr().out.splitlines()[1:]
     assert of_record[0] == of_pulse[0]

@@ -60,23 +60,22 @@ def file(tmp_path):
 
 
 def test_the_command_prints_and_draws_the_forces(file, tmp_path, capsys):
-    line = f'shock {file} --peak "500 g" --duration 0.5ms --stop-time 1ms --out {tmp_path / "out"}'
-    assert cli.main(shlex.split(line)) == cli.OK
+    out = ["--out", str(tmp_path / "out")]
+    line = '--peak "500 g" --duration 0.5ms --stop-time 1ms'
+    assert cli.main(["shock", str(file), *shlex.split(line), *out]) == cli.OK
     printed = capsys.readouterr().out
     assert "force at bump_left" in printed
-    line = f"simulate {file} --input 'base.acceleration.x=half-sine(500 g, 0.5 ms)'"
-    assert cli.main(shlex.split(f"{line} --stop-time 1ms")) == cli.OK
+    line = "--input 'base.acceleration.x=half-sine(500 g, 0.5 ms)' --stop-time 1ms"
+    assert cli.main(["simulate", str(file), *shlex.split(line)]) == cli.OK
     assert "force at bump_left" in capsys.readouterr().out
     assert (tmp_path / "out" / "Accelerometer-shock.png").stat().st_size > 10_000
 
 
 def test_the_sweep_over_the_peak_has_a_column_of_the_force(file, tmp_path, capsys):
     """The force grows with the peak; without hits it is zero."""
-    line = (
-        f"shock {file} --duration 0.5ms --peaks 10 500 800 g --stop-time 0.6ms "
-        f"--out {tmp_path / 'out'}"
-    )
-    assert cli.main(shlex.split(line)) == cli.OK
+    line = "--duration 0.5ms --peaks 10 500 800 g --stop-time 0.6ms"
+    out = ["--out", str(tmp_path / "out")]
+    assert cli.main(["shock", str(file), *line.split(), *out]) == cli.OK
     assert "force [N]" in capsys.readouterr().out
     table = (tmp_path / "out" / "Accelerometer-fragility.csv").read_text("utf-8").splitlines()
     column = table[0].split(",").index("force [N]")

@@ -1,9 +1,11 @@
 """The command that builds FMUs: selection, identical bytes, complete files, error messages."""
 
+import importlib
 import io
 import itertools
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,9 +16,10 @@ from pathlib import Path, PurePosixPath
 
 import matplotlib
 import pytest
-from fmpy import read_model_description, simulate_fmu
+from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 
+from fmu_host import simulate_fmu
 from prbm.base import atomic
 from prbm.base.errors import MechanismError
 from prbm.commands import build_fmu as command
@@ -257,6 +260,21 @@ def test_no_file_is_written_if_one_mechanism_fails(tmp_path, monkeypatch, capfd)
     assert [*tmp_path.iterdir()] == []
 
 
+def test_the_copy_of_pythonfmu_in_an_fmu_that_ran_before_is_not_packed(
+    fmus, mechanisms, tmp_path, monkeypatch
+):
+    """Its folder is removed after the run, and it has no libraries."""
+    with zipfile.ZipFile(fmus["PRBDM"]) as fmu:
+        fmu.extractall(tmp_path)
+    for name in [name for name in sys.modules if name.partition(".")[0] == "pythonfmu"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.syspath_prepend(tmp_path / "resources")
+    copy = importlib.import_module("pythonfmu")
+    assert tmp_path in Path(copy.__file__).parents
+    shutil.rmtree(tmp_path / "resources")
+    assert python_fmu.build(mechanisms["PRBDM"]) == fmus["PRBDM"].read_bytes()
+
+
 def test_a_parameter_of_one_mechanism_is_rejected_before_the_build(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert cli.main([*GUIDES, "--set", "flexure.gamma=0.8"]) == cli.MISTAKE
@@ -308,7 +326,7 @@ EPOCHS = {"999999999999999999": None, "soon": None, "86400": "1970-01-02T00:00:0
 @pytest.mark.parametrize("command", MISTAKES)
 def test_mistakes_are_one_sentence_and_status_2(command, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "file").write_text("a file where a folder is needed")
+    (tmp_path / "file").write_text("a file where a folder is needed", encoding="utf-8")
     assert cli.main(command.split()) == cli.MISTAKE
     error = capsys.readouterr().err
     assert MISTAKES[command] in error
@@ -331,8 +349,10 @@ def test_list_prints_the_shipped_mechanisms(capsys):
 
 @pytest.mark.slow
 def test_fmus_of_a_mechanism_file_have_the_name_of_the_mechanism(tmp_path):
-    text = (ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml").read_text()
-    (tmp_path / "mine.toml").write_text(text.replace('name = "PRBDM"', 'name = "Mine"'))
+    text = (ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml").read_text(encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(
+        text.replace('name = "PRBDM"', 'name = "Mine"'), encoding="utf-8"
+    )
     done = build(tmp_path, "--mechanism", "mine.toml", "--set", "stop.position=1e-3")
     assert done.returncode == 0, done.stderr
     for folder in ("python", "fmi2", "fmi3"):
@@ -516,7 +536,7 @@ def test_ctrl_c_ends_the_processes_of_a_build(tmp_path, moment):
     ],
 )
 def test_names_and_values_that_fmi_forbids_are_reported(tmp_path, old, new, sentence):
-    text = (ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml").read_text()
+    text = (ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml").read_text(encoding="utf-8")
     path = tmp_path / "mine.toml"
     path.write_text(text.replace(old, new, 1), "utf-8")
     with pytest.raises(MechanismError, match=sentence):
@@ -525,7 +545,7 @@ def test_names_and_values_that_fmi_forbids_are_reported(tmp_path, old, new, sent
 
 def test_a_mechanism_may_have_the_name_of_a_python_function(tmp_path):
     """The script runs twice, the second time beside a class of that name."""
-    text = (ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml").read_text()
+    text = (ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml").read_text(encoding="utf-8")
     path = tmp_path / "mine.toml"
     path.write_text(text.replace('name = "PRBDM"', 'name = "globals"'), "utf-8")
     fmu = tmp_path / "globals.fmu"
@@ -535,7 +555,7 @@ def test_a_mechanism_may_have_the_name_of_a_python_function(tmp_path):
 
 def test_titles_are_escaped_in_script_and_xml(tmp_path):
     """Quotes do not end the docstring of the script; control characters do not break the XML."""
-    text = (ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml").read_text()
+    text = (ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml").read_text(encoding="utf-8")
     odd = 'title = "{a} \\"\\"\\" \\\\ \\u0007 <b> %s é"'
     path = tmp_path / "mine.toml"
     path.write_text(re.sub(r"^title = .*$", lambda _: odd, text, flags=re.MULTILINE), "utf-8")
@@ -588,10 +608,10 @@ FILE_MISTAKES = {
 
 @pytest.mark.parametrize("change", FILE_MISTAKES, ids=lambda change: change[1] or "nothing")
 def test_a_mistake_in_a_mechanism_file_names_file_key_and_remedy(tmp_path, change):
-    text = (ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml").read_text()
+    text = (ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml").read_text(encoding="utf-8")
     assert change[0] in text
     path = tmp_path / "mine.toml"
-    path.write_text(text.replace(*change, 1))
+    path.write_text(text.replace(*change, 1), encoding="utf-8")
     with pytest.raises(MechanismError) as error:
         read_mechanism(path)
     assert FILE_MISTAKES[change] in str(error.value)
@@ -603,7 +623,7 @@ def test_a_mistake_in_a_mechanism_file_names_file_key_and_remedy(tmp_path, chang
 
 def test_a_byte_order_mark_in_a_mechanism_file_is_ignored(mechanisms, tmp_path):
     """Editors on Windows write byte order marks."""
-    text = (ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml").read_text()
+    text = (ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml").read_text(encoding="utf-8")
     path = tmp_path / "mine.toml"
     path.write_text(text, encoding="utf-8-sig")
     assert read_mechanism(path) == mechanisms["PRBDM"]

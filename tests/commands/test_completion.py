@@ -51,8 +51,8 @@ def test_words_are_completed(line, words):
 
 def test_mechanism_files_of_the_folder_are_proposed(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    Path("mine.toml").write_text("")
-    Path("mine.csv").write_text("")
+    Path("mine.toml").write_text("", encoding="utf-8")
+    Path("mine.csv").write_text("", encoding="utf-8")
     assert completed("prbm modes mi") == ["mine.toml"]
     names = [word for word in completed("prbm modes ") if not word.startswith("--")]
     assert names == [*shipped(), "mine.toml"]
@@ -60,9 +60,9 @@ def test_mechanism_files_of_the_folder_are_proposed(tmp_path, monkeypatch):
 
 def test_names_with_blanks_stay_whole_and_folders_are_proposed(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    Path("my guide.toml").write_text("")
+    Path("my guide.toml").write_text("", encoding="utf-8")
     Path("my parts").mkdir()
-    Path("my parts", "inner.toml").write_text("")
+    Path("my parts", "inner.toml").write_text("", encoding="utf-8")
     assert completed("prbm modes my") == ["my guide.toml", "my parts"]
     assert completed("prbm modes 'my parts/'") == ["my parts/inner.toml"]
 
@@ -70,7 +70,7 @@ def test_names_with_blanks_stay_whole_and_folders_are_proposed(tmp_path, monkeyp
 def test_the_shell_escapes_blanks_of_file_names_alone(tmp_path, monkeypatch):
     """The option ``filenames`` of bash is on if a file is proposed, and off for words."""
     monkeypatch.chdir(tmp_path)
-    Path("my guide.toml").write_text("")
+    Path("my guide.toml").write_text("", encoding="utf-8")
     for word, options in (("my", "-o filenames"), ("PRBDM2R", "")):
         program = (
             f'{script(parser())}\ncompopt() {{ echo "$*"; }}\n'

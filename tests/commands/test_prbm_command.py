@@ -252,7 +252,7 @@ def test_two_coefficients_fitted_to_one_frequency_form_a_valley(capsys):
 def test_several_beams_give_a_table_with_their_mean(tmp_path, capsys):
     """The same record for a beam 1 % wider gives a modulus 1 % lower."""
     records(tmp_path)
-    Path("other.csv").write_text(Path("bending.csv").read_text())
+    Path("other.csv").write_text(Path("bending.csv").read_text(encoding="utf-8"), encoding="utf-8")
     line = (
         "measure youngs-modulus bending.csv other.csv --length 40mm --width 8mm --width 8.08mm "
         "--thickness '0.1 mm +- 0.5 %' --window 10 --out ."
@@ -481,7 +481,7 @@ MISTAKES = [
 
 @pytest.mark.parametrize(("line", "sentence"), MISTAKES)
 def test_mistakes_are_reported_in_one_sentence_and_nothing_is_written(line, sentence, capsys):
-    Path("taken").write_text("")
+    Path("taken").write_text("", encoding="utf-8")
     assert run(line) == cli.MISTAKE
     printed = capsys.readouterr().err
     assert sentence in printed
@@ -505,7 +505,7 @@ def test_missing_output_folders_are_created(line, capsys):
 
 
 def test_an_unwritable_film_is_reported_before_the_simulation(monkeypatch):
-    Path("taken").write_text("")
+    Path("taken").write_text("", encoding="utf-8")
     monkeypatch.setattr("prbm.commands.pictures.simulate", pytest.fail)
     assert run("animate PRBDM taken/a.gif") == cli.MISTAKE
 
@@ -550,7 +550,7 @@ end = "wheel.left"
 
 def test_a_wheel_on_a_cross_pivot_has_a_rest_position_but_no_stiffness(capsys):
     """No force on its centre of mass moves the wheel."""
-    Path("cross.toml").write_text(CROSS)
+    Path("cross.toml").write_text(CROSS, encoding="utf-8")
     assert run("equilibrium cross.toml --out .") == cli.OK
     printed = capsys.readouterr().out
     assert "rest position at 0 mm: stable" in printed
@@ -568,8 +568,8 @@ def test_a_wheel_on_a_cross_pivot_has_a_rest_position_but_no_stiffness(capsys):
 
 
 def test_commands_that_need_a_stop_report_a_missing_one(capsys):
-    Path("cross.toml").write_text(CROSS)
-    Path("data.csv").write_text(text(*GOOD))
+    Path("cross.toml").write_text(CROSS, encoding="utf-8")
+    Path("data.csv").write_text(text(*GOOD), encoding="utf-8")
     restitution = "measure restitution data.csv --mechanism cross.toml"
     for line in (
         "impact-map cross.toml --wall-positions 0 1 mm",
@@ -844,18 +844,21 @@ def test_a_lack_of_memory_is_reported_in_one_sentence(monkeypatch, capsys):
     assert capsys.readouterr().err.startswith("prbm simulate: there is not enough memory; choose ")
 
 
-@pytest.mark.parametrize(("command", "status"), [("--help", cli.OK), ("list", cli.FAILED)])
-def test_a_closed_pipe_is_not_reported(command, status):
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize("command", ["--help", "list"])
+def test_a_closed_pipe_is_not_reported(command, unbuffered):
+    """An output without a buffer fails when it is written, another one at the end."""
     words = [sys.executable, "-m", "prbm", command]
     with subprocess.Popen(
-        words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment()
-    ) as process:
+        words, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        env=environment() | {"PYTHONUNBUFFERED": unbuffered},
+    ) as process:  # fmt: skip
         assert process.stdout is not None
         assert process.stderr is not None
         process.stdout.close()
         printed = process.stderr.read()
     assert printed == b""
-    assert process.returncode == status
+    assert process.returncode == cli.FAILED
 
 
 def test_the_readme_names_the_page_and_the_page_all_commands():
@@ -872,7 +875,7 @@ def test_the_help_of_validate_names_a_compared_quantity(capsys):
 
 def test_a_body_that_is_released_by_an_angle_is_held_by_a_moment(capsys):
     """Amounts are angles in all commands that hold the body."""
-    pivot = SUPPORT / "pivot.toml"
+    pivot = shlex.quote(str(SUPPORT / "pivot.toml"))
     assert run(f"equilibrium {pivot} --held 5deg") == cli.OK
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "Pivot: rotation of wheel, from straight; no gravity acts"
@@ -894,13 +897,13 @@ def test_a_body_that_is_released_by_an_angle_is_held_by_a_moment(capsys):
 @pytest.mark.parametrize("name", ["modes", "simulate --stop-time 1ms", "picture --modes 2"])
 def test_commands_note_a_mode_that_inextensible_flexures_suppress(name, capsys, tmp_path):
     command, *options = name.split()
-    out = f"--out {tmp_path / 'finger.png'}" if command == "picture" else ""
-    assert run(f"{command} {SUPPORT / 'finger.toml'} {' '.join(options)} {out}") == cli.OK
+    out = ["--out", str(tmp_path / "finger.png")] if command == "picture" else []
+    assert cli.main([command, str(SUPPORT / "finger.toml"), *options, *out]) == cli.OK
     assert "note: finger at rest: mode 2 is at 3953 Hz" in capsys.readouterr().out
 
 
 def test_an_impact_map_notes_positions_that_few_pivots_do_not_describe(capsys):
-    finger = SUPPORT / "finger.toml"
+    finger = shlex.quote(str(SUPPORT / "finger.toml"))
     assert run(f"impact-map {finger} --wall-positions 0 3 mm --offsets 0") == cli.OK
     out = capsys.readouterr().out
     assert "note, 2R: finger held at the wall of stop, hit point displaced by 3 mm" in out

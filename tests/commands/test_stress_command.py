@@ -38,12 +38,12 @@ def table() -> list[list[str]]:
 def guide(tmp_path, monkeypatch):
     """Write a file of the guide with a material and stress as outputs; return its name."""
     monkeypatch.chdir(tmp_path)
-    text = shipped()["PRBDM2R"].read_text()
+    text = shipped()["PRBDM2R"].read_text(encoding="utf-8")
     own = 'youngs_modulus = "181.5 GPa"\ndensity = "7.8 g/cm3"\n'
     assert own in text
     text = text.replace(own, 'material = "steel"\nstress = true\n')
     text = text.replace("[ground]", MATERIAL + "\n[ground]")
-    (tmp_path / "guide.toml").write_text(text)
+    (tmp_path / "guide.toml").write_text(text, encoding="utf-8")
     return "guide.toml"
 
 

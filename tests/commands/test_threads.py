@@ -59,7 +59,7 @@ def test_a_reader_that_closes_the_pipe_ends_a_command_without_a_message(argument
     read, write = os.pipe()
     os.close(read)
     command = [sys.executable, "-m", *arguments]
-    with os.fdopen(write) as pipe:
+    with os.fdopen(write, encoding="utf-8") as pipe:
         done = subprocess.run(command, stdout=pipe, stderr=subprocess.PIPE, cwd=tmp_path, text=True)
     assert (done.returncode, done.stderr) == (program.FAILED, "")
     assert [*tmp_path.iterdir()] == []

@@ -18,6 +18,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
+from fmu_host import simulate_fmu
 from prbm.base.errors import ParameterError
 from prbm.commands.command_line import main
 from prbm.drawing.shapes import CURVED_PIVOTS_MAX, curve
@@ -163,7 +164,7 @@ def test_results_of_fmpy_and_of_the_engine_give_equal_films(
 ) -> None:
     mechanism = mechanisms["PRBDM"]
     of_engine = simulate(mechanism, {"stop.offset": 2e-3}, stop_time=STOP_TIME, engine="python")
-    of_fmpy = fmpy.simulate_fmu(
+    of_fmpy = simulate_fmu(
         fmus["PRBDM"],
         stop_time=STOP_TIME,
         output_interval=1e-3,
@@ -293,7 +294,7 @@ def test_a_failed_film_leaves_the_old_file(
     tmp_path: Path, short: Result, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "motion.gif"
-    path.write_text("the old one")
+    path.write_text("the old one", encoding="utf-8")
 
     def interrupt(fraction: float) -> None:
         if fraction > 0.5:
@@ -301,7 +302,7 @@ def test_a_failed_film_leaves_the_old_file(
 
     with pytest.raises(KeyboardInterrupt):
         animate(short, path, slow=5.0, fps=10.0, progress=interrupt)
-    assert path.read_text() == "the old one"
+    assert path.read_text(encoding="utf-8") == "the old one"
     assert [p.name for p in tmp_path.iterdir()] == ["motion.gif"]
 
 
@@ -462,7 +463,7 @@ def test_for_a_result_without_links_a_command_that_records_them_is_printed(
     monkeypatch.chdir(tmp_path)
     for name, path in fmus.items():
         (tmp_path / f"{name}.fmu").write_bytes(path.read_bytes())
-    outputs = fmpy.simulate_fmu(fmus["PRBDM"], stop_time=0.01)
+    outputs = simulate_fmu(fmus["PRBDM"], stop_time=0.01)
     fmpy.util.write_csv("result.csv", outputs)
     commands = []
     for model in ([], ["--model", "PRBDM"]):
@@ -510,6 +511,6 @@ def test_mistakes_are_reported_in_one_sentence(
 def test_an_unidentified_mechanism_must_be_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "result.csv").write_text("time,crank.angle\n0,0\n1,0\n")
+    (tmp_path / "result.csv").write_text("time,crank.angle\n0,0\n1,0\n", encoding="utf-8")
     assert main(["animate", str(tmp_path / "result.csv"), str(tmp_path / "out.gif")]) == 2
     assert re.search(r"--model \(.*PRBDM, PRBDM2R", capsys.readouterr().err)

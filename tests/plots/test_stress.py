@@ -87,7 +87,7 @@ def test_stress_is_interpolated_between_times():
 
 
 def test_a_result_without_all_sections_is_rejected(tmp_path, capsys):
-    (tmp_path / "r.csv").write_text("time\n0\n1\n")
+    (tmp_path / "r.csv").write_text("time\n0\n1\n", encoding="utf-8")
     arguments = ["animate", str(tmp_path / "r.csv"), str(tmp_path / "o.gif"), "--stress"]
     assert cli.main([*arguments, "--model", "GuideBeam"]) == cli.MISTAKE
     assert "--stress: a result has no stress in all sections" in capsys.readouterr().err

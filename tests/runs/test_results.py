@@ -172,7 +172,7 @@ def test_a_file_of_fmpy_is_read_back_exactly(tmp_path: Path, result: Result) -> 
 )
 def test_files_of_another_layout_are_rejected(tmp_path: Path, text: str, sentence: str) -> None:
     path = tmp_path / "result.csv"
-    path.write_text(text)
+    path.write_text(text, encoding="utf-8")
     with pytest.raises(ResultError, match=sentence):
         read_csv(path)
 

@@ -375,14 +375,14 @@ def test_mistakes_in_signals_built_by_hand_are_reported(signal, sentence):
 
 def test_a_column_of_a_file_is_converted_to_si(guide, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    Path("shock.csv").write_text("t [ms],a [g],F [mN]\n0,0,1\n2,100,3\n4,0,5\n")
+    Path("shock.csv").write_text("t [ms],a [g],F [mN]\n0,0,1\n2,100,3\n4,0,5\n", encoding="utf-8")
     signal = read_signal("base.acceleration.x", "csv(shock.csv, a)", "m/s2")
     assert signal.breaks == (0.0, 0.002, 0.004)
     assert after(signal, 0.001) == pytest.approx(50 * 9.80665, rel=1e-14)
     assert after(signal, 1.0) == 0.0
     force = read_signal("force.x", "csv(shock.csv, F)", "N")
     assert after(force, 0.001) == pytest.approx(2e-3)
-    Path("plain.csv").write_text("time,F\n0,1\n1,3\n")
+    Path("plain.csv").write_text("time,F\n0,1\n1,3\n", encoding="utf-8")
     assert read_signal("force.x", "csv(plain.csv)", "N") == Table((0.0, 1.0), (1.0, 3.0))
 
 
@@ -439,10 +439,10 @@ MISTAKES = [
 @pytest.mark.parametrize(("inputs", "sentence"), MISTAKES)
 def test_mistakes_in_signals_are_reported(guide, inputs, sentence, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    Path("a.csv").write_text("t [s],a [N],b [mm]\n0,0,1\n2,100,3\n")
-    Path("gap.csv").write_text("t,F\n0,0\n1,\n")
-    Path("blank.csv").write_text("\nt,F,b\n1,1,2\n\n0,-,4\n")
-    Path("bare.csv").write_text("0,0\n1,1\n2,2\n")
+    Path("a.csv").write_text("t [s],a [N],b [mm]\n0,0,1\n2,100,3\n", encoding="utf-8")
+    Path("gap.csv").write_text("t,F\n0,0\n1,\n", encoding="utf-8")
+    Path("blank.csv").write_text("\nt,F,b\n1,1,2\n\n0,-,4\n", encoding="utf-8")
+    Path("bare.csv").write_text("0,0\n1,1\n2,2\n", encoding="utf-8")
     with pytest.raises(PrbmError, match=sentence):
         simulate(guide, inputs=inputs, stop_time=0.01)
 

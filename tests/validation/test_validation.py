@@ -200,12 +200,14 @@ def test_the_command_writes_and_lists_results_and_rejects_errors(tmp_path, capsy
     monkeypatch.setattr(validation, "RESULTS", (Reproduction("quick", lambda progress: drawn),))
     assert main(["validate", "--out", str(tmp_path)]) == 0
     assert (tmp_path / "figures" / "validation-quick.png").read_bytes().startswith(b"\x89PNG")
-    assert "![A figure](figures/validation-quick.png)" in (tmp_path / "validation.md").read_text()
+    assert "![A figure](figures/validation-quick.png)" in (tmp_path / "validation.md").read_text(
+        encoding="utf-8"
+    )
     assert main(["validate", "--list"]) == 0
     assert "quick" in capsys.readouterr().out
     assert main(["validate", "--only", "figure-9"]) == 2
     assert "unknown result 'figure-9'" in capsys.readouterr().err
-    (tmp_path / "file").write_text("")
+    (tmp_path / "file").write_text("", encoding="utf-8")
     assert main(["validate", "--out", str(tmp_path / "file")]) == 2
     assert "file is a file" in capsys.readouterr().err
 

@@ -27,6 +27,7 @@ from ..mechanics.statics import equilibrium
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import value
+from ..runs.released import released_label
 from .flexure_models import stretching, with_flexures
 from .touching import impact_shape, lever
 
@@ -386,13 +387,14 @@ def wall(system: System, impact: Impact) -> float:
 
 def _where(model: _Model, shape: Shape, cause: Cause = Cause.PIVOTS) -> str:
     """Return the description of a shape, the beginning of a sentence."""
-    system, released = model.system(shape), model.mechanism.release.body
+    system, release = model.system(shape), model.mechanism.release
     factor, name = length_unit(system.length)
     if isinstance(shape, Vibration):
-        if model.mechanism.release.turns:
+        if release.turns:
             factor, name = 180 / math.pi, "deg"
-        at = "at rest" if shape.held is None else f"held at {factor * shape.held:.4g} {name}"
-        return f"{released} {at}"
+        if shape.held is None:
+            return f"{release.body} at rest"
+        return f"{released_label(release)} held at {factor * shape.held:.4g} {name}"
     stop = model.mechanism.stops[shape.stop]
     place = f"{factor * wall(system, shape):.4g} {name}"
     touching = f"{stop.body} held at the wall of {stop.name}, hit point displaced by {place}"

@@ -194,9 +194,8 @@ def _straight(hold: Callable[[float], float], step: float) -> Quantities:
 
 def _of_model(system: System, step: float) -> Quantities:
     free = equilibrium(system)
-    x = float((system.release @ system.directions(free.q)).real) + system.release_c
     return {
-        "rest position": x,
+        "rest position": system.amount(free.q),
         **_frequencies(modes(system, free), "at rest"),
         **_straight(lambda x: equilibrium(system, x).force, step),
         **_frequencies(modes(system, equilibrium(system, 0.0)), "straight"),

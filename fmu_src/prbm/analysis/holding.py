@@ -34,15 +34,15 @@ class Held:
     Parameters
     ----------
     displacement : float
-        Displacement of the released body along the direction of the release, from the straight
-        shape [m]; its rotation [rad] if the release is by an angle.
+        Displacement of the released point along the direction of the release, from the straight
+        shape [m]; the rotation of its body [rad] if the release is by an angle.
     force : float
         Holding force on the body along that direction [N], or moment [N m]; 0 at a rest position.
     stiffness : float
         Derivative of the force by the displacement [N/m], [N m/rad]; NaN where the loops prevent
         a further motion along that direction.
     across : float
-        Displacement of the body to the left of that direction [m].
+        Displacement of the released point to the left of that direction [m].
     angle : float
         Rotation of the body, counter-clockwise [rad].
     frequency : float
@@ -61,7 +61,7 @@ class Held:
 def _described(system: System, displacement: float, shape: Equilibrium) -> Held:
     """Return a held shape with its stiffness and frequency."""
     release = system.mechanism.release
-    frame, e = system.bodies[release.body], system.directions(shape.q)
+    frame, e = system.released, system.directions(shape.q)
     moved = unit(release.direction).conjugate() * complex(frame.c + frame.A @ e - frame.drawn)
     return Held(
         displacement, shape.force, _stiffness(system, displacement), moved.imag,

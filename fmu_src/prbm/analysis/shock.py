@@ -18,12 +18,12 @@ from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble
 from ..mechanics.statics import free_displacement
 from ..mechanics.stress import with_stress
-from ..mechanics.system import unit
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import Release
 from ..runs.experiment import STEPS, experiment
 from ..runs.marks import largest_latched
 from ..runs.quantities import settling
+from ..runs.released import released_displacement, system_of
 from ..runs.result import Result
 from ..runs.run import simulate
 from ..runs.signals import RAMP_SHARE, Signal, Wave, sawtooth, trapezoid
@@ -239,13 +239,15 @@ def shock(
 
 
 def displacement(result: Result) -> Real:
-    """Return the displacement of the released body from its start over time [m], [rad]."""
+    """Return the displacement of the released point from its start over time [m].
+
+    If the release is by an angle, return the rotation of its body from the start [rad].
+    """
     release, columns = result.mechanism.release, result.columns
     if release.turns:
-        turned: Real = columns[f"{release.body}.angle"] - columns[f"{release.body}.angle"][0]
-        return turned
-    u = unit(release.direction)
-    along: Real = u.real * columns[f"{release.body}.x"] + u.imag * columns[f"{release.body}.y"]
+        along: Real = columns[f"{release.body}.angle"]
+    else:
+        along = released_displacement(system_of(result), columns)
     moved: Real = along - along[0]
     return moved
 

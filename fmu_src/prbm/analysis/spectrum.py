@@ -22,11 +22,11 @@ from scipy.signal.windows import hann
 from ..base.errors import ParameterError
 from ..hybrid.records import Impact
 from ..mechanics.arrays import Real
-from ..mechanics.assembly import assemble
 from ..mechanics.modal import modes_at
 from ..mechanics.system import unit
 from ..mechanism.description import Mechanism
 from ..runs.engine import simulation as start
+from ..runs.released import system_of
 from ..runs.result import Result
 from .impact_map import first_impact
 
@@ -153,9 +153,7 @@ def after_last_impact(result: Result) -> AfterImpact:
             f"needs at least {SAMPLES_MIN}: simulate longer, or in smaller steps"
         )
     v = unit(s.direction).conjugate() * (later[f"{s.body}.vx"] + 1j * later[f"{s.body}.vy"])
-    own = {p.name for p in result.mechanism.parameters}
-    values = {name: x for name, x in result.values.items() if name in own}
-    found = modes_at(assemble(result.mechanism, values), impact.q).frequency
+    found = modes_at(system_of(result), impact.q).frequency
     return AfterImpact(
         result.mechanism.title, impact, later["time"] - impact.time, v.real, v.imag,
         later[f"{s.body}.omega"], found,

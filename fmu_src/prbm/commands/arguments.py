@@ -4,6 +4,7 @@ This module imports no slow packages, so that help appears at once.
 """
 
 import re
+import sys
 import textwrap
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Iterable, Sequence
@@ -27,6 +28,13 @@ class ProposingParser(ArgumentParser):
         if args is not None and not self.allow_abbrev and self._subparsers is None:
             self._check_options(args)
         return super().parse_known_args(args, namespace)
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        """Print the help or the version.
+
+        Some versions of argparse ignore that the reader has closed the pipe.
+        """
+        print(message, end="", file=file or sys.stderr)
 
     def _check_options(self, words: Sequence[str]) -> None:
         """Report the first unknown option."""

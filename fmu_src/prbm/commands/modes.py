@@ -15,6 +15,7 @@ from ..mechanics.statics import Equilibrium, equilibrium
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import value
+from ..runs.released import released_label
 from .output import Output, aligned
 from .systems import assembled, check_held, held_scale, held_unit, rounded
 
@@ -91,15 +92,15 @@ def _hertz(frequency: float) -> str:
 def _where(system: System, shape: Equilibrium, at: float | None) -> str:
     """Return a description of the shape about which the mechanism vibrates."""
     name, release = system.mechanism.name, system.mechanism.release
-    held = held_unit(system.mechanism)
+    held, moved = held_unit(system.mechanism), released_label(release)
     straight = release.direction == 0.0 or release.turns
     along = "" if straight else f" along {release.direction:g} degrees"
     if at is not None:
         effort = held.si_effort.replace(".", " ")
         return (
-            f"{name}, {release.body} held at {held.factor * at:.6g} {held.shown} from straight"
+            f"{name}, {moved} held at {held.factor * at:.6g} {held.shown} from straight"
             f"{along} by {shape.force:.5g} {effort}"
         )
     at_rest = "at rest under gravity" if system.gravity else "at rest without gravity"
     place = rounded(held.factor * system.amount(shape.q), held.factor * held_scale(system))
-    return f"{name} {at_rest}, {release.body} {place} {held.shown} from straight{along}"
+    return f"{name} {at_rest}, {moved} {place} {held.shown} from straight{along}"

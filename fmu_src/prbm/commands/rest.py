@@ -13,6 +13,7 @@ from ..mechanics.statics import immobile
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from ..plots.holding import holding_figure
+from ..runs.released import released_label
 from .output import Output, aligned
 from .systems import HeldUnit, assembled, check_held, held_scale, held_unit, rounded
 
@@ -104,8 +105,8 @@ def _held(mechanism: Mechanism) -> str:
     release = mechanism.release
     if release.turns:
         return release.body
-    point = release.body if release.point is None else f"the released point of {release.body}"
-    return f"{point} along {'x' if release.direction == 0.0 else f'{release.direction:g} degrees'}"
+    along = "x" if release.direction == 0.0 else f"{release.direction:g} degrees"
+    return f"{released_label(release)} along {along}"
 
 
 def _csv_head(unit: HeldUnit) -> list[str]:

@@ -12,6 +12,7 @@ from ..files.settings import UserMistake, quantities, quantity, settings
 from ..mechanics.assembly import assemble
 from ..mechanism.description import Mechanism
 from ..runs.headline import contact_line, instant, length
+from ..runs.released import released_label
 from .output import Output, aligned
 from .stress import no_damage
 
@@ -97,7 +98,7 @@ def _print(found: Shock, mechanism: Mechanism, about: str) -> None:
         if release.turns
         else length(found.displacement, size)
     )
-    print(f"largest displacement {release.body} {largest} from its equilibrium")
+    print(f"largest displacement {released_label(release)} {largest} from its equilibrium")
     for hits in found.hits:
         how = f", at most {hits.speed:.4g} m/s and {hits.impulse:.4g} N s" if hits.count else ""
         print(f"impacts at {hits.stop:9} {hits.count}{how}")

@@ -17,6 +17,13 @@ from ..mechanics.system import unit
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import GROUND
 from ..runs.marks import Mark, marks
+from ..runs.released import (
+    displacement_outputs,
+    released_displacement,
+    released_velocity,
+    system_of,
+    velocity_outputs,
+)
 from ..runs.result import (
     ZERO_MOTION_RTOL,
     Columns,
@@ -67,7 +74,12 @@ class _Plot:
         self.columns = result.columns if isinstance(result, Result) else result
         self.mechanism = mechanism
         self.marks = marks(result, mechanism)
-        self.size = assemble(mechanism, mechanism.values()).length
+        self.system = (
+            system_of(result)
+            if isinstance(result, Result)
+            else assemble(mechanism, mechanism.values())
+        )
+        self.size = self.system.length
         self.seconds: Real = np.asarray(column(self.columns, "time"), float)
         self.end = self._end()
         self.factor, self.unit = time_unit(self.end)
@@ -89,18 +101,15 @@ class _Plot:
         end = settled + SETTLED_MARGIN * (settled - first)
         return end if first < end < first + SETTLED_SHARE_MAX * (last - first) else last
 
-    def along(self, x: str, y: str) -> Real:
-        """Return a vector of the released body along the direction of the release."""
-        body, u = self.mechanism.release.body, unit(self.mechanism.release.direction)
-        result: Real = u.real * self.columns[f"{body}.{x}"] + u.imag * self.columns[f"{body}.{y}"]
-        return result
+    def displacement(self) -> Real:
+        """Return the displacement of the released point along the direction of the release [m]."""
+        return released_displacement(self.system, self.columns)
 
     def at_rest(self) -> bool:
-        """Return whether the recorded displacement of the released body is round-off."""
-        body = self.mechanism.release.body
-        if not self.has(f"{body}.x", f"{body}.y"):
+        """Return whether the recorded displacement of the released point is round-off."""
+        if not self.has(*displacement_outputs(self.mechanism.release)):
             return False
-        return float(np.ptp(self.along("x", "y"))) <= ZERO_MOTION_RTOL * self.size
+        return float(np.ptp(self.displacement())) <= ZERO_MOTION_RTOL * self.size
 
 
 @own_style()
@@ -117,8 +126,8 @@ def response(result: Result | Columns, mechanism: Mechanism | None = None) -> Fi
     Returns
     -------
     Figure
-        One panel for each recorded quantity: displacement and velocity of the released body along
-        the direction of its release, or its rotation and rate if it is released by an angle;
+        One panel for each recorded quantity: displacement and velocity of the released point along
+        the direction of its release, or rotation and rate of its body for a release by an angle;
         closing and opening speeds of the impacts, energies.  The sum of the energies less the work
         is constant.  Times at which a stop holds are shaded.  The time axis ends shortly after the
         motion has settled.  If no body moves, the figure says so.
@@ -140,9 +149,9 @@ def response(result: Result | Columns, mechanism: Mechanism | None = None) -> Fi
     body = mechanism.release.body
     drawn: list[Panel] = []
     turns = mechanism.release.turns
-    if plot.has(f"{body}.angle") if turns else plot.has(f"{body}.x", f"{body}.y"):
+    if plot.has(f"{body}.angle") if turns else plot.has(*displacement_outputs(mechanism.release)):
         drawn.append(_rotation if turns else _displacement)
-    if plot.has(f"{body}.omega") if turns else plot.has(f"{body}.vx", f"{body}.vy"):
+    if plot.has(f"{body}.omega") if turns else plot.has(*velocity_outputs(mechanism.release)):
         drawn.append(_turning if turns else _velocity)
     if plot.marks:
         drawn.append(_speeds)
@@ -201,7 +210,7 @@ def _shade_rest(axes: Axes, plot: _Plot) -> None:
 
 
 def _displacement(axes: Axes, plot: _Plot) -> None:
-    x = plot.along("x", "y")
+    x = plot.displacement()
     if plot.at_rest():
         x = np.full(len(x), round(float(x[0]) / plot.size, 9) * plot.size)
     factor, unit_name = length_unit(float(np.abs(x).max()) or plot.size)
@@ -260,7 +269,8 @@ def _walls(axes: Axes, plot: _Plot, x: Real, factor: float) -> None:
 
 
 def _velocity(axes: Axes, plot: _Plot) -> None:
-    v = np.zeros(len(plot.time)) if plot.at_rest() else plot.along("vx", "vy")
+    at_rest = plot.at_rest()
+    v = np.zeros(len(plot.time)) if at_rest else released_velocity(plot.system, plot.columns)
     factor, unit_name = prefixed_unit(float(np.abs(v).max()), "m/s")
     axes.plot(plot.time, factor * v, color=PAST, linewidth=1.2)
     axes.set_ylabel(f"velocity [{unit_name}]")

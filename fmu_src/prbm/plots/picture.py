@@ -13,7 +13,7 @@ from matplotlib.patches import PathPatch
 from matplotlib.patheffects import withStroke
 
 from ..base.errors import ParameterError, PrbmError
-from ..base.tolerances import RELEASE_PENETRATION_ATOL
+from ..base.tolerances import RELEASE_PENETRATION_RTOL
 from ..base.unit_text import frequency_unit, length_unit
 from ..drawing.shapes import Shapes, corners
 from ..drawing.style import (
@@ -333,7 +333,7 @@ class Drawing:
                 into *= complex(E[system.on[i]])
             self.line(np.array([hit, hit + gap * into]), START, 1.0, 6.5, ":")
             self.mark(np.array([hit]), "o", START, 5.0, 6.6)
-            if gap < -RELEASE_PENETRATION_ATOL:
+            if gap < -RELEASE_PENETRATION_RTOL * system.length:
                 words = f"behind {stop.name} by {-gap * self.factor:.3g} {self.unit}"
             else:
                 words = f"start gap {gap * self.factor:.3g} {self.unit}"

@@ -36,6 +36,7 @@ from ..drawing.style import (
     own_style,
 )
 from ..mechanics.arrays import Complex
+from ..runs.released import released_label
 from .motion import Film, Motion, pace
 from .stress_colours import (
     COLOURS_OF_STRESS,
@@ -298,7 +299,7 @@ class Scene:
         else:
             row, c = self.system.release, self.system.release_c
             self.traced = ((self.system.directions(motion.q) @ row).real + c)[:, None]
-            label = self.system.mechanism.release.body
+            label = released_label(self.system.mechanism.release)
         shown = (motion.time >= span[0]) & (motion.time <= span[1])
         factor, name = length_unit(float(np.ptp(self.traced[shown])) or self.system.length)
         trace.set_ylabel(f"{label} [{name}]", fontsize=9, labelpad=1)

@@ -12,6 +12,7 @@ from ..drawing.style import IMPACT, PAST, REST, WALL, own_style
 from ..mechanics.arrays import Real
 from ..mechanics.system import unit
 from ..mechanism.parts import GROUND
+from ..runs.released import released_label
 from .figures import PANEL_HEIGHT, PARALLEL_ATOL, WALL_MARGIN, WIDTH
 from .scene import plain
 
@@ -61,7 +62,7 @@ def _draw_displacement(axes: Axes, found: Shock, time: Real) -> None:
     factor, shown = displacement_unit(found.result.mechanism)
     moved, release = factor * displacement(found.result), found.result.mechanism.release
     axes.plot(time, moved, color=PAST)
-    axes.set_ylabel(f"{release.body} [{shown}]")
+    axes.set_ylabel(f"{released_label(release)} [{shown}]")
     if release.turns:
         return
     reach = (1.0 + WALL_MARGIN) * float(np.abs(moved).max())
@@ -117,7 +118,7 @@ def fragility_figure(peaks: Sequence[float], found: Sequence[Shock], level: floa
     panels = list(figure.subplots(3, 1, sharex=True))
     x = np.array(peaks) / GRAVITY
     panels[0].plot(x, [factor * abs(one.displacement) for one in found], "o-", color=PAST)
-    panels[0].set_ylabel(f"{found[0].result.mechanism.release.body} [{shown}]")
+    panels[0].set_ylabel(f"{released_label(found[0].result.mechanism.release)} [{shown}]")
     hits = [sum(hits.count for hits in one.hits) for one in found]
     panels[1].plot(x, hits, "o-", color=PAST)
     panels[1].set_ylabel("impacts")

@@ -1,6 +1,5 @@
 """The summary of a result: frequency, free rest position, impacts, rest on a stop."""
 
-import cmath
 import math
 from collections.abc import Mapping
 
@@ -8,11 +7,11 @@ from ..base.unit_text import frequency_unit, length_unit, prefixed_unit, time_un
 from ..mechanics.assembly import assemble
 from ..mechanics.statics import free_displacement
 from ..mechanics.stress import stressed
-from ..mechanics.system import System, unit
+from ..mechanics.system import System
 from ..mechanism.description import Mechanism
-from ..mechanism.expressions import affine
 from .marks import largest_latched, marks
 from .quantities import FREQUENCY, KINETIC, SETTLED_ENERGY_RTOL, settling
+from .released import displacement_outputs, released_displacement
 from .result import Columns, Result, column, moves, rest_time
 
 SECONDS_MIN = 0.1  # Times of shorter runs are printed in ms or µs [s].
@@ -197,16 +196,12 @@ def _from_straight(amount: float, system: System) -> str:
 
 def _place(columns: Columns, system: System) -> str:
     """Return the final position of the released body as text."""
-    release, frame = system.mechanism.release, system.released
-    x, y, angle = (
-        float(column(columns, f"{release.body}.{output}")[-1]) for output in ("x", "y", "angle")
-    )
+    release = system.mechanism.release
     if release.turns:
-        return _from_straight(angle, system)
+        return _from_straight(float(column(columns, f"{release.body}.angle")[-1]), system)
+    for name in displacement_outputs(release):
+        column(columns, name)  # Raises an error if it is missing.
+    moved = float(released_displacement(system, columns[-1:])[0])
     if release.direction == 0.0 and release.point is None:
-        return f"{release.body}.x = {length(x, system.length)}"
-    drawn = frame.drawn
-    if release.point is not None:
-        drawn = complex(*(affine(coordinate)(system.values) for coordinate in release.point))
-    moved = complex(x, y) + (drawn - frame.drawn) * (cmath.exp(1j * angle) - 1.0)
-    return _from_straight((unit(release.direction).conjugate() * moved).real, system)
+        return f"{release.body}.x = {length(moved, system.length)}"
+    return _from_straight(moved, system)

@@ -9,6 +9,7 @@ from typing import Any, cast
 
 from ..base.errors import ParameterError
 from ..base.names import proposal, unknown
+from ..base.reading import opening_error, shown
 from ..mechanics.inputs import input_units
 from ..mechanism.description import Mechanism
 from .signals import (
@@ -365,10 +366,12 @@ def _rows(where: str, path: Path) -> tuple[list[str], dict[int, list[str]]]:
         with path.open(newline="", encoding="utf-8-sig") as file:
             reader = csv.reader(file)
             rows = dict((reader.line_num, row) for row in reader if row)
-    except OSError as error:
-        raise ParameterError(f"{where}: {path} cannot be read ({error.strerror})") from None
     except (UnicodeDecodeError, csv.Error) as error:
         raise ParameterError(f"{where}: {path} is not a CSV file ({error})") from None
+    except (OSError, ValueError) as error:
+        raise ParameterError(
+            f"{where}: {shown(path)} cannot be read ({opening_error(error)})"
+        ) from None
     head = rows.pop(min(rows, default=0), [])
     if len(rows) < 2 or len(head) < 2 or _numeric(head, (0,)):
         raise ParameterError(

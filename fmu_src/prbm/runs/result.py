@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..base.errors import PrbmError
 from ..base.names import proposal
+from ..base.reading import opening_error, shown
 from ..hybrid.records import Impact
 from ..mechanics.arrays import Real
 from ..mechanism.description import Mechanism
@@ -150,10 +151,10 @@ def read_csv(path: str | Path) -> Columns:
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             lines = [line for line in csv.reader(file) if line]
-    except OSError as error:
-        raise ResultError(f"{path}: cannot be read ({error.strerror})") from None
     except (UnicodeDecodeError, csv.Error) as error:
         raise ResultError(f"{path}: not a CSV file ({error})") from None
+    except (OSError, ValueError) as error:
+        raise ResultError(f"{shown(path)}: cannot be read ({opening_error(error)})") from None
     if len(lines) < 3 or lines[0][0].strip() != "time":
         raise ResultError(
             f"{path}: not a result; the first line must name the columns, the first of them time, "

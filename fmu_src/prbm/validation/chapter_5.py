@@ -124,8 +124,11 @@ def elements_of_steel(_: Progress) -> Result:
         found[count] = [1e3 * fe.displacement(rest.q), *fe.modes(rest).frequency[:3], straight]
     system = assemble(two, two.values())
     shape = equilibrium(system)
-    x = float((system.release @ system.directions(shape.q)).real) + system.release_c
-    own = [1e3 * x, *modes(system, shape).frequency[:3], frequencies(two, WEIGHTLESS)[0]]
+    own = [
+        1e3 * system.amount(shape.q),
+        *modes(system, shape).frequency[:3],
+        frequencies(two, WEIGHTLESS)[0],
+    ]
     names = (
         "rest position, mm",
         "f1 at rest, Hz",

@@ -14,13 +14,13 @@ from ...mechanics.arrays import Real
 from ...mechanics.assembly import assemble
 from ...mechanics.modal import modes
 from ...mechanics.statics import equilibrium
-from ...mechanics.system import unit
 from ...mechanism.description import Mechanism
 from ...runs.engine import Engine, simulation
+from ...runs.released import displacement_outputs, released_displacement
 
 RECORD_SHIFT, RECORD_ZERO = "record.shift", "record.zero"
 RECORD_UNITS = {RECORD_SHIFT: "s", RECORD_ZERO: "m"}  # Parameters of a record, not of a mechanism.
-DISPLACEMENT = "displacement"  # Output: displacement of the released body along its release.
+DISPLACEMENT = "displacement"  # Output: displacement of the released point along its release.
 
 
 class Target(Protocol):
@@ -122,7 +122,7 @@ class Response:
         The record, with times since the release.
     output : str
         Name of the output, for instance ``shuttle.x``; or ``displacement``, that of the released
-        body along the direction of its release.
+        point along the direction of its release.
     uncertainty : float or None
         Standard uncertainty of a sample; None: estimated from the residuals.
     tolerance : float or None
@@ -170,16 +170,14 @@ class Response:
 
 
 def _outputs(motion: Engine, times: Real, name: str) -> Real:
-    """Return an output, or the displacement of the released body [m], at times."""
-    release = motion.mechanism.release
+    """Return an output, or the displacement of the released point [m], at times."""
     if name == DISPLACEMENT:
-        x, y = motion.sample(times, [f"{release.body}.{axis}" for axis in "xy"]).T
-        u = unit(release.direction)
-        displacement: Real = u.real * x + u.imag * y
-        return displacement
-    outputs = motion.outputs()
-    if name not in outputs:
-        raise EvaluationError(unknown(name, {DISPLACEMENT: 0.0, **outputs}))
+        needed = displacement_outputs(motion.mechanism.release)
+        columns = dict(zip(needed, motion.sample(times, needed).T, strict=True))
+        return released_displacement(motion.system, columns)
+    known = motion.outputs()
+    if name not in known:
+        raise EvaluationError(unknown(name, {DISPLACEMENT: 0.0, **known}))
     return motion.sample(times, [name])[:, 0]
 
 

@@ -89,8 +89,9 @@ def closed_form(
 def _path(system: System, body: str, shape: Equilibrium) -> tuple[complex, float]:
     """Return the unit direction of a body's path along held shapes, and its rotation [rad/m]."""
     frame, step = system.bodies[body], PATH_STEP * system.length
-    held = float((system.release @ system.directions(shape.q)).real) + system.release_c
-    behind, ahead = (equilibrium(system, held + k * step).q for k in (-1, 1))
+    held, turns = system.amount(shape.q), system.mechanism.release.turns
+    change = PATH_STEP if turns else step
+    behind, ahead = (equilibrium(system, held + k * change).q for k in (-1, 1))
     moved = complex(frame.A @ (system.directions(ahead) - system.directions(behind)))
     if abs(moved) <= PATH_RTOL * step:
         raise ParameterError(
