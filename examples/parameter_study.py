@@ -14,11 +14,10 @@ and the guide rests at t_1 + T(eps v_1) + T(eps^2 v_1) + ..., where t_1 and v_1 
 speed of the first impact and eps is the restitution.
 """
 
+import io
 import math
 import sys
-import tempfile
 from collections.abc import Sequence
-from pathlib import Path
 
 import fmpy
 import numpy as np
@@ -28,6 +27,7 @@ from scipy.optimize import brentq
 
 from prbm import load
 from prbm.fmu.python_fmu import build
+from prbm.fmu.unpack import unpacked
 
 RESTITUTIONS = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 REST_SPEED = 1e-5  # Slower impacts end the bouncing, at most 0.1 ms early [m/s].
@@ -48,10 +48,7 @@ def study(restitutions: Sequence[float] = RESTITUTIONS) -> np.ndarray:
         ``restitution`` [-]; ``rebound``, the ratio of opening to closing speed that differs most
         from it [-]; ``impacts``; ``rest_time`` by the FMU and ``exact`` by the scalar equation [s].
     """
-    with tempfile.TemporaryDirectory() as folder:
-        fmu = Path(folder) / "PRBDM.fmu"
-        fmu.write_bytes(build(load("PRBDM")))
-        unzipped = fmpy.extract(fmu, Path(folder) / "unzipped")
+    with unpacked(io.BytesIO(build(load("PRBDM")))) as unzipped:
         start = {"damping.beta": 0.0, "stop.rest_speed": REST_SPEED}
         rows = []
         for restitution in restitutions:

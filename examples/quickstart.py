@@ -16,6 +16,7 @@ import numpy as np
 from prbm import load
 from prbm.base.errors import PrbmError
 from prbm.fmu.python_fmu import build
+from prbm.fmu.unpack import unpacked
 from prbm.plots.animation import animate
 from prbm.plots.figures import response, save
 from prbm.runs.result import rest_time
@@ -44,7 +45,8 @@ def simulate(folder: Path, stop_time: float = 1.0) -> np.ndarray:
     fmu.write_bytes(build(MECHANISM))
     variables = fmpy.read_model_description(fmu).modelVariables
     record = [v.name for v in variables if v.causality in ("output", "local")]
-    return fmpy.simulate_fmu(fmu, stop_time=stop_time, output_interval=1e-3, output=record)
+    with unpacked(fmu) as unzipped:
+        return fmpy.simulate_fmu(unzipped, stop_time=stop_time, output_interval=1e-3, output=record)
 
 
 def main(arguments: list[str] | None = None) -> None:

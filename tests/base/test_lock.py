@@ -53,10 +53,12 @@ def test_a_held_lock_is_rejected_with_its_owner(holder, tmp_path):
 def test_the_lock_of_a_killed_process_is_free(holder, tmp_path):
     holder.kill()
     holder.wait()
-    assert (tmp_path / "lock").read_text() == f"process {holder.pid} on {platform.node()}"
+    assert (tmp_path / "lock").read_text(
+        encoding="utf-8"
+    ) == f"process {holder.pid} on {platform.node()}"
     with locked(tmp_path / "lock", wait=False):
-        assert str(os.getpid()) in (tmp_path / "lock").read_text()
-    assert (tmp_path / "lock").read_text() == ""
+        assert str(os.getpid()) in (tmp_path / "lock").read_text(encoding="utf-8")
+    assert (tmp_path / "lock").read_text(encoding="utf-8") == ""
 
 
 def test_a_wait_for_a_lock_ends_when_its_owner_ends(holder, tmp_path):
@@ -76,7 +78,7 @@ def test_threads_and_nested_blocks_lock_each_other_out(tmp_path):
 
 
 def test_a_block_runs_without_lock_if_the_file_cannot_be_opened(tmp_path):
-    (tmp_path / "file").write_text("")
+    (tmp_path / "file").write_text("", encoding="utf-8")
     with locked(tmp_path / "file" / "lock", wait=False):
         pass
 
@@ -137,4 +139,4 @@ def test_on_windows_a_held_lock_is_polled(windows, tmp_path, monkeypatch):
     owners[path.stat().st_ino, locks.LOCKED_BYTE] = None
     monkeypatch.setattr(windows.time, "sleep", lambda seconds: owners.clear())
     with windows.locked(path):
-        assert path.read_text().startswith(f"process {os.getpid()}")
+        assert path.read_text(encoding="utf-8").startswith(f"process {os.getpid()}")

@@ -38,7 +38,9 @@ def test_encodings_are_detected(encoding, unit, tmp_path):
 def test_names_of_columns_can_be_given_for_a_table_without_a_head(tmp_path):
     """The carbon-nanotube records of the thesis have three columns and no head."""
     path = tmp_path / "TS02E01CNT009_1_data.txt"
-    path.write_text(table("\t", factors=(1.0, 1e3, 1.0), columns=(TIME, SIGNAL, SIGNAL)))
+    path.write_text(
+        table("\t", factors=(1.0, 1e3, 1.0), columns=(TIME, SIGNAL, SIGNAL)), encoding="utf-8"
+    )
     record = read_record(path, columns=["t [s]", "d [mm]", "F"], units={"F": "mN"})
     np.testing.assert_allclose(record.column("d", "mm"), SIGNAL, rtol=1e-8)
     np.testing.assert_allclose(record.column("f", "N"), 1e-3 * SIGNAL, rtol=1e-8)
@@ -46,7 +48,9 @@ def test_names_of_columns_can_be_given_for_a_table_without_a_head(tmp_path):
 
 def test_temperatures_and_percentages_are_converted_to_si(tmp_path):
     path = tmp_path / "record.csv"
-    path.write_text("t [min];T [°C];u [%];n [-]\n0;20;50;1\n1;21,5;51;2\n2;22;52;3\n")
+    path.write_text(
+        "t [min];T [°C];u [%];n [-]\n0;20;50;1\n1;21,5;51;2\n2;22;52;3\n", encoding="utf-8"
+    )
     record = read_record(path)
     assert record.time.values.tolist() == [0.0, 60.0, 120.0]
     assert record.column("T", "K") == pytest.approx([293.15, 294.65, 295.15], rel=1e-15)
@@ -153,7 +157,7 @@ def test_malformed_records_are_rejected_with_one_message(name, tmp_path):
 
 def test_arguments_that_disagree_with_the_file_are_rejected(tmp_path):
     path = tmp_path / "record.csv"
-    path.write_text(HEAD + table())
+    path.write_text(HEAD + table(), encoding="utf-8")
     with pytest.raises(RecordError, match="a unit is given for the unknown column 'y'"):
         read_record(path, units={"y": "mm"})
     with pytest.raises(RecordError, match="the unit 'ell' of 'x' is unknown"):
@@ -170,7 +174,7 @@ def test_arguments_that_disagree_with_the_file_are_rejected(tmp_path):
 
 def test_given_units_replace_those_of_the_file(tmp_path):
     path = tmp_path / "record.csv"
-    path.write_text("t [s],x [mm]\n" + table())
+    path.write_text("t [s],x [mm]\n" + table(), encoding="utf-8")
     record = read_record(path, units={"t": "ms", "x": "V"})
     np.testing.assert_allclose(record.time.values, 1e-3 * TIME, atol=1e-15)
     np.testing.assert_allclose(record.column("x", "mV"), 1e3 * SIGNAL, rtol=1e-8)

@@ -15,7 +15,7 @@ from prbm.files.mechanism_file import read_mechanism
 from support import ROOT
 
 PROGRAMS = {"prbm": "prbm", "prbm-build-fmu": "prbm.commands.build_fmu"}
-PAGE = (ROOT / "docs" / "describe-your-mechanism.md").read_text()
+PAGE = (ROOT / "docs" / "describe-your-mechanism.md").read_text(encoding="utf-8")
 
 
 def blocks(kind: str) -> list[str]:
@@ -25,7 +25,7 @@ def blocks(kind: str) -> list[str]:
 def write_file(folder: Path) -> Path:
     """Write the mechanism file of the page, all pieces in order."""
     path = folder / "lever.toml"
-    path.write_text("\n".join(blocks("toml")))
+    path.write_text("\n".join(blocks("toml")), encoding="utf-8")
     return path
 
 

@@ -17,7 +17,7 @@ pytestmark = [pytest.mark.fmu, pytest.mark.native]
 
 def blocks() -> list[tuple[str, str]]:
     """Return the attribute of each code block, and its code."""
-    return re.findall(r"```python ?(.*?)\n(.*?)```", PAGE.read_text(), re.DOTALL)
+    return re.findall(r"```python ?(.*?)\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
 
 
 @pytest.fixture
@@ -33,7 +33,7 @@ def printed(tmp_path, monkeypatch, capsys) -> str:
         if "libcosimpy" in code:
             pytest.importorskip("libcosimpy", reason="libcosimpy is not installed")
         if note:
-            Path(note.removeprefix("file=")).write_text(code)
+            Path(note.removeprefix("file=")).write_text(code, encoding="utf-8")
         else:
             exec(compile(code, PAGE.name, "exec"), space)
     return capsys.readouterr().out
@@ -62,7 +62,7 @@ def test_coupling_errors_of_the_page_halve_with_the_step_and_masters_agree(print
 
 def test_recipes_for_other_tools_connect_the_same_variables():
     """The systems of fmucontainer and ecos are those of the first example of the page."""
-    text = PAGE.read_text()
+    text = PAGE.read_text(encoding="utf-8")
     (code,) = re.findall(r"```json\n(.*?)```", text, re.DOTALL)
     recipe = json.loads(code)
     short = {"PRBDM.fmu": "guide", "Brake.fmu": "brake"}

@@ -9,8 +9,8 @@ import pytest
 from prbm.commands.command_line import main
 from support import ROOT
 
-README = (ROOT / "README.md").read_text()
-NATIVE = (ROOT / "docs" / "native-fmus.md").read_text()
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+NATIVE = (ROOT / "docs" / "native-fmus.md").read_text(encoding="utf-8")
 
 
 def blocks(text: str) -> list[str]:

@@ -156,7 +156,7 @@ def test_formulas_are_mathml(browser, folder):
 
 
 def test_a_folder_of_other_files_is_not_replaced(tmp_path):
-    (tmp_path / "mine.txt").write_text("kept")
+    (tmp_path / "mine.txt").write_text("kept", encoding="utf-8")
     done = command(tmp_path)
     assert done.returncode == 2
     assert "name another folder" in done.stderr

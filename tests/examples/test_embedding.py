@@ -50,7 +50,7 @@ def is_picture(path: str | Path) -> bool:
 @pytest.mark.parametrize("name", NAMES)
 def test_each_page_has_a_lesson_a_figure_and_a_command(name):
     """The figure is the one that the command draws."""
-    text = (EXAMPLES / name / "README.md").read_text()
+    text = (EXAMPLES / name / "README.md").read_text(encoding="utf-8")
     assert "**Lesson:**" in text
     assert f"({name}.png)" in text
     assert f"python examples/{name}/run.py" in text

@@ -60,7 +60,7 @@ def test_an_invalid_parameter_of_a_simulation_is_rejected(key, toml, value, word
 @pytest.mark.parametrize(("key", "toml", "value", "words"), VALUES)
 def test_an_invalid_option_is_rejected(key, toml, value, words, tmp_path, capsys):
     setting = f"bump_left.{key}={value:g}"
-    line = f"simulate {written(tmp_path)} --set {setting} --stop-time 1e-6"
+    line = f"simulate {shlex.quote(str(written(tmp_path)))} --set {setting} --stop-time 1e-6"
     assert cli.main(shlex.split(line)) == cli.MISTAKE
     message = capsys.readouterr().err
     assert f"bump_left.{key} = {words}" in message or "write a finite number in N/m" in message
@@ -82,7 +82,7 @@ def test_a_pulse_without_duration_is_rejected(duration):
 
 
 def test_a_shock_without_duration_is_rejected(capsys):
-    line = f'shock {ACCELEROMETER} --peak "500 g"'
+    line = f'shock {shlex.quote(str(ACCELEROMETER))} --peak "500 g"'
     assert cli.main(shlex.split(line)) == cli.MISTAKE
     assert "duration" in capsys.readouterr().err
 

@@ -45,7 +45,7 @@ displacement = "-1 mm"
 
 def read(folder: Path, body: str, tail: str = TAIL) -> Mechanism:
     path = folder / "copies.toml"
-    path.write_text(HEAD + body + tail)
+    path.write_text(HEAD + body + tail, encoding="utf-8")
     return read_mechanism(path)
 
 
@@ -397,7 +397,7 @@ displacement = "-1 mm"
 @pytest.mark.parametrize("shape", ['rise = "2 mm"', 'curvature = "8 1/m"'])
 def test_a_symmetric_body_between_curved_flexures_does_not_turn(tmp_path: Path, shape: str) -> None:
     path = tmp_path / "curved.toml"
-    path.write_text(HEAD + shape + CURVED)
+    path.write_text(HEAD + shape + CURVED, encoding="utf-8")
     curved = read_mechanism(path)
     system = assemble(curved, curved.values())
     q = equilibrium(system, -1e-3).q

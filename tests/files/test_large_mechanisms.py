@@ -1,11 +1,10 @@
 """Mechanism files are read in linear time in the number of their parts."""
 
-import math
-import time
 from pathlib import Path
 
 import pytest
 
+from growth import grows
 from mechanism_mistakes import EXAMPLE
 from prbm.base.errors import MechanismError
 from prbm.files.mechanism_file import read_mechanism
@@ -38,31 +37,20 @@ def text(parts: str, n: int, last: str = "") -> str:
     return EXAMPLE + "\n".join(tables) + last
 
 
-def duration(path: Path, content: str, valid: bool) -> float:
-    """Return the processor time of reading a file [s]."""
-    path.write_text(content)
-    begin = time.process_time()
-    if valid:
-        read_mechanism(path)
-    else:
-        with pytest.raises(MechanismError, match="unknown key"):
-            read_mechanism(path)
-    return time.process_time() - begin
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("valid", [True, False])
 @pytest.mark.parametrize("parts", PARTS)
-def test_four_times_as_many_parts_take_about_four_times_as_long(parts, valid, tmp_path):
-    """A quadratic part of the time would make the ratio larger than 8 at these numbers.
+def test_the_time_grows_in_proportion_to_the_number_of_parts(parts, valid, tmp_path):
+    def make(n: int) -> Path:
+        path = tmp_path / f"{n}.toml"
+        path.write_text(text(parts, n, "" if valid else "stroke = 3\n"), encoding="utf-8")
+        return path
 
-    Other programs may disturb the times.  The smallest of up to three times counts.
-    """
-    path, few, many = tmp_path / "many.toml", math.inf, math.inf
-    last = "" if valid else "stroke = 3\n"
-    for _ in range(3):
-        few = min(few, duration(path, text(parts, 500, last), valid))
-        many = min(many, duration(path, text(parts, 2000, last), valid))
-        if many < 8 * few and many < 4.0:
-            return
-    pytest.fail(f"{few:.3g} s for 500 parts, {many:.3g} s for 2000")
+    def read(path: Path) -> None:
+        if valid:
+            read_mechanism(path)
+        else:
+            with pytest.raises(MechanismError, match="unknown key"):
+                read_mechanism(path)
+
+    assert not grows(read, make, 500, 4, power=1)

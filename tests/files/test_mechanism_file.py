@@ -367,7 +367,7 @@ def test_an_unreadable_path_is_rejected_with_a_message_and_status_2(tmp_path, ca
     assert "cannot be read (Is a directory)" in rejection(tmp_path, capsys)
     assert "cannot be read (No such file or directory)" in rejection(tmp_path / "a.toml", capsys)
     assert "cannot be read (File name too long)" in rejection(tmp_path / ("a" * 300), capsys)
-    (tmp_path / "file").write_text(EXAMPLE)
+    (tmp_path / "file").write_text(EXAMPLE, encoding="utf-8")
     assert "cannot be read (Not a directory)" in rejection(tmp_path / "file" / "a.toml", capsys)
 
 
@@ -549,8 +549,12 @@ def test_the_command_prints_the_schema(capsys):
 
 def test_pint_is_not_imported_for_a_file_without_units(tmp_path):
     """The import of pint takes 0.3 s."""
-    text = (ROOT / "tests" / "interface" / "test_tables.py").read_text().split('"""')[3]
-    (tmp_path / "plain.toml").write_text(text)
+    text = (
+        (ROOT / "tests" / "interface" / "test_tables.py")
+        .read_text(encoding="utf-8")
+        .split('"""')[3]
+    )
+    (tmp_path / "plain.toml").write_text(text, encoding="utf-8")
     code = (
         "import sys; from prbm.files.mechanism_file import load; load(sys.argv[1]); "
         "sys.exit('pint' in sys.modules)"

@@ -226,7 +226,7 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Mechanism:
 
 def read(folder: Path, text: str) -> Mechanism:
     path = folder / "plate.toml"
-    path.write_text(text)
+    path.write_text(text, encoding="utf-8")
     return read_mechanism(path)
 
 
@@ -287,7 +287,7 @@ def test_the_picture_command_prints_the_properties_of_plates(
     begin, end = FILE.index('"left", ["30 mm"'), FILE.index('thickness = "8 mm"')
     bar = '"left", ["30 mm", "leaf.length"], ["30 mm", "leaf.length + 10 mm"], '
     bar += '["-30 mm", "leaf.length + 10 mm"]]\n'
-    (tmp_path / "plate.toml").write_text(FILE[:begin] + bar + FILE[end:])
+    (tmp_path / "plate.toml").write_text(FILE[:begin] + bar + FILE[end:], encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     assert main(["picture", "plate.toml", "--set", "leaf.length=50mm"]) == 0
     assert capsys.readouterr().out.splitlines() == [

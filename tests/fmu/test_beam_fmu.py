@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fmpy import read_model_description, simulate_fmu
+from fmpy import read_model_description
 from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 
+from fmu_host import simulate_fmu
 from native_host import Instance, Integrator
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.assembly import assemble

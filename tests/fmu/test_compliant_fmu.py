@@ -1,17 +1,20 @@
 """FMUs of a mechanism with a compliant stop: Python FMUs equal the engine."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import fmpy
 import numpy as np
 import pytest
-from fmpy import read_model_description, simulate_fmu
+from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 
+from fmu_host import simulate_fmu
 from point_mass import point_mass
 from prbm.fmu import mathml
 from prbm.fmu.documentation import page
 from prbm.fmu.start import interface
+from prbm.fmu.unpack import unpacked
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanism.parts import LAWS
 from prbm.runs.experiment import Experiment
@@ -107,27 +110,27 @@ def test_invalid_parameters_of_a_compliant_stop_are_rejected_in_an_fmu(name, val
 
 @pytest.mark.fmu
 @pytest.mark.native
-def test_a_state_saved_in_contact_restores_in_an_fmu(path, tmp_path):
+def test_a_state_saved_in_contact_restores_in_an_fmu(path):
     description = read_model_description(path)
     if description.fmiVersion == "3.0":
         pytest.skip("the functions of FMI 2.0")
-    folder = fmpy.extract(path, unzipdir=str(tmp_path))
-    fmu = fmpy.instantiate_fmu(folder, description)
-    fmu.setupExperiment(startTime=0.0)
-    fmu.enterInitializationMode()
-    fmu.exitInitializationMode()
-    references = [v.valueReference for v in description.modelVariables if v.name in (
-        "mass.x", "stop.force", "stop.peak_force", "stop.impulse_sum"
-    )]  # fmt: skip
-    fmu.doStep(0.0, 1.1e-3)
-    state, ends = fmu.getFMUState(), []
-    for _ in range(2):
-        fmu.doStep(1.1e-3, 1e-3)
-        ends.append(fmu.getReal(references))
-        fmu.setFMUState(state)
-    assert ends[0] == ends[1]
-    fmu.terminate()
-    fmu.freeInstance()
+    with unpacked(Path(path)) as folder:
+        fmu = fmpy.instantiate_fmu(str(folder), description)
+        fmu.setupExperiment(startTime=0.0)
+        fmu.enterInitializationMode()
+        fmu.exitInitializationMode()
+        references = [v.valueReference for v in description.modelVariables if v.name in (
+            "mass.x", "stop.force", "stop.peak_force", "stop.impulse_sum"
+        )]  # fmt: skip
+        fmu.doStep(0.0, 1.1e-3)
+        state, ends = fmu.getFMUState(), []
+        for _ in range(2):
+            fmu.doStep(1.1e-3, 1e-3)
+            ends.append(fmu.getReal(references))
+            fmu.setFMUState(state)
+        assert ends[0] == ends[1]
+        fmu.terminate()
+        fmu.freeInstance()
 
 
 @pytest.mark.fmu

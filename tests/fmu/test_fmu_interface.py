@@ -279,7 +279,7 @@ def test_an_fmu_contains_documentation_icon_and_licences_but_no_bytecode(fmus, m
         assert archive.read("documentation/icon.svg").endswith(b"</svg>\n")
     installed = importlib.metadata.distribution("pythonfmu")
     license_file = next(f for f in installed.files if f.name == "LICENSE")
-    assert bundled.split() == license_file.read_text().split()
+    assert bundled.split() == license_file.read_text(encoding="utf-8").split()
     assert "documentation/index.html" in names
     assert not [name for name in names if "pyc" in name]
 

@@ -6,9 +6,8 @@ import zipfile
 
 import numpy as np
 import pytest
-from fmpy import simulate_fmu
 
-from fmu_host import DISCARD, OK, Instance
+from fmu_host import DISCARD, OK, Instance, simulate_fmu
 from importer_mistakes import AT_START, LATER, NAN, STEPS
 from prbm.fmu.slave import instance
 from prbm.fmu.slave.resolved import FILE

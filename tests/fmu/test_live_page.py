@@ -108,7 +108,7 @@ def test_sliders_contain_the_start_values_and_stay_within_the_bounds(model):
 
 def test_the_joined_script_has_no_syntax_errors(tmp_path):
     path = tmp_path / "page.js"
-    path.write_text(script())
+    path.write_text(script(), encoding="utf-8")
     node("--check", path)
 
 

@@ -6,9 +6,10 @@ import zipfile
 
 import numpy as np
 import pytest
-from fmpy import read_model_description, simulate_fmu
+from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 
+from fmu_host import simulate_fmu
 from kernel_simulation import KernelSimulation
 from many_parts import anvil, beams, elastic
 from prbm.fmu.slave.resolved import mechanism_from, resolved

@@ -22,7 +22,7 @@ from support import SUPPORT, each_shipped, mechanism
 
 rumoca = pytest.importorskip("rumoca", reason="the Modelica compiler rumoca is not installed")
 
-LIBRARY = (SUPPORT / "modelica_library.mo").read_text()
+LIBRARY = (SUPPORT / "modelica_library.mo").read_text(encoding="utf-8")
 TEST = """
 model Test
   {wrapper}.Flanges guide;
@@ -94,7 +94,7 @@ def structured_block(block: str, variables: Iterable[Variable]) -> str:
 
 def compiled(text: str, model: str, folder: Path):
     path = folder / "all.mo"
-    path.write_text(text.replace("within ;\n", ""))
+    path.write_text(text.replace("within ;\n", ""), encoding="utf-8")
     return rumoca.Session().load(str(path), model=model)
 
 
@@ -180,10 +180,12 @@ def test_the_command_writes_the_package(tmp_path, monkeypatch, capsys):
     assert main(["modelica", "PRBDM"]) == OK
     assert capsys.readouterr().out == "PRBDMWrapper.mo\n"
     chosen = mechanism("PRBDM")
-    assert Path("PRBDMWrapper.mo").read_text() == wrapper(chosen, interface(chosen, {}))
+    assert Path("PRBDMWrapper.mo").read_text(encoding="utf-8") == wrapper(
+        chosen, interface(chosen, {})
+    )
     options = ["--names", "underscore", "--fmu", "Lib.Guide", "--set", "stop.position=1mm"]
     assert main(["modelica", "PRBDM", *options, "--out", "x/y.mo"]) == OK
-    text = Path("x/y.mo").read_text()
+    text = Path("x/y.mo").read_text(encoding="utf-8")
     assert "Lib.Guide fmu(flexure_length=flexure_length," in text
     assert main(["modelica", "PRBDM", "--fmu", "a b"]) == MISTAKE
     assert "--fmu a b: write the name of a class" in capsys.readouterr().err

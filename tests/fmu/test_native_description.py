@@ -313,10 +313,10 @@ def test_the_report_reads_the_mechanism_from_the_fmu(fmu, mechanisms):
 
 
 def test_clocks_without_a_stop_are_rejected(tmp_path):
-    text = shipped()["PRBDM"].read_text()
+    text = shipped()["PRBDM"].read_text(encoding="utf-8")
     text = re.sub(r"\[\[stops\]\].*?\n\n", "", text, flags=re.DOTALL)
     path = tmp_path / "mine.toml"
-    path.write_text(text)
+    path.write_text(text, encoding="utf-8")
     free = read_mechanism(path)
     assert free.stops == ()
     with pytest.raises(MechanismError, match="PRBDM has no stop"):

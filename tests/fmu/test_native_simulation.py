@@ -8,8 +8,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from fmpy import simulate_fmu
 
+from fmu_host import simulate_fmu
 from native_host import INTERFACES, OK, Instance, Integrator, clocked, unpacked
 from prbm.base.atomic import write
 from prbm.fmu import native_fmu

@@ -134,7 +134,7 @@ def test_commands_write_and_read_sets(tmp_path, capsys):
     assert re.search(r"^force\.x +0\.01 N +Force on", printed, re.MULTILINE)
     run = ["simulate", "PRBDM", "--stop-time", "0.05", "--parameters", str(path), "--out"]
     assert main([*run, str(tmp_path)]) == OK
-    rows = (tmp_path / "PRBDM.csv").read_text().splitlines()
+    rows = (tmp_path / "PRBDM.csv").read_text(encoding="utf-8").splitlines()
     values = CHANGES | {"force.x": 0.01}
     expected = simulate(mechanism("PRBDM"), values, stop_time=0.05)
     names = rows[0].split(",")

@@ -8,9 +8,10 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from fmpy import read_model_description, simulate_fmu
+from fmpy import read_model_description
 from lxml import etree
 
+from fmu_host import simulate_fmu
 from prbm.base.errors import SimulationError
 from prbm.files.settings import units_of
 from prbm.fmu import reference_results as reference

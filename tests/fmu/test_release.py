@@ -4,9 +4,10 @@ import math
 from dataclasses import replace
 
 import pytest
-from fmpy import read_model_description, simulate_fmu
+from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 
+from fmu_host import simulate_fmu
 from prbm.files.mechanism_file import read_mechanism
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanism.parts import Release

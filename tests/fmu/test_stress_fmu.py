@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fmpy import read_model_description, simulate_fmu
+from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 
 import prbm
+from fmu_host import simulate_fmu
 from prbm.hybrid.simulation import Simulation
 from support import own_fmu
 

@@ -124,7 +124,7 @@ def mechanism(request, tmp_path_factory) -> Mechanism:
         return elastic() if request.param == "Elastic" else profiles()
     if request.param == "Lever":
         path = tmp_path_factory.mktemp("lever") / "lever.toml"
-        path.write_text(EXPRESSIONS)
+        path.write_text(EXPRESSIONS, encoding="utf-8")
         return read_mechanism(path)
     return read_mechanism(shipped()[request.param])
 
@@ -387,7 +387,7 @@ def test_tables_of_an_invalid_mechanism_are_rejected(name, index, number, messag
 
 def test_the_length_of_a_name_is_in_bytes(tmp_path):
     path = tmp_path / "mine.toml"
-    text = shipped()["PRBDM"].read_text()
+    text = shipped()["PRBDM"].read_text(encoding="utf-8")
     path.write_text(text.replace('"left_flexure"', '"linke_Fläche"'), "utf-8")
     mechanism = read_mechanism(path)
     native = described(Export(mechanism), 2)

@@ -60,7 +60,11 @@ def log(tmp_path, monkeypatch) -> Path:
 
 def runs(log: Path) -> Counter[float]:
     """Return the number of runs for each value of x."""
-    return Counter(float(line) for line in log.read_text().split()) if log.exists() else Counter()
+    return (
+        Counter(float(line) for line in log.read_text(encoding="utf-8").split())
+        if log.exists()
+        else Counter()
+    )
 
 
 def alone(fmu: Path, row: dict[str, float], **options) -> np.ndarray:
@@ -137,7 +141,10 @@ def test_defaults_without_a_default_experiment_are_one_second_and_all_outputs(mi
     results = sweep(mishap, pd.DataFrame({"x": [2.0]}), workers=1)
     assert results.columns.tolist() == ["row", "x", "y", "status", "message", "seconds"]
     assert results["y"].tolist() == [2.0]
-    assert json.loads(Path("results.parquet/_sweep.json").read_text())["step [s]"] == 1e-3
+    assert (
+        json.loads(Path("results.parquet/_sweep.json").read_text(encoding="utf-8"))["step [s]"]
+        == 1e-3
+    )
 
 
 def test_reductions_match_a_closed_form():
@@ -357,7 +364,7 @@ def test_two_sweeps_of_one_process_into_the_same_folder_are_rejected(mishap, log
 
 def test_the_lock_of_a_sweep_that_never_began_does_not_block_the_folder(mishap, log):
     Path("results.parquet").mkdir()
-    Path("results.parquet/_sweep.lock").write_text("process 1 on nowhere")
+    Path("results.parquet/_sweep.lock").write_text("process 1 on nowhere", encoding="utf-8")
     assert len(sweep(mishap, pd.DataFrame({"x": [1.0]}), step=0.5, workers=1)) == 1
 
 
@@ -393,11 +400,11 @@ def test_results_of_another_sweep_are_rejected_or_replaced(mishap, log, native):
 
 def test_a_folder_with_other_contents_is_rejected_and_unchanged(mishap):
     Path("results.parquet").mkdir()
-    Path("results.parquet/letter.txt").write_text("keep me")
+    Path("results.parquet/letter.txt").write_text("keep me", encoding="utf-8")
     for overwrite in (False, True):
         with pytest.raises(ParameterError, match=r"results\.parquet exists but contains no sweep"):
             sweep(mishap, pd.DataFrame({"x": [1.0]}), overwrite=overwrite)
-    assert Path("results.parquet/letter.txt").read_text() == "keep me"
+    assert Path("results.parquet/letter.txt").read_text(encoding="utf-8") == "keep me"
 
 
 def test_a_damaged_part_is_reported(mishap, log):
@@ -574,7 +581,7 @@ def test_an_invalid_setting_is_rejected_with_one_sentence(native, case):
 
 def test_an_unreadable_fmu_is_reported(native, tmp_path, capsys):
     GRID.to_csv("t.csv", index=False)
-    Path("text.fmu").write_text("no archive")
+    Path("text.fmu").write_text("no archive", encoding="utf-8")
     for name, sentence in (
         ("none.fmu", "none.fmu cannot be read (No such file or directory); give an FMU"),
         ("text.fmu", "text.fmu is not a readable FMU"),

@@ -3,6 +3,7 @@
 import gc
 import math
 import re
+import tempfile
 import zipfile
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from prbm.references.scalar_guide import ScalarGuide
 from prbm.systems import cosimulation
 from prbm.systems.components import CO_SIMULATION, Component, CouplingError, start_value
 from prbm.systems.cosimulation import GAUSS_SEIDEL, JACOBI, System, simulate
-from support import mechanism
+from support import mechanism, possible
 
 pytestmark = [pytest.mark.fmu, pytest.mark.native]
 
@@ -54,6 +55,15 @@ def test_outputs_reach_inputs_in_initialization_mode():
     with System(fmus, {"sum.rate": "guide.shuttle.x"}, watched=["sum.value"]) as system:
         system.start({"sum.feedthrough": 2.0, "guide.release.displacement": -3e-3})
         assert system.values["sum.value"] == pytest.approx(-6e-3, rel=1e-12)
+
+
+def test_names_and_temporary_folders_may_have_any_letters(fmus, tmp_path, monkeypatch):
+    """The library inside a Python FMU crashes where a URI encodes the path of its resources."""
+    folder = possible(tmp_path / "Prüfung 試験 100%")
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    found = simulate({"Führung": fmus["PRBDM"]}, {}, 2e-3, 1e-3, None, ["Führung.shuttle.x"])
+    assert np.isfinite(found["Führung.shuttle.x"]).all()
 
 
 def test_the_last_step_may_be_shorter():
@@ -275,8 +285,9 @@ def test_every_number_is_taken_as_the_type_of_its_variable(name, kind):
     assert found[-1] == pytest.approx(end)
 
 
-def test_enumerations_are_integers_and_strings_are_strings(tmp_path):
-    one = Component("a", integrator(), tmp_path, CO_SIMULATION)
+@pytest.mark.usefixtures("plain_temporary_folder")
+def test_enumerations_are_integers_and_strings_are_strings():
+    one = Component("a", integrator(), tempfile.mkdtemp(), CO_SIMULATION)
     one.instantiate()
     skipped = one.variable("skipped")
     skipped.type = "Enumeration"

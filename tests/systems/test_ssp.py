@@ -16,7 +16,9 @@ from prbm.systems.components import CouplingError
 from prbm.systems.container import container
 from prbm.systems.cosimulation import JACOBI
 
-pytestmark = [pytest.mark.fmu, pytest.mark.native]
+pytestmark = [
+    pytest.mark.fmu, pytest.mark.native, pytest.mark.usefixtures("plain_temporary_folder")
+]  # fmt: skip
 
 SCHEMAS = Path(fmpy.__file__).parent / "ssp" / "schema"
 STOP, STEP = 0.3, 1e-3
@@ -201,7 +203,7 @@ def test_every_number_may_be_a_start_value(number, tmp_path):
 
 @pytest.mark.parametrize("name", ["text.fmu", "missing.fmu"])
 def test_an_unreadable_fmu_is_rejected(name, tmp_path):
-    (tmp_path / "text.fmu").write_text("no FMU")
+    (tmp_path / "text.fmu").write_text("no FMU", encoding="utf-8")
     with pytest.raises(CouplingError, match=rf"a: .*{name} cannot be read as an FMU"):
         ssp.package(tmp_path / "x.ssp", {"a": tmp_path / name}, {})
     with pytest.raises(CouplingError, match=rf"a: .*{name} cannot be read as an FMU"):

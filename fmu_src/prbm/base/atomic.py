@@ -42,6 +42,8 @@ def write_all(files: Mapping[Path, bytes]) -> None:
     OSError
         If a folder cannot be created or a file cannot be written; ``filename`` is that file.
     """
+    for path in files:
+        check_name(path)
     partial: dict[Path, str] = {}
     path = Path()
     try:
@@ -63,6 +65,24 @@ def write_all(files: Mapping[Path, bytes]) -> None:
             Path(name).unlink(missing_ok=True)
 
 
+def check_name(path: Path) -> None:
+    """Check that the encoding of the file system has all characters of a path.
+
+    Raises
+    ------
+    FileError
+        If it lacks one.
+    """
+    try:
+        os.fsencode(path)
+    except UnicodeEncodeError as error:
+        raise FileError(
+            f"cannot write {str(path)!a}: names of files have the encoding {error.encoding} here, "
+            f"which lacks {error.object[error.start]!a}; choose another name, or set the "
+            "environment variable PYTHONUTF8=1"
+        ) from None
+
+
 def check_writable(folder: Path, remedy: str = "choose a folder with --out") -> None:
     """Check, before a long computation, that files can be written to a folder.
 
@@ -78,8 +98,9 @@ def check_writable(folder: Path, remedy: str = "choose a folder with --out") -> 
     Raises
     ------
     FileError
-        If the path is a file, or there is no permission to write.
+        If the path is a file or not a valid name, or there is no permission to write.
     """
+    check_name(folder)
     existing = folder
     while not existing.exists() and existing != existing.parent:
         existing = existing.parent
@@ -99,6 +120,7 @@ def check_file(path: Path) -> None:
     FileError
         If the path is a folder, its parent is a file, or there is no permission to write.
     """
+    check_name(path)
     if path.is_dir():
         raise FileError(f"cannot write {path}: it is a folder; choose another name")
     check_writable(path.parent, "choose another folder")

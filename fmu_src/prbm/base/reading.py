@@ -25,10 +25,29 @@ def content(path: Path, limit: int, error: type[PrbmError]) -> bytes:
     try:
         with path.open("rb") as file:
             data = file.read(limit + 1)
-    except OSError as failure:
-        raise error(f"{path}: cannot be read ({failure.strerror})") from None
-    except ValueError as failure:  # a null byte or a surrogate in the path
-        raise error(f"{str(path)!r}: cannot be read ({failure})") from None
+    except (OSError, ValueError) as failure:
+        raise error(f"{shown(path)}: cannot be read ({opening_error(failure)})") from None
     if len(data) > limit:
         raise error(f"{path}: larger than {limit} bytes, the limit of such files; split it")
     return data
+
+
+def shown(path: Path) -> str:
+    r"""Return a path for a message, with escapes if a file cannot have this name.
+
+    Examples
+    --------
+    >>> shown(Path("a.toml")), shown(Path("a\0.toml")), shown(Path("a\ud800.toml"))
+    ('a.toml', "'a\\x00.toml'", "'a\\ud800.toml'")
+    """
+    text = str(path)
+    return text if text.isprintable() else ascii(text)
+
+
+def opening_error(error: OSError | ValueError) -> str:
+    """Return the reason why a file cannot be opened.
+
+    A :class:`ValueError` is raised for a path with a null byte, or with characters that the
+    encoding of the file system lacks.
+    """
+    return getattr(error, "strerror", None) or str(error)

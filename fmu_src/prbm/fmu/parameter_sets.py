@@ -13,6 +13,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from ..base.errors import ParameterError
 from ..base.names import unknown
+from ..base.reading import opening_error, shown
 from ..base.version import GENERATION_TOOL
 from ..interface.units import UNITS
 from ..interface.variables import Variable
@@ -124,8 +125,7 @@ def _root(path: Path) -> Element:
         with path.open("rb") as file:
             content = file.read(BYTES_MAX + 1)
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise ParameterError(f"{path}: cannot be read ({reason})") from None
+        raise ParameterError(f"{shown(path)}: cannot be read ({opening_error(error)})") from None
     if len(content) > BYTES_MAX:
         raise ParameterError(f"{path}: more than {BYTES_MAX // 10**6} MB; not a parameter set")
     try:

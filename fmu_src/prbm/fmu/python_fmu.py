@@ -6,8 +6,9 @@ import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
+from importlib.metadata import distribution
 from importlib.resources import files as package_files
-from importlib.resources.abc import Traversable
+from pathlib import Path
 
 from ..base.errors import MechanismError
 from ..base.text import printable
@@ -131,7 +132,7 @@ def _sources(
     yield f"{ENGINE}/__init__.py", INIT.encode()
     for path, text in shipped_modules().items():
         yield f"{ENGINE}/{path}", text
-    for entry in package_files("pythonfmu").iterdir():
+    for entry in _wrapper().iterdir():
         if entry.name.endswith(".py"):
             yield f"pythonfmu/{entry.name}", entry.read_bytes()
 
@@ -192,19 +193,24 @@ def _plain(title: str) -> str:
 
 
 def _binaries(name: str) -> Iterator[tuple[str, bytes]]:
-    for platform in _folder("pythonfmu", "resources", "binaries").iterdir():
+    for platform in _wrapper().joinpath("resources", "binaries").iterdir():
         for library in platform.iterdir():
             suffix = "." + library.name.rpartition(".")[2]
             if suffix in (".so", ".dll", ".dylib"):
                 yield f"binaries/{platform.name}/{name}{suffix}", library.read_bytes()
 
 
-def _folder(package: str, *parts: str) -> Traversable:
-    return package_files(package).joinpath(*parts)
+def _wrapper() -> Path:
+    """Return the folder of the installed library pythonfmu.
+
+    The imported module may be the copy inside an FMU that ran in this process before.  That copy
+    has no binaries, and its folder may be removed.
+    """
+    return Path(str(distribution("pythonfmu").locate_file("pythonfmu")))
 
 
 def _licenses() -> Iterator[tuple[str, bytes]]:
     """Yield the licences of the engine and of pythonfmu."""
     for name in ("prbm-impact.txt", "pythonfmu.txt"):
-        text = _folder(__package__, "licenses", name).read_bytes()
+        text = package_files(__package__).joinpath("licenses", name).read_bytes()
         yield f"documentation/licenses/{name}", text

@@ -1,15 +1,18 @@
 """Unpacking of FMUs to paths that pythonfmu can read."""
 
+import re
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
-from urllib.parse import unquote
 
 import fmpy  # type: ignore[import-untyped]
 
 from ..base.archives import check_unpacked_size
+
+CANDIDATES = ("/tmp", "/var/tmp", r"C:\Users\Public", ".")
+"""Folders for temporary files besides that of the system."""
 
 
 @contextmanager
@@ -24,17 +27,22 @@ def unpacked(fmu: Path | BinaryIO) -> Iterator[Path]:
         If the path of every candidate has characters that a URI encodes.
     """
     check_unpacked_size(fmu)
-    candidates = (tempfile.gettempdir(), "/tmp", "/var/tmp", r"C:\Users\Public", ".")
-    for candidate in map(Path, candidates):
-        if candidate.is_dir() and plain(candidate.resolve()):
-            with tempfile.TemporaryDirectory(prefix="prbm_", dir=candidate.resolve()) as folder:
-                fmpy.extract(fmu, unzipdir=folder)
-                yield Path(folder)
-            return
-    raise RuntimeError(
-        f"no folder for temporary files has a path of plain ASCII letters (tried {candidates[0]}); "
-        "set the environment variable TMPDIR to a folder with such a path"
-    )
+    chosen = plain_folder()
+    if chosen is None:
+        raise RuntimeError(
+            "no folder for temporary files has a path of plain ASCII letters (tried "
+            f"{tempfile.gettempdir()}); set the environment variable TMPDIR to a folder with such "
+            "a path"
+        )
+    with tempfile.TemporaryDirectory(prefix="prbm_", dir=chosen) as folder:
+        fmpy.extract(fmu, unzipdir=folder)
+        yield Path(folder)
+
+
+def plain_folder() -> Path | None:
+    """Return a folder for temporary files whose path pythonfmu can read, or None."""
+    folders = (Path(folder).resolve() for folder in (tempfile.gettempdir(), *CANDIDATES))
+    return next((folder for folder in folders if folder.is_dir() and plain(folder)), None)
 
 
 def plain(path: Path) -> bool:
@@ -45,5 +53,5 @@ def plain(path: Path) -> bool:
     >>> plain(Path("/tmp/my model")), plain(Path("/tmp/modèle")), plain(Path("/tmp/100%"))
     (True, False, False)
     """
-    uri = path.absolute().as_uri().replace("%20", " ")
-    return unquote(uri) == uri and "%" not in uri
+    text = path.absolute().as_posix().removeprefix(path.drive)
+    return re.fullmatch(r"[\w./~ -]*", text, re.ASCII) is not None

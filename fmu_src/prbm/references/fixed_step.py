@@ -95,7 +95,7 @@ def march(
                 impacts.append((t, stop.name))
                 e, M, loops = equations.mass_and_loops(y[:n])
                 G = system.gap_rows.jacobian(e)[[i]]
-                X = contact.response(M, loops, G)
+                X = contact.response(M, loops, G, system.length)
                 eps = np.array([value(stop, "restitution", simulation.values)])
                 P = contact.newton(G @ X, G @ y[n : 2 * n], eps)
                 y = y.copy()

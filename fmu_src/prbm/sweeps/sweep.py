@@ -31,6 +31,7 @@ from ..base.archives import check_unpacked_size
 from ..base.errors import ParameterError, PrbmError
 from ..base.names import proposal
 from ..base.progress import Progress
+from ..base.reading import opening_error, shown
 from ..runs.inputs import filled, placeholders, read_signal
 from ..runs.run import ROWS_MAX
 from .outputs import CRASHED, GOOD, Outcome, Output, SpecificationError, parse_output
@@ -294,8 +295,10 @@ def read_fmu(path: Path) -> tuple[bytes, Any]:
     """
     try:
         data = path.read_bytes()
-    except OSError as error:
-        raise SweepError(f"{path} cannot be read ({error.strerror}); give an FMU") from None
+    except (OSError, ValueError) as error:
+        raise SweepError(
+            f"{shown(path)} cannot be read ({opening_error(error)}); give an FMU"
+        ) from None
     try:
         check_unpacked_size(io.BytesIO(data))
         description = fmpy.read_model_description(io.BytesIO(data), validate=False)

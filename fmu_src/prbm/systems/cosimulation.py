@@ -29,6 +29,7 @@ from pathlib import Path
 from typing import Self
 
 from ..base.progress import Progress
+from ..fmu.unpack import plain_folder
 from ..runs.result import Columns, structured
 from ..runs.run import Source, communication_points
 from .components import CO_SIMULATION, Component, CouplingError, Value, check_wire, start_value
@@ -193,11 +194,11 @@ class System:
         self.scheme, self.connections = scheme, dict(connections)
         self.time = 0.0
         self.values: dict[str, Value] = {}
-        self.folder = tempfile.TemporaryDirectory(prefix="prbm_system_")
+        self.folder = tempfile.TemporaryDirectory(prefix="prbm_system_", dir=plain_folder())
         self.instances: dict[str, Instance] = {}
         try:
             for name, fmu in fmus.items():
-                there = Path(self.folder.name) / name
+                there = Path(self.folder.name) / str(len(self.instances))
                 self.instances[name] = Instance(name, fmu, there, events)
             self.wires, self.read = self._wires(), self._read(watched)
         except BaseException:

@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from scipy.integrate import DOP853
 from scipy.optimize import brentq
 
+from ..base.tolerances import EVENT_TIME_RTOL
 from ..runs.result import Columns, structured
 from ..runs.run import communication_points
 from .components import MODEL_EXCHANGE, Component, CouplingError, Value, start_value
 
 Real = NDArray[np.float64]
 Partner = Callable[[float, Mapping[str, Value], Real], tuple[Mapping[str, float], Sequence[float]]]
-EVENT_TIME_ATOL = 1e-14  # s
 UPDATES_MAX = 1000  # Updates of discrete states at one time.
 STATE_ATOL_FACTOR = 1e-3  # Absolute tolerance / (relative tolerance * nominal value).
 NAMES2 = {
@@ -226,8 +226,8 @@ class OneSolver:
             def indicator(t: float, k: int = k) -> float:
                 return float(self.indicators(t, inside(t))[k])
 
-            root = brentq(indicator, inside.t_old, inside.t, xtol=EVENT_TIME_ATOL)
-            beyond = EVENT_TIME_ATOL
+            beyond = EVENT_TIME_RTOL * (inside.t - inside.t_old)
+            root = brentq(indicator, inside.t_old, inside.t, xtol=beyond)
             while (indicator(root) > 0.0) == sign[k]:
                 root, beyond = min(root + beyond, inside.t), 2 * beyond
             roots.append(root)

@@ -56,6 +56,8 @@ def content(
     system = assemble(mechanism, mechanism.values())
     slot = slots(mechanism, independent)
     release = mechanism.release
+    centres = {body.name: body.centre for body in mechanism.bodies}
+    released = centres[release.body] if release.point is None else release.point
     typical = {v.unit: v.nominal for v in variables if v.causality == "output" and v.nominal}
     return {
         "name": mechanism.name,
@@ -97,6 +99,7 @@ def content(
         ],
         "release": {
             "body": release.body,
+            "point": _point(released),
             "direction": release.direction,
             "quantity": _given(release, release.start),
             "start": release.start,

@@ -341,15 +341,16 @@ class Stage {
     }
   }
 
-  // Place the handle of the released body at its centre or, for a release by an angle, at the corner
-  // that is farthest from it.
+  // Place the handle of the released body at its released point or, for a release by an angle, at the
+  // corner that is farthest from its centre.
   placeBodyHandle(shapes, shape) {
-    const { body, direction, quantity, start } = this.description.release;
-    const { centre } = shape.poses.get(body);
+    const { body, point, direction, quantity, start } = this.description.release;
     if (start !== "angle") {
-      this.place(this.bodyHandle, centre, unitVector(direction), quantity);
+      const held = shapes.carried(body, point, shape.poses);
+      this.place(this.bodyHandle, held, unitVector(direction), quantity);
       return;
     }
+    const { centre } = shape.poses.get(body);
     const index = this.description.bodies.findIndex(({ name }) => name === body);
     const arms = shapes.body(index, shape.poses).map((corner) => minus(corner, centre));
     const arm = arms.reduce((a, b) => (norm(b) > 1.001 * norm(a) ? b : a));

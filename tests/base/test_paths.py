@@ -1,0 +1,58 @@
+"""Paths that the file system cannot hold are rejected with a message."""
+
+import sys
+
+import pytest
+
+import prbm
+from prbm.base import atomic
+from prbm.base.errors import PrbmError
+from prbm.data.records import read_record
+from prbm.fmu.parameter_sets import read_parameter_set
+from prbm.runs.inputs import read_signal
+from prbm.runs.result import read_csv
+from prbm.sweeps.sweep import read_fmu
+from prbm.systems.components import described
+
+UNPAIRED = "half\ud800.toml"  # No encoding of a file system has half of a pair of surrogates.
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows allows such names")
+
+
+@pytest.mark.parametrize(
+    "write",
+    [
+        lambda path: atomic.write(path, b""),
+        lambda path: atomic.write_all({path.with_name("first"): b"", path: b""}),
+        atomic.check_file,
+        atomic.check_writable,
+        lambda path: atomic.check_writable(path / "deeper"),
+    ],
+)
+def test_a_name_that_the_encoding_lacks_is_rejected_before_a_file_is_written(tmp_path, write):
+    with pytest.raises(PrbmError, match=r"write '.*half\\ud800.*lacks '\\ud800'.*PYTHONUTF8"):
+        write(tmp_path / UNPAIRED)
+    assert [*tmp_path.iterdir()] == []
+
+
+READERS = {
+    "mechanism": prbm.load,
+    "record": read_record,
+    "parameter set": lambda path: read_parameter_set(path, {}),
+    "signal": lambda path: read_signal("force.x", f"csv({path}, force)", "N"),
+    "result": read_csv,
+    "FMU of a sweep": read_fmu,
+    "FMU of a system": lambda path: described("guide", path),
+}
+
+
+@pytest.mark.parametrize("kind", READERS)
+def test_a_name_that_the_encoding_lacks_cannot_be_read(tmp_path, kind):
+    with pytest.raises(PrbmError, match=r"half.*read.*codec can't encode"):
+        READERS[kind](tmp_path / UNPAIRED)
+
+
+@pytest.mark.parametrize("kind", READERS)
+def test_a_name_with_a_null_byte_cannot_be_read(tmp_path, kind):
+    with pytest.raises(PrbmError, match=r"read.*null"):
+        READERS[kind](tmp_path / "half\0.toml")
