@@ -340,7 +340,7 @@ def inclusive(profile: Path, functions: Sequence[str]) -> tuple[int, int]:
     names: dict[str, str] = {}
     calls = total = 0
     callee, pending = "", 0
-    for line in profile.read_text().splitlines():
+    for line in profile.read_text(encoding="utf-8").splitlines():
         if pending:
             if callee.split(".")[0] in functions:
                 calls, total = calls + pending, total + int(line.split()[-1])

@@ -509,7 +509,7 @@ class Problem:
         e, v = system.directions(y[:n]), y[n : 2 * n]
         _, M, loops = self.simulation.equations.mass_and_loops(y[:n])
         G = system.gap_rows.jacobian(e)[:1]
-        X = contact.response(M, loops, G)
+        X = contact.response(M, loops, G, system.length)
         P = contact.newton(G @ X, G @ v, np.array([self.simulation.values["stop.restitution"]]))
         result = y.copy()
         result[n : 2 * n] = v + X @ P

@@ -1,6 +1,8 @@
 """Fixtures for all tests: the shipped mechanisms and their FMUs, each built once per run."""
 
-from collections.abc import Callable, Hashable, Iterable
+import shutil
+import tempfile
+from collections.abc import Callable, Hashable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +13,9 @@ from c_importer import host_fmu
 from prbm.base.atomic import write
 from prbm.files.mechanism_file import shipped
 from prbm.fmu import python_fmu
+from prbm.fmu.unpack import plain_folder
 from prbm.mechanism.description import Mechanism
-from shared import once
+from shared import once, shared_folder
 from support import GUIDES, SUPPORT, mechanism
 
 collect_ignore = ["support"]  # Modules that tests import; they contain no tests.
@@ -68,6 +71,17 @@ def fmus(mechanisms: dict[str, Mechanism]) -> dict[str, Path]:
         return once(f"python-{name}", make) / f"{name}.fmu"
 
     return FmuCache(build, GUIDES)
+
+
+@pytest.fixture
+def plain_temporary_folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Let other programs unpack Python FMUs to a folder that pythonfmu can read."""
+    shared_folder()  # The files of the test run stay in its own folder.
+    folder = tempfile.mkdtemp(dir=plain_folder())
+    monkeypatch.setattr(tempfile, "tempdir", folder)
+    monkeypatch.setenv("TMPDIR", folder)
+    yield
+    shutil.rmtree(folder)
 
 
 @pytest.fixture(scope="session")

@@ -307,7 +307,7 @@ def test_the_moving_mass_excludes_the_stubs_at_the_ground():
 
 
 def test_invalid_files_are_rejected_with_path_and_reason(tmp_path):
-    text = shipped()["PRBDM"].read_text()
+    text = shipped()["PRBDM"].read_text(encoding="utf-8")
     cases = {
         "no toml": ("= 3", "not a TOML file"),
         "unknown key": (text + "\n[extra]\nx = 1\n", "extra"),
@@ -320,7 +320,7 @@ def test_invalid_files_are_rejected_with_path_and_reason(tmp_path):
     }
     for name, (content, words) in cases.items():
         path = tmp_path / f"{name}.toml"
-        path.write_text(content)
+        path.write_text(content, encoding="utf-8")
         with pytest.raises(MechanismError) as caught:
             read_mechanism(path)
         assert str(path) in str(caught.value)

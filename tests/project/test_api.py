@@ -49,7 +49,7 @@ def test_an_unknown_public_name_is_an_attribute_error():
 
 
 def test_the_version_is_the_one_of_the_project():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     assert prbm.__version__ == project["version"]
 
 

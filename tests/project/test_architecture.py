@@ -54,6 +54,6 @@ def test_the_files_and_functions_that_the_page_names_exist():
         assert file is not None, path
         if function:
             name = re.sub(r"^(fmi[23])(\w+)", r"(\1\2|FMI[23]\\(\2\\))", function.split(".")[-1])
-            assert re.search(rf"\b{name}\(", file.read_text()), function
+            assert re.search(rf"\b{name}\(", file.read_text(encoding="utf-8")), function
     for name in re.findall(r"`(test_\w+\.py)`", PAGE):
         assert (ROOT / "tests" / "kernel" / name).exists(), name

@@ -25,7 +25,10 @@ def test_code_for_moving_walls_is_within_its_limit():
 def test_length_of_c_code_excludes_comments_and_blank_lines(tmp_path):
     path = tmp_path / sizes.WALLS_FILE
     path.parent.mkdir(parents=True)
-    path.write_text("int x;\n/* A\n * comment. */\nint\nf(void) {\n\n    return 1; /* one */\n}\n")
+    path.write_text(
+        "int x;\n/* A\n * comment. */\nint\nf(void) {\n\n    return 1; /* one */\n}\n",
+        encoding="utf-8",
+    )
     assert [(x.size, x.name) for x in sizes.wall_functions(tmp_path)] == [(4, "f")]
 
 

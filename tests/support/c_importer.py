@@ -82,6 +82,8 @@ ARM = Host(
 )
 PACKAGES = {
     "cc": "gcc",
+    "aarch64-linux-gnu-gcc": "gcc-aarch64-linux-gnu",
+    "x86_64-w64-mingw32-gcc": "gcc-mingw-w64-x86-64",
     "valgrind": "valgrind",
     "wine": "wine64",
     "qemu-aarch64-static": "qemu-user-static and libc6-arm64-cross",
@@ -345,8 +347,17 @@ def native(model: str, fmi: int, platform: str = "host") -> Path:
 
 
 @cache
-def kernel_library(name: str, flags: tuple[str, ...], compiler: str = "cc") -> Path:
-    """Return the library of the native FMUs, compiled with more flags; it fits every mechanism."""
-    shared = ("-fPIC", "-shared", "-fvisibility=hidden", *flags, "-lm")
+def kernel_library(
+    name: str, flags: tuple[str, ...], compiler: str = "cc", host: Host = NATIVE, target: str = ""
+) -> Path:
+    """Return the library of the native FMUs, compiled with more flags; it fits every mechanism.
+
+    The compiler is that of ziglang if a target is given.
+    """
+    system = () if host.windows else ("-fPIC", "-lm")
+    shared = ("-shared", "-fvisibility=hidden", *flags, *system)
     sources = [KERNEL / "prbm_fmu.c"]
-    return once(f"{name}.so", lambda path: compile_c(path, sources, shared, "", compiler))
+    return once(
+        f"{name}{host.suffix}",
+        lambda path: compile_c(path, sources, shared, target, compiler),
+    )

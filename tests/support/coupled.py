@@ -55,7 +55,7 @@ class Integrator(Fmi2Slave):
 def integrator() -> Path:
     """Return the path of an FMU that integrates its input by explicit Euler steps."""
     source = Path(_folder.name) / "integrator.py"
-    source.write_text(INTEGRATOR)
+    source.write_text(INTEGRATOR, encoding="utf-8")
     return Path(_folder.name) / FmuBuilder.build_FMU(source, dest=_folder.name)
 
 

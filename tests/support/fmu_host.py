@@ -1,12 +1,14 @@
 """An importer of Python FMUs for the tests: FMPy's slave with names instead of references."""
 
 import shutil
+import tempfile
 from ctypes import byref
 from itertools import pairwise
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+import fmpy
 import numpy as np
 from fmpy import extract, read_model_description
 from fmpy.fmi1 import FMICallException
@@ -16,9 +18,17 @@ from fmpy.fmi2 import fmi2CallbackFreeMemoryTYPE as Free
 from fmpy.fmi2 import fmi2CallbackLoggerTYPE as Logger
 from fmpy.logging import addLoggerProxy
 
+from prbm.fmu.unpack import plain_folder, unpacked
+
 OK, DISCARD = 0, 2
 
 _kept: list[fmi2CallbackFunctions] = []  # FMPy's proxy calls the last logger, freed or not.
+
+
+def simulate_fmu(fmu: str | Path, **options: Any) -> np.ndarray:
+    """Simulate an FMU with FMPy in a folder that pythonfmu can read."""
+    with unpacked(Path(fmu)) as folder:
+        return fmpy.simulate_fmu(str(folder), **options)
 
 
 class Instance:
@@ -28,7 +38,7 @@ class Instance:
         self.description = read_model_description(str(fmu))
         self.variables = {v.name: v for v in self.description.modelVariables}
         self.messages: list[str] = []
-        self.folder = extract(str(fmu))
+        self.folder = extract(str(fmu), tempfile.mkdtemp(dir=plain_folder()))
         self.fmu = FMU2Slave(
             guid=self.description.guid,
             unzipDirectory=self.folder,

@@ -30,6 +30,9 @@ function result(kernel, job) {
     error: run.error?.message ?? null,
     milliseconds: performance.now() - start,
   };
+  if (job.rows) {
+    found.rows = Buffer.from(run.rows.buffer).toString("base64");
+  }
   if (job.drawing) {
     Object.assign(found, drawing(simulation, run, job));
   }

@@ -10,7 +10,7 @@ NOISE, RATE = 4e-6, 750.0  # m, Hz
 
 def write(path, head, *columns):
     rows = "\n".join(",".join(f"{x:.9g}" for x in row) for row in zip(*columns, strict=True))
-    path.write_text(f"{head}\n{rows}\n")
+    path.write_text(f"{head}\n{rows}\n", encoding="utf-8")
 
 
 def records(folder):

@@ -30,7 +30,7 @@ class Mishap(Fmi2Slave):
 
     def exit_initialization_mode(self):
         """Append x to the log and wait for the time ``pause`` [s]."""
-        with open(os.environ["MISHAP_LOG"], "a") as log:
+        with open(os.environ["MISHAP_LOG"], "a", encoding="utf-8") as log:
             log.write(f"{self.x!r}\n")
         time.sleep(self.pause)
 

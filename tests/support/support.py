@@ -1,6 +1,7 @@
 """Shared by the tests: the shipped mechanisms, and the 1R guide as one scalar equation."""
 
 import math
+import os
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -31,6 +32,15 @@ SUPPORT = Path(__file__).resolve().parent
 @cache
 def mechanism(name: str) -> Mechanism:
     return read_mechanism(shipped()[name])
+
+
+def possible(path: Path) -> Path:
+    """Return a path; skip the test if the encoding of the file system lacks one of its letters."""
+    try:
+        os.fsencode(path)
+    except UnicodeEncodeError as error:
+        pytest.skip(f"names of files have the encoding {error.encoding} here")
+    return path
 
 
 GUIDES = ("PRBDM", "PRBDM2R")

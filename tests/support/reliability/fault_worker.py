@@ -56,7 +56,7 @@ class Worker:
         source, sink = os.pipe()
         child = os.fork()
         if child == 0:
-            with self.log.open("w") as file:
+            with self.log.open("w", encoding="utf-8") as file:
                 os.dup2(file.fileno(), 1)
                 os.dup2(file.fileno(), 2)
             self.fault.fault_arm(os.fsencode(self.folder), kind, at)
@@ -126,7 +126,7 @@ class Worker:
         self, kind: int, found: "Attempt", before: dict[str, bytes], after: dict[str, bytes]
     ) -> list[str]:
         """Return the violations after a fault: partial files, tracebacks, no recovery."""
-        text, wrong = self.log.read_text(errors="replace"), []
+        text, wrong = self.log.read_text(encoding="utf-8", errors="replace"), []
         if "Traceback" in text:
             wrong.append(f"traceback: {text[-300:]!r}")
         if kind == KILL and found.status != KILLED:

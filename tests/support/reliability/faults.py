@@ -61,7 +61,8 @@ def _compiler(folder: Path) -> str:
         "kind=kernel\n"
         'while [ $# -gt 0 ]; do case "$1" in --version) echo cc 1; exit;; -o) out=$2;; '
         "-DPRBM_ENGINE) kind=engine;; esac\n"
-        f'shift; done\ncp "{folder}/$kind.so" "$out"\n'
+        f'shift; done\ncp "{folder}/$kind.so" "$out"\n',
+        encoding="utf-8",
     )
     path.chmod(0o755)
     return str(path)
