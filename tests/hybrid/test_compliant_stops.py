@@ -182,6 +182,7 @@ def test_friction_holds_or_slides_after_each_reversal(engine, stiffness, e, forc
 # --- rules of contacts ------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_energy_is_conserved_through_all_contacts_until_rest():
     sim = Simulation(compliant("PRBDM2R", 1e6, 0.3))
     start = energy_balance(sim.outputs())

@@ -127,6 +127,7 @@ def test_a_short_previous_step_is_no_node_of_the_interpolation():
     assert arc.start_before(0.1) is not None
 
 
+@pytest.mark.slow
 def test_error_is_roughly_proportional_to_the_tolerance():
     """The tolerances are from 1e-6 to 1e-10; the span of time includes an impact."""
     span = (0.045, 0.06)

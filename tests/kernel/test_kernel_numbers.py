@@ -160,6 +160,18 @@ def test_power_error_is_bounded_by_the_rounding_of_its_exponent(rng):
     assert kernel().power(3.0, 0.0) == 1.0
 
 
+def test_a_power_scales_exactly_with_powers_of_two(rng):
+    """Limits of the base and of the exponent included: 0, infinity and large exponents."""
+    power = kernel().power
+    for x in 10.0 ** rng.uniform(-12, 12, 1000):
+        assert power(4.0 * x, 1.5) == 8.0 * power(x, 1.5)
+    assert power(2.0, 500.0) == 2.0**500
+    assert power(2.0, 1100.0) == power(math.inf, 0.5) == math.inf
+    assert power(2.0, -1100.0) == power(math.inf, -0.5) == 0.0
+    assert power(math.inf, 0.0) == power(0.0, 0.0) == 1.0
+    assert math.isnan(power(-1.0, 0.5))
+
+
 def test_phase_is_within_two_units_for_vectors_of_any_length(rng):
     angles = np.concatenate([rng.uniform(-np.pi, np.pi, 4000), 10.0 ** rng.uniform(-12, 0, 500)])
     for angle in angles:

@@ -26,6 +26,7 @@ ROOT = Path(__file__).resolve().parents[2]
 """Root folder of the project."""
 
 SUPPORT = Path(__file__).resolve().parent
+CASES = ROOT / "tests" / "cases"  # Public cases; README.md has their values and sources.
 """Folder of the modules that the tests import."""
 
 

@@ -173,10 +173,6 @@ typedef enum {
     EVENT_KINDS = 7,
 } EventKind;
 
-/* --- prbm.mechanism.parts ----------------------------------------------------------------------- */
-
-#define LENGTH_MIN 1e-09
-
 /* --- prbm.mechanism.flexure --------------------------------------------------------------------- */
 
 typedef enum {

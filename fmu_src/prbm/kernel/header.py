@@ -49,7 +49,6 @@ from ..mechanism.flexure import (
     PROFILES,
     THICK_NODES,
 )
-from ..mechanism.parts import LENGTH_MIN
 
 PATH = Path(__file__).with_name("generated.h")
 INT_MAX = 2**31 - 1
@@ -80,7 +79,6 @@ def header() -> str:
             sys.modules[EventKind.__module__],
             [_enumeration("EventKind", "EVENT", _kinds())],
         ),
-        _section("prbm.mechanism.parts", [_constant("LENGTH_MIN", LENGTH_MIN)]),
         _section(
             "prbm.mechanism.flexure",
             [

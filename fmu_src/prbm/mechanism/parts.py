@@ -522,9 +522,9 @@ def check_slender(
     Raises
     ------
     ParameterError
-        If the length is below :data:`LENGTH_MIN`, or the thickness is not below the length.
+        If the length is zero, or the thickness is not below the length.
     """
-    if not length >= LENGTH_MIN:
+    if not length > 0.0:
         raise ParameterError(
             f"flexure {flexure.name} from {flexure.start} to {flexure.end} has the length "
             f"{length:g} m: move its ends apart"

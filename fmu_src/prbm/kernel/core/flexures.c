@@ -318,7 +318,7 @@ static bool check_slender(const System *system, const Flexure *flexure, const Fl
     double L = length_of(system, flexure), thickness[2];
     thickness[0] = evaluate(kind->thickness, system->values);
     thickness[1] = dimension(system, kind, DIMENSION_END_THICKNESS);
-    if (!(L >= LENGTH_MIN)) {
+    if (!(L > 0.0)) {
         return fail(problem, "flexure %s has the length %g m: move its ends apart", flexure->name,
                     L);
     }

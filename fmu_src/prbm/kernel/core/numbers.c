@@ -142,6 +142,7 @@ SHARED bool turned_directions(int even, const double *q, const double *start, Pa
 #define SQUARE_ROOT_OF_HALF 0.7071067811865476
 #define EXPONENT_MAX 710.0  /* Above, exp is infinite. */
 #define EXPONENT_MIN -746.0 /* Below, exp is zero. */
+#define POWER_EXPONENT_MAX 512.0
 
 /* Return c_0 + c_1 z + c_2 z^2 + ... */
 static double series(int count, const double *c, double z) {
@@ -200,9 +201,16 @@ PRBM double exponential(double x) {
     return ldexp(1.0 + (r + (rest + r * r * exponential_series(r))), (int)k);
 }
 
-/* The relative error is |y ln x| times the rounding error of a double. */
+/* With x = 2^k m, x^y = 2^(k y) m^y: a factor 2^j of x is exactly the factor 2^(j y) of x^y if j y is
+   an integer.  The relative error is at most |y ln x| times the rounding error of a double. */
 PRBM double power(double x, double y) {
-    return y == 0.0 ? 1.0 : exponential(y * natural_log(x));
+    if (!(x > 0.0) || x > DBL_MAX || !(fabs(y) < POWER_EXPONENT_MAX)) {
+        return y == 0.0 ? 1.0 : exponential(y * natural_log(x));
+    }
+    int k;
+    double m = frexp(x, &k), turns = k * y, whole = floor(turns + 0.5);
+    double rest = y * natural_log(m) + (turns - whole) * (LN2_HIGH + LN2_LOW);
+    return ldexp(exponential(rest), (int)whole);
 }
 
 /* --- phase ------------------------------------------------------------------------------------ */
