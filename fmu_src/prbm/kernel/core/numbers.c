@@ -160,18 +160,23 @@ static double atanh_series(double z) {
     return series(10, c, z);
 }
 
+/* Return m of x = 2^k m > 0, between the square roots of 1/2 and of 2, and store k. */
+static double mantissa(double x, int *k) {
+    double m = frexp(x, k);
+    if (m < SQUARE_ROOT_OF_HALF) {
+        m *= 2.0;
+        *k -= 1;
+    }
+    return m;
+}
+
 /* With x = 2^k (1 + f) and s = f/(2 + f), ln(1 + f) = 2 atanh s = f - s (f - s^2 Q(s^2)). */
 PRBM double natural_log(double x) {
     if (!(x > 0.0) || x > DBL_MAX) {
         return x == 0.0 ? -HUGE_VAL : x < 0.0 ? (double)NAN : x;
     }
     int k;
-    double f = frexp(x, &k);
-    if (f < SQUARE_ROOT_OF_HALF) {
-        f *= 2.0;
-        k -= 1;
-    }
-    f -= 1.0;
+    double f = mantissa(x, &k) - 1.0;
     double s = f / (2.0 + f), z = s * s;
     double correction = s * (f - z * atanh_series(z));
     return k * LN2_HIGH + (f - (correction - k * LN2_LOW));
@@ -208,7 +213,7 @@ PRBM double power(double x, double y) {
         return y == 0.0 ? 1.0 : exponential(y * natural_log(x));
     }
     int k;
-    double m = frexp(x, &k), turns = k * y, whole = floor(turns + 0.5);
+    double m = mantissa(x, &k), turns = k * y, whole = floor(turns + 0.5);
     double rest = y * natural_log(m) + (turns - whole) * (LN2_HIGH + LN2_LOW);
     return ldexp(exponential(rest), (int)whole);
 }
