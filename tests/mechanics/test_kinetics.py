@@ -120,3 +120,20 @@ def test_constraint_rows_equal_central_differences_of_the_constraints(rng):
     np.testing.assert_allclose(rows(q), differences, atol=1e-9)
     bent = (rows(q + h * v) - rows(q - h * v)) @ v / (2 * h)
     np.testing.assert_allclose(convective(B, np.exp(1j * q), v), -bent, atol=1e-9)
+
+
+def pivots(G):
+    """Return the pivots D of a Hermitian matrix L D L^*, L with ones on its diagonal."""
+    return np.diag(np.linalg.cholesky(G)).real ** 2
+
+
+def test_no_configuration_has_smaller_pivots_than_the_coupling(rng):
+    """The kernel tests G = H + diag(J) once, instead of M = Re(U^* G U) at every evaluation."""
+    for _ in range(300):
+        n = int(rng.integers(1, 6))
+        parts = rng.normal(size=(2, n + 1, n))
+        A = (parts[0] + 1j * parts[1]) * 10.0 ** rng.uniform(-2, 2, n)
+        G = A.conj().T @ A
+        U = np.exp(1j * rng.uniform(-np.pi, np.pi, n))
+        M = (U.conj()[:, None] * G * U).real
+        assert np.all(pivots(M) >= pivots(G) * (1.0 - 1e-9))

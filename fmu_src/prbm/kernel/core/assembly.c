@@ -337,6 +337,35 @@ static bool check_ratio(const System *system, const double *M, Problem *problem)
                 part_of(m, heavy), most);
 }
 
+/* Return whether no pivot of M = Re(U^* G U), G = H + diag(J), is round-off in any configuration U,
+ * a diagonal matrix of unit vectors.  The pivots of M are at least those of G: both are minima of
+ * the same quadratic form, for M over fewer vectors. */
+static bool definite_everywhere(const System *system, Scratch *scratch) {
+    size_t mark = scratch->used;
+    const Complex *H = system->coupling;
+    bool definite = !system->mapped;
+    for (int block = 0; definite && block < system->block_count; block++) {
+        int start = system->blocks[block].start, size = system->blocks[block].size;
+        Complex *G = take_complex(scratch, size, size);
+        memcpy(G, H, (size_t)(size * size) * sizeof *G);
+        for (int k = 0; definite && k < size; k++) {
+            double diagonal = system->own[start + k];
+            double pivot = G[k * size + k].re - H[k * size + k].re + diagonal;
+            definite = pivot > SINGULAR_RTOL * diagonal;
+            for (int i = k + 1; definite && i < size; i++) {
+                Complex share = scaled(1.0 / pivot, G[i * size + k]);
+                for (int j = k + 1; j <= i; j++) {
+                    Complex *g = &G[i * size + j];
+                    *g = minus(*g, product(share, conjugate(G[j * size + k])));
+                }
+            }
+        }
+        H += size * size;
+        scratch->used = mark;
+    }
+    return definite;
+}
+
 /* Check the mass matrix, and derive the least mobility of a row from it. */
 static bool check_masses(System *system, const Complex *e0, Scratch *scratch, Problem *problem) {
     size_t mark = scratch->used, n = (size_t)system->n;
@@ -348,6 +377,7 @@ static bool check_masses(System *system, const Complex *e0, Scratch *scratch, Pr
         return false;
     }
     double row = ROW_RTOL * system->length;
+    system->definite = definite_everywhere(system, scratch);
     system->least_mobility = HUGE_VAL;
     bool regular = true;
     for (size_t i = 0; i < n; i++) {

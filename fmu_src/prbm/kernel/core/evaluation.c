@@ -400,7 +400,7 @@ static bool blocks_motion(const Equations *q, Evaluation *result) {
     double *L = result->factors.L;
     for (int k = 0; k < result->factors.block_count; k++) {
         int start = result->factors.blocks[k].start, size = result->factors.blocks[k].size;
-        switch (size) {
+        switch (q->system->definite ? size : 0) {
         case 1: regular = small_block_motion(q, result, 1, start, H, L) && regular; break;
         case 2: regular = small_block_motion(q, result, 2, start, H, L) && regular; break;
         case 3: regular = small_block_motion(q, result, 3, start, H, L) && regular; break;

@@ -78,18 +78,17 @@ RARE bool factor(int size, const double *M, double *L, double *inverse) {
     return factor_any(size, 0, M, L, inverse);
 }
 
-/* Limits in small_factor: of the products of pivots, beyond which they may underflow or overflow,
- * and of the sum of the diagonal elements over their pivots. */
+/* Limits in small_factor of the products of pivots, beyond which they may underflow or overflow. */
 #define LEAST_MULTIPLE 1e-280
 #define LARGEST_MULTIPLE 1e280
-#define LARGEST_RATIO (1.0 / SINGULAR_RTOL)
 
 /* Factor M, of a size up to SMALL, like factor_any, but with all divisions at the end, so that they
  * overlap in time.  Elimination without divisions computes w_k = w_0 w_1 ... w_(k-1) D_k on the
  * diagonal, with w_0 = D_0, and w_k L_ik below it.  Return false if M is not positive definite, or
- * if a product may underflow or overflow; factor may then succeed. */
+ * if a product may underflow or overflow; factor may then succeed.  The caller knows that no pivot
+ * is round-off, or tests it. */
 SHARED bool small_factor(int size, const double *ALONE M, double *ALONE L, double *ALONE inverse) {
-    double w[SMALL][SMALL], multiple = 1.0, ratios = 0.0;
+    double w[SMALL][SMALL], multiple = 1.0;
     bool safe;
     UNROLLED
     for (int i = 0; i < size; i++) {
@@ -125,11 +124,7 @@ SHARED bool small_factor(int size, const double *ALONE M, double *ALONE L, doubl
             }
         }
     }
-    UNROLLED
-    for (int k = 0; k < size; k++) {
-        ratios += inverse[k] * M[k * size + k];
-    }
-    return safe && ratios < LARGEST_RATIO; /* If one is too large, factor rejects M. */
+    return safe;
 }
 
 /* Copy the values of a block to its place in a vector, in pairs if start is even. */
@@ -236,6 +231,21 @@ static void backward_all(const Factors *factors, double *x) {
     solve_blocks(factors, x, BACKWARD);
 }
 
+/* Factor a Schur complement. */
+SIZED bool factor_rows(int size, const double *S, double *L, double *inverse) {
+    double ratios = 0.0;
+    if (small_factor(size, S, L, inverse)) {
+        UNROLLED
+        for (int k = 1; k < size; k++) { /* The first ratio is 1. */
+            ratios += inverse[k] * S[k * size + k];
+        }
+        if (ratios < 1.0 / SINGULAR_RTOL) {
+            return true;
+        }
+    }
+    return factor(size, S, L, inverse);
+}
+
 /* Compute the lower triangle of S = Z D^-1 Z^T, with the D of M, and factor S = L_S D_S L_S^T.
  * L_S (r, r) and 1/D_S (r,) are stored behind S.  Return false if S is singular. */
 SIZED bool schur_of_size(int r, int even, Factors *factors) {
@@ -262,7 +272,7 @@ SIZED bool schur_of_size(int r, int even, Factors *factors) {
         S[i] = total(sum[i]);
         rows = rows && (i % (r + 1) != 0 || S[i] > factors->least);
     }
-    return rows && (small_factor(r, S, L, L + r * r) || factor(r, S, L, L + r * r));
+    return rows && factor_rows(r, S, L, L + r * r);
 }
 
 /* Return Z_i D^-1 column. */

@@ -170,16 +170,21 @@ static double mantissa(double x, int *k) {
     return m;
 }
 
-/* With x = 2^k (1 + f) and s = f/(2 + f), ln(1 + f) = 2 atanh s = f - s (f - s^2 Q(s^2)). */
+/* Return ln(2^k m).  With m = 1 + f and s = f/(2 + f),
+   ln(1 + f) = 2 atanh s = f - s (f - s^2 Q(s^2)). */
+static double log_of(double m, int k) {
+    double f = m - 1.0, s = f / (2.0 + f), z = s * s;
+    double correction = s * (f - z * atanh_series(z));
+    return k * LN2_HIGH + (f - (correction - k * LN2_LOW));
+}
+
 PRBM double natural_log(double x) {
     if (!(x > 0.0) || x > DBL_MAX) {
         return x == 0.0 ? -HUGE_VAL : x < 0.0 ? (double)NAN : x;
     }
     int k;
-    double f = mantissa(x, &k) - 1.0;
-    double s = f / (2.0 + f), z = s * s;
-    double correction = s * (f - z * atanh_series(z));
-    return k * LN2_HIGH + (f - (correction - k * LN2_LOW));
+    double m = mantissa(x, &k);
+    return log_of(m, k);
 }
 
 /* 1/2! + r/3! + r^2/4! + ..., |r| < 0.35 */
@@ -191,19 +196,20 @@ static double exponential_series(double r) {
     return series(13, c, r);
 }
 
-/* With x = k ln 2 + r, exp x = 2^k (1 + r + r^2 (1/2 + ...)). */
-PRBM double exponential(double x) {
-    if (!(x < EXPONENT_MAX)) {
-        return x >= EXPONENT_MAX ? HUGE_VAL : x;
-    }
-    if (x < EXPONENT_MIN) {
-        return 0.0;
-    }
+/* Return 2^shift exp x.  With x = k ln 2 + r, exp x = 2^k (1 + r + r^2 (1/2 + ...)). */
+static double shifted_exponential(double x, double shift) {
     double k = floor(x * BINARY_DIGITS_PER_E + 0.5);
     double high = x - k * LN2_HIGH; /* exact */
     double r = high - k * LN2_LOW;
     double rest = (high - r) - k * LN2_LOW;
-    return ldexp(1.0 + (r + (rest + r * r * exponential_series(r))), (int)k);
+    return ldexp(1.0 + (r + (rest + r * r * exponential_series(r))), (int)(k + shift));
+}
+
+PRBM double exponential(double x) {
+    if (!(x < EXPONENT_MAX)) {
+        return x >= EXPONENT_MAX ? HUGE_VAL : x;
+    }
+    return x < EXPONENT_MIN ? 0.0 : shifted_exponential(x, 0.0);
 }
 
 /* With x = 2^k m, x^y = 2^(k y) m^y: a factor 2^j of x is exactly the factor 2^(j y) of x^y if j y is
@@ -214,8 +220,7 @@ PRBM double power(double x, double y) {
     }
     int k;
     double m = mantissa(x, &k), turns = k * y, whole = floor(turns + 0.5);
-    double rest = y * natural_log(m) + (turns - whole) * (LN2_HIGH + LN2_LOW);
-    return ldexp(exponential(rest), (int)whole);
+    return shifted_exponential(y * log_of(m, 0) + (turns - whole) * (LN2_HIGH + LN2_LOW), whole);
 }
 
 /* --- phase ------------------------------------------------------------------------------------ */

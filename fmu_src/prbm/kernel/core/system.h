@@ -144,6 +144,7 @@ typedef struct {
     double *calculated;       /* gamma0 of the flexure types with several pivots */
     Complex anchor, gravity;
     double length;
+    bool definite;            /* M is not singular in any configuration; false if mapped */
     double least_mobility;    /* of the shortest row that is not round-off [1/kg] */
 } System;
 
