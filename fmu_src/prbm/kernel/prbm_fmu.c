@@ -32,6 +32,7 @@
 #include "core/start.c"
 #include "core/complementarity.c"
 #include "core/contact.c"
+#include "core/contact_problem.c"
 #include "core/contact_state.c"
 #include "core/compliance.c"
 #include "core/equations.c"

@@ -469,14 +469,14 @@ static bool mobility_change(const Tangent *t, int i, double *result, Problem *pr
     const System *system = system_of(sim);
     size_t mark = sim->scratch.used;
     int n = system->n, r = system->r, size = n + r;
-    double *kkt = take_matrix(&sim->scratch, size, size), *x = take(&sim->scratch, (size_t)size);
+    double *x = take(&sim->scratch, (size_t)size);
     Rows gaps = gap_rows(system), loops = plain_rows(system, r, system->loops, system->loops_c);
-    Inertia at = inertia_at(sim, t->y);
-    row_jacobian(&gaps, i, at.e, x);
+    ContactProblem *at = contact_problem_at(sim, t->y);
+    row_jacobian(&gaps, i, at->e, x);
     zeros(r, x + n);
-    saddle(n, r, at.M, at.loops, at.loops, kkt);
-    bool ok = solve(n, r, kkt, x, system->length, &sim->scratch, problem);
+    bool ok = factor_contacts(at, problem);
     if (ok) {
+        solve_saddle(&at->factors, x);
         Tangent u = at_rates(t, x);
         double change = rate_change(&u, &gaps, i) - kinetic_change(&u);
         for (int k = 0; k < r; k++) {

@@ -552,6 +552,7 @@ PRBM bool assemble(System *system, const double *values, Scratch *scratch, Probl
     const Mechanism *m = system->mechanism;
     size_t mark = scratch->used;
     system->values = values;
+    system->assembly += 1;
     system->gravity = complex_of(values[m->gravity[0]], values[m->gravity[1]]);
     clear(system);
     system->length = size_of(system, scratch);

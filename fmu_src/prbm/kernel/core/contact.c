@@ -9,25 +9,33 @@
 #include "core/contact.h"
 #include "core/matrix.h"
 
-PRBM bool response(int n, int r, int k, const double *M, const double *held, const double *rows,
-                   double length, double *X, Scratch *scratch, Problem *problem) {
-    size_t used = scratch->used;
-    int size = n + r;
-    double *kkt = take_matrix(scratch, size, size), *right = take(scratch, (size_t)size);
-    ScaledFactors factors = take_factors(scratch, size, kkt);
-    saddle(n, r, M, held, held, kkt);
-    bool solved = factor_saddle(n, r, length, &factors, problem);
-    for (int j = 0; solved && j < k; j++) {
-        for (int i = 0; i < size; i++) {
-            right[i] = i < n ? rows[j * n + i] : 0.0;
-        }
-        solve_saddle(&factors, right);
+PRBM void factored_response(const ScaledFactors *factors, int n, int k, const double *rows,
+                            double *X, Scratch *scratch) {
+    size_t mark = scratch->used;
+    double *right = take(scratch, (size_t)factors->size);
+    for (int j = 0; j < k; j++) {
+        copy(n, rows + j * n, right);
+        zeros(factors->size - n, right + n);
+        solve_saddle(factors, right);
         for (int i = 0; i < n; i++) {
             X[i * k + j] = right[i];
         }
     }
-    scratch->used = used;
-    return solved;
+    scratch->used = mark;
+}
+
+PRBM bool response(int n, int r, int k, const double *M, const double *held, const double *rows,
+                   double length, double *X, Scratch *scratch, Problem *problem) {
+    size_t mark = scratch->used;
+    int size = n + r;
+    ScaledFactors factors = take_factors(scratch, size, take_matrix(scratch, size, size));
+    saddle(n, r, M, held, held, factors.lu);
+    bool regular = factor_saddle(n, r, length, &factors, problem);
+    if (regular) {
+        factored_response(&factors, n, k, rows, X, scratch);
+    }
+    scratch->used = mark;
+    return regular;
 }
 
 PRBM double least_mobility(int n, const double *M, const double *row, double length) {

@@ -2,10 +2,13 @@
 #ifndef PRBM_CONTACT_H
 #define PRBM_CONTACT_H
 
-#include "core/memory.h"
+#include "core/constraints.h"
 
 /* Compute the changes of velocity X (n, k) by unit impulses along the rows (k, n).  The rates of
- * the rows held (r, n) do not change.  length: the size of the mechanism [m]. */
+ * the rows in the factored saddle-point matrix do not change. */
+PRBM void factored_response(const ScaledFactors *factors, int n, int k, const double *rows,
+                            double *X, Scratch *scratch);
+/* The same, with the rows held (r, n) whose rates do not change.  length: the size of the mechanism [m]. */
 PRBM bool response(int n, int r, int k, const double *M, const double *held, const double *rows,
                    double length, double *X, Scratch *scratch, Problem *problem);
 /* Return the mobility below which no motion along a row (n,) is possible: SINGULAR_RTOL of that

@@ -143,6 +143,7 @@ typedef struct {
     double *straight;         /* (even,) q0 */
     double *calculated;       /* gamma0 of the flexure types with several pivots */
     Complex anchor, gravity;
+    int assembly;             /* the number of assemblies so far */
     double length;
     bool definite;            /* M is not singular in any configuration; false if mapped */
     double least_mobility;    /* of the shortest row that is not round-off [1/kg] */

@@ -293,10 +293,10 @@ static bool point_mobility(Simulation *sim, int stop, double *result, Problem *p
     size_t mark = sim->scratch.used;
     const System *system = system_of(sim);
     double *G = take(&sim->scratch, (size_t)system->n);
-    Inertia at = inertia_at(sim, sim->state.front);
+    ContactProblem *at = contact_problem_at(sim, sim->state.front);
     Rows gaps = gap_rows(system);
-    row_jacobian(&gaps, stop, at.e, G);
-    bool ok = mobility(sim, &at, system->r, at.loops, G, result, problem);
+    row_jacobian(&gaps, stop, at->e, G);
+    bool ok = mobility(at, G, result, &sim->scratch, problem);
     *result += sim->equations.inputs.mobilities[stop];
     sim->scratch.used = mark;
     return ok;
@@ -320,10 +320,10 @@ static void shorten_step(Simulation *sim, int stop, double inverse_mass) {
 static double kinetic_energy(Simulation *sim, const double *v) {
     size_t mark = sim->scratch.used;
     int n = system_of(sim)->n;
-    Inertia at = inertia_at(sim, sim->state.front);
+    ContactProblem *at = contact_problem_at(sim, sim->state.front);
     double sum = 0.0;
     for (int j = 0; j < n; j++) {
-        sum += 0.5 * v[j] * dot(n, at.M + j * n, v);
+        sum += 0.5 * v[j] * dot(n, at->M + j * n, v);
     }
     sim->scratch.used = mark;
     return sum;
@@ -354,11 +354,11 @@ static bool is_stuck(Simulation *sim, int stop, bool *result, Problem *problem) 
         return true; /* There are no constraints but the loops. */
     }
     double *G = take(&sim->scratch, (size_t)n), *held = take_matrix(&sim->scratch, q->r, n);
-    Inertia at = inertia_at(sim, sim->state.front);
+    ContactProblem *at = contact_problem_at(sim, sim->state.front);
     Rows gaps = gap_rows(q->system);
-    row_jacobian(&gaps, stop, at.e, G);
-    jacobian(&q->active, at.e, held);
-    bool moves = true, ok = independent(sim, &at, q->r, held, G, &moves, problem);
+    row_jacobian(&gaps, stop, at->e, G);
+    jacobian(&q->active, at->e, held);
+    bool moves = true, ok = independent(at, q->r, held, G, &moves, &sim->scratch, problem);
     *result = !moves;
     sim->scratch.used = mark;
     return ok;

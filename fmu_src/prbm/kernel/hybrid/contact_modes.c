@@ -200,16 +200,16 @@ static bool is_mobile(Simulation *sim, int contact, const ContactMode *modes, bo
     const Equations *q = &sim->trial.equations;
     double *row = take(&sim->scratch, (size_t)system->n);
     ContactMode others[CONTACTS_MAX];
-    Inertia at = inertia_at(sim, sim->state.front);
+    ContactProblem *at = contact_problem_at(sim, sim->state.front);
     memcpy(others, modes, bytes);
     if (others[contact] != CONTACT_OPEN) {
         others[contact] = CONTACT_FRICTIONLESS;
     }
     try_contacts(sim, others);
-    tangential_row(system, contact, at.e, row);
+    tangential_row(system, contact, at->e, row);
     double *held = take_matrix(&sim->scratch, q->r, system->n);
-    jacobian(&q->active, at.e, held);
-    bool ok = independent(sim, &at, q->r, held, row, result, problem);
+    jacobian(&q->active, at->e, held);
+    bool ok = independent(at, q->r, held, row, result, &sim->scratch, problem);
     sim->scratch.used = mark;
     return ok;
 }

@@ -11,47 +11,6 @@
 #include "hybrid/simulation.h"
 #include "hybrid/walls.h"
 
-/* --- mobility --------------------------------------------------------------------------------- */
-
-PRBM Inertia inertia_at(Simulation *sim, const double *q) {
-    const System *system = system_of(sim);
-    Inertia at = {take_complex(&sim->scratch, system->d, 1),
-                  take_matrix(&sim->scratch, system->n, system->n),
-                  take_matrix(&sim->scratch, system->r, system->n)};
-    Rows loops = plain_rows(system, system->r, system->loops, system->loops_c);
-    directions(system, q, at.e);
-    mass_matrix(system, at.e, at.M, &sim->scratch);
-    jacobian(&loops, at.e, at.loops);
-    return at;
-}
-
-/* Compute the inverse mass along a row; the rates of the rows held (r, n) do not change. */
-PRBM bool mobility(Simulation *sim, const Inertia *at, int r, const double *held,
-                   const double *row, double *result, Problem *problem) {
-    size_t mark = sim->scratch.used;
-    int n = system_of(sim)->n;
-    double *X = take(&sim->scratch, (size_t)n), length = system_of(sim)->length;
-    bool ok = response(n, r, 1, at->M, held, row, length, X, &sim->scratch, problem);
-    *result = ok ? dot(n, row, X) : 0.0;
-    sim->scratch.used = mark;
-    return ok;
-}
-
-/* Find whether a motion along a row is possible while the rows held (r, n), loops among them, hold.
- * It is not if the row is round-off, or they leave hardly any of its mobility. */
-PRBM bool independent(Simulation *sim, const Inertia *at, int r, const double *held,
-                      const double *row, bool *result, Problem *problem) {
-    const System *system = system_of(sim);
-    double left = 0.0, own = 0.0;
-    bool ok = mobility(sim, at, system->r, at->loops, row, &own, problem);
-    *result = ok && own > least_mobility(system->n, at->M, row, system->length);
-    if (*result) {
-        ok = mobility(sim, at, r, held, row, &left, problem);
-        *result = left > DEPENDENT_FRICTION_RTOL * own;
-    }
-    return ok;
-}
-
 /* Compute the velocities after = v + X P. */
 static void add_impulses(int k, int n, const double *v, const double *X, const double *P,
                          double *after) {
@@ -76,7 +35,7 @@ typedef struct {
 
 /* The state before an impact. */
 typedef struct {
-    const Inertia *at;
+    ContactProblem *at;
     const double *v;
     double rates[STOPS_MAX], friction[STOPS_MAX]; /* of the gaps; of the stops struck */
 } Approach;
@@ -93,7 +52,7 @@ static double motion_speed(const Simulation *sim) {
 static bool impulses_without_friction(Simulation *sim, const Approach *approach, Hits *hits,
                                       Problem *problem) {
     const System *system = system_of(sim);
-    const Inertia *at = approach->at;
+    ContactProblem *at = approach->at;
     int n = system->n, k = hits->struck_count + hits->held_count;
     double *G = take_matrix(&sim->scratch, k, n), *X = take_matrix(&sim->scratch, n, k);
     double *W = take_matrix(&sim->scratch, k, k), *rates = take(&sim->scratch, (size_t)k);
@@ -105,8 +64,7 @@ static bool impulses_without_friction(Simulation *sim, const Approach *approach,
         rates[a] = lesser(approach->rates[i], 0.0);
         eps[a] = a < hits->struck_count ? hits->restitution[a] : 0.0;
     }
-    if (!response(n, system->r, k, at->M, at->loops, G, system->length, X, &sim->scratch,
-                  problem)) {
+    if (!loop_response(at, k, G, X, &sim->scratch, problem)) {
         return false;
     }
     contact_mobility(n, k, at->M, G, X, system->length, W);
@@ -159,7 +117,7 @@ static void impact_rows(Simulation *sim, const Approach *approach, const Hits *h
                         int kept_count, const int *kept, double *rows, double *GT,
                         double *rates) {
     const System *system = system_of(sim);
-    const Inertia *at = approach->at;
+    ContactProblem *at = approach->at;
     int n = system->n, k = hits->struck_count;
     Rows gaps = gap_rows(system), walls = slide_rows(system);
     copy(system->r * n, at->loops, rows);
@@ -208,7 +166,7 @@ static void set_impulses(Hits *hits, const double *P, int kept_count, const int 
 static bool impulses_with_friction(Simulation *sim, const Approach *approach, Hits *hits,
                                    int *kept_count, int *kept, bool *pulling, Problem *problem) {
     const System *system = system_of(sim);
-    const Inertia *at = approach->at;
+    ContactProblem *at = approach->at;
     int n = system->n, k = hits->struck_count, r = system->r + *kept_count;
     double *rows = take_matrix(&sim->scratch, r, n), *GT = take_matrix(&sim->scratch, 2 * k, n);
     double *X = take_matrix(&sim->scratch, n, 2 * k);
@@ -311,10 +269,10 @@ static bool impact_impulses(Simulation *sim, const double *q, const double *v, H
                             Problem *problem) {
     size_t mark = sim->scratch.used;
     bool rough = false;
-    Inertia at = inertia_at(sim, q);
-    Approach approach = {&at, v, {0.0}, {0.0}};
+    ContactProblem *at = contact_problem_at(sim, q);
+    Approach approach = {at, v, {0.0}, {0.0}};
     for (int i = 0; i < system_of(sim)->s; i++) {
-        approach.rates[i] = gap_rate(&sim->equations, i, sim->state.front_time, at.e, v,
+        approach.rates[i] = gap_rate(&sim->equations, i, sim->state.front_time, at->e, v,
                                      NULL);
         hits->normal[i] = hits->tangential[i] = 0.0;
         hits->with_normal[i] = false;
@@ -346,9 +304,9 @@ static bool bounce_vanishes(Simulation *sim, int stop, const HoldingSet *resting
                             extra_states(sim, sim->state.front), NULL, tried, problem)) {
         return false;
     }
-    Inertia at = inertia_at(sim, q);
-    row_jacobian(&gaps, stop, at.e, G);
-    if (!mobility(sim, &at, system->r, at.loops, G, &free, problem)) {
+    ContactProblem *at = contact_problem_at(sim, q);
+    row_jacobian(&gaps, stop, at->e, G);
+    if (!mobility(at, G, &free, &sim->scratch, problem)) {
         return false;
     }
     double pressing = stop_force(holding, tried->lam, stop) * free;
@@ -620,10 +578,9 @@ static bool apply_impulses(Simulation *sim, int i, const double *P, Problem *pro
     double *front = sim->state.front, *v = front + n;
     double *rows = take_matrix(&sim->scratch, LOADS, n), *X = take_matrix(&sim->scratch, n, LOADS);
     double *after = take(&sim->scratch, (size_t)n);
-    Inertia at = inertia_at(sim, front);
-    load_rows(system, &system->pushed[i], at.e, rows, &sim->scratch);
-    bool ok = response(n, system->r, LOADS, at.M, at.loops, rows, system->length, X,
-                       &sim->scratch, problem);
+    ContactProblem *at = contact_problem_at(sim, front);
+    load_rows(system, &system->pushed[i], at->e, rows, &sim->scratch);
+    bool ok = loop_response(at, LOADS, rows, X, &sim->scratch, problem);
     if (ok) {
         add_impulses(LOADS, n, v, X, P, after);
         for (int k = 0; k < LOADS; k++) {

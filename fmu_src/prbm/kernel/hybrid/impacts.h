@@ -4,17 +4,6 @@
 
 #include "hybrid/state.h"
 
-/* Directions, mass matrix and Jacobian of the loops at a position, in working memory. */
-typedef struct {
-    Complex *e;
-    double *M, *loops;
-} Inertia;
-
-PRBM Inertia inertia_at(Simulation *sim, const double *q);
-PRBM bool mobility(Simulation *sim, const Inertia *at, int r, const double *held,
-                   const double *row, double *result, Problem *problem);
-PRBM bool independent(Simulation *sim, const Inertia *at, int r, const double *held,
-                      const double *row, bool *result, Problem *problem);
 PRBM void report_impact(const Simulation *sim, int i, const double *q, const double *v,
                         const double *after);
 PRBM bool impact(Simulation *sim, int hit, Problem *problem);

@@ -211,13 +211,12 @@ static bool output_mobilities(Simulation *sim, Problem *problem) {
     const System *system = system_of(sim);
     double *out = sim->present.outputs + system->mechanism->slots.stops;
     double *G = take(&sim->scratch, (size_t)system->n);
-    Inertia at = inertia_at(sim, sim->present.y);
+    ContactProblem *at = contact_problem_at(sim, sim->present.y);
     Rows gaps = gap_rows(system);
     bool ok = true;
     for (int i = 0; ok && i < system->s; i++) {
-        row_jacobian(&gaps, i, at.e, G);
-        ok = mobility(sim, &at, system->r, at.loops, G, out + PER_STOP * i + STOP_POINT_MOBILITY,
-                      problem);
+        row_jacobian(&gaps, i, at->e, G);
+        ok = mobility(at, G, out + PER_STOP * i + STOP_POINT_MOBILITY, &sim->scratch, problem);
     }
     sim->scratch.used = mark;
     return ok;

@@ -97,7 +97,7 @@ PRBM bool rest_forces(Simulation *sim, const double *q, const double *v,
     size_t mark = sim->scratch.used;
     const System *system = system_of(sim);
     int n = system->n, k = rest->stop_count, m = rest->count, size = k + m;
-    Inertia at = inertia_at(sim, q);
+    ContactProblem *at = contact_problem_at(sim, q);
     double *rows = take_matrix(&sim->scratch, size, n);
     double *pushes = take_matrix(&sim->scratch, size, n);
     double *X = take_matrix(&sim->scratch, n, size), *W = take_matrix(&sim->scratch, size, size);
@@ -108,15 +108,13 @@ PRBM bool rest_forces(Simulation *sim, const double *q, const double *v,
     bool ok = evaluate_equations(&sim->trial.equations, sim->state.front_time, q, v,
                                  extra_states(sim, sim->state.front), NULL,
                                  &sim->trial.evaluation, problem);
-    rest_rows(sim, rest, at.e, rows, pushes);
-    ok = ok &&
-         response(n, system->r, size, at.M, at.loops, pushes, system->length, X, &sim->scratch,
-                  problem);
+    rest_rows(sim, rest, at->e, rows, pushes);
+    ok = ok && loop_response(at, size, pushes, X, &sim->scratch, problem);
     found->solved = false;
     if (ok) {
-        contact_mobility(n, size, at.M, rows, X, system->length, W);
-        rest_accelerations(sim, rest, at.e, v, rows, u);
-        rest_laws(sim, rest, at.e, friction, fixed, normal);
+        contact_mobility(n, size, at->M, rows, X, system->length, W);
+        rest_accelerations(sim, rest, at->e, v, rows, u);
+        rest_laws(sim, rest, at->e, friction, fixed, normal);
         tolerance = accepted_violation(sim, k, m, W, u, fixed);
         found->solved =
             coulomb(k, m, W, u, friction, fixed, normal, tolerance, P, &sim->scratch);

@@ -34,6 +34,11 @@ PRBM int contact_count(const Simulation *sim) {
     return m->stop_count + m->friction_count;
 }
 
+PRBM ContactProblem *contact_problem_at(Simulation *sim, const double *q) {
+    set_position(&sim->contact_problem, q, &sim->scratch);
+    return &sim->contact_problem;
+}
+
 PRBM Complex *directions_at(Simulation *sim, const double *q) {
     Complex *e = take_complex(&sim->scratch, system_of(sim)->d, 1);
     directions(system_of(sim), q, e);
@@ -165,6 +170,7 @@ static void place_all(Simulation *sim, Memory *memory) {
     evaluation_place(&sim->trial.evaluation, system, memory);
     place_stepping(&sim->stepping, system, memory);
     place_present(sim, system, memory);
+    contact_problem_place(&sim->contact_problem, system, memory);
     evaluation_place(&sim->at_front, system, memory);
     correction_place(&sim->correction, system, memory);
     place_scratch(&sim->scratch, m, memory);

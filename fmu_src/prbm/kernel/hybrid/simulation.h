@@ -10,6 +10,8 @@ PRBM const double *extra_states(const Simulation *sim, const double *y);
 PRBM const System *system_of(const Simulation *sim);
 PRBM int contact_count(const Simulation *sim);
 PRBM Complex *directions_at(Simulation *sim, const double *q); /* in working memory */
+/* Return the contact problem at the angles q, valid until it is set up for others. */
+PRBM ContactProblem *contact_problem_at(Simulation *sim, const double *q);
 /* Record the communication step from the present time to another; return the recent
  * longest step. */
 PRBM double pass_point(Simulation *sim, double time);

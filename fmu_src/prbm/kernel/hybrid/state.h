@@ -2,6 +2,7 @@
 #ifndef PRBM_HYBRID_STATE_H
 #define PRBM_HYBRID_STATE_H
 
+#include "core/contact_problem.h"
 #include "core/dynamics.h"
 #include "core/projection.h"
 #include "core/runge_kutta.h"
@@ -204,6 +205,7 @@ struct Simulation {
     Trial trial;
     Stepping stepping;
     Present present;
+    ContactProblem contact_problem; /* at the position that needed it last */
     Evaluation at_front;   /* at the front, while contacts change */
     Correction correction; /* working memory of projections */
     Scratch scratch;
