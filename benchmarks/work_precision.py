@@ -57,6 +57,7 @@ from prbm.base.errors import SimulationError
 from prbm.hybrid.runge_kutta import TSITOURAS_PAPAKOSTAS as ENGINE
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics import contact
+from prbm.mechanics.contact_problem import ContactProblem
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
@@ -506,10 +507,9 @@ class Problem:
     def rebound(self, y: Real) -> Real:
         """Return the state after an impact at the first stop."""
         system, n = self.simulation.system, self.simulation.system.n
-        e, v = system.directions(y[:n]), y[n : 2 * n]
-        _, M, loops = self.simulation.equations.mass_and_loops(y[:n])
-        G = system.gap_rows.jacobian(e)[:1]
-        X = contact.response(M, loops, G, system.length)
+        at, v = ContactProblem(system, y[:n]), y[n : 2 * n]
+        G = at.gaps[:1]
+        X = at.response(G)
         P = contact.newton(G @ X, G @ v, np.array([self.simulation.values["stop.restitution"]]))
         result = y.copy()
         result[n : 2 * n] = v + X @ P

@@ -80,13 +80,12 @@ def closing_in(model: Mechanism) -> bool:
     """Return whether no forces at the stops that touch keep all their gaps from closing."""
     far = replace(model, stops=tuple(replace(s, position=s.position + 1.0) for s in model.stops))
     simulation = Simulation(far)
-    system, front, equations = simulation.system, simulation.front, simulation.equations
-    e, M, loops = equations.mass_and_loops(front.q)
+    front, equations, at = simulation.front, simulation.equations, simulation.front.at
+    e, M, loops = at.e, at.M, at.loops
     gaps, rates = equations.gaps(0.0, e) - 1.0, equations.gap_rates(0.0, e, front.v)
     touching = np.flatnonzero((np.abs(gaps) < 1e-9) & (rates < 1e-9))
     opening = equations.gap_accelerations(0.0, e, front.v, front.evaluate().a)[touching]
-    G, T = (rows.jacobian(e)[touching] for rows in (system.gap_rows, system.slide_rows))
-    along = np.vstack([G, T])
+    along = np.vstack([at.gaps[touching], at.slides[touching]])
     inverse = np.linalg.inv(M)
     held = loops @ inverse @ along.T
     W = along @ inverse @ along.T - held.T @ np.linalg.solve(loops @ inverse @ loops.T, held)

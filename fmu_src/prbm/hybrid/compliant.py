@@ -273,15 +273,13 @@ def _stop_force(front: Front, stop: int) -> float:
 
 def point_mobility(front: Front, stop: int) -> float:
     """Return the inverse effective mass of a hit point, with that of its wall [1/kg]."""
-    (e, M, loops), system = front.equations.mass_and_loops(front.q), front.equations.system
-    G = system.gap_rows.jacobian(e)[[stop]]
-    return contact_modes.mobility(M, loops, G, system.length) + front.inputs.mobilities[stop]
+    return front.at.mobility(front.at.gaps[[stop]]) + front.inputs.mobilities[stop]
 
 
 def _stuck(front: Front, stop: int) -> bool:
     """Return whether other constraints, such as its own friction, hold a hit point at rest."""
-    G = front.equations.system.gap_rows.jacobian(front.e)[[stop]]
-    return not contact_modes.independent(front.equations, front.q, G)
+    held = front.equations.rows.jacobian(front.e)
+    return not front.at.independent(held, front.at.gaps[[stop]])
 
 
 def _settled(
@@ -289,8 +287,7 @@ def _settled(
 ) -> tuple[Front, list[Impact]]:
     """Return the front in which a contact is settled; its kinetic energy is a loss."""
     slow = rest.front.projected()
-    M = front.equations.mass_and_loops(front.q)[1]
-    loss = kinetic_energy(M, rest.front.v) - kinetic_energy(M, slow.v)
+    loss = kinetic_energy(front.at.M, rest.front.v) - kinetic_energy(front.at.M, slow.v)
     y = slow.y.copy()
     y[2 * front.equations.n] += loss
     y[2 * front.equations.n + 2 + front.equations.compliant.index(stop, Extra.LOSS)] += loss

@@ -11,12 +11,9 @@ import numpy as np
 
 from ..base.errors import SimulationError
 from ..base.tolerances import (
-    DEPENDENT_FRICTION_RTOL,
     FRICTION_EXCESS_RTOL,
     SETTLE_ITERATIONS_MAX,
 )
-from ..mechanics import contact
-from ..mechanics.arrays import Real
 from ..mechanics.contact_state import ContactMode, ContactState
 from ..mechanics.dynamics import Equations
 from .configuration import Configuration, Scales, contact_names
@@ -176,7 +173,7 @@ def find_holding_stops(
     sliding = equations_holding(scales, front, every).contacts.modes
     equations = equations_holding(scales, front, ())
     slips = [sliding[i].slip for i in every]
-    found = rest_forces(scales, equations, front.time, front.y, every, slips, ())
+    found = rest_forces(scales, front, equations, every, slips, ())
     if found is None:
         return None
     pressing = zip(every, found.normal, strict=True)
@@ -216,24 +213,6 @@ def equations_holding(scales: Scales, front: Front, stops: Sequence[int]) -> Equ
         elif contacts.modes[c].closed:
             contacts = contacts.with_mode(c, slip_mode(scales, float(speed)))
     return front.equations.with_contacts(contacts)
-
-
-def mobility(M: Real, held: Real, row: Real, length: float) -> float:
-    """Return the inverse mass along a row (1, n) while the rows ``held`` (r, n) rest [1/kg]."""
-    return float((row @ contact.response(M, held, row, length)).item())
-
-
-def independent(equations: Equations, q: Real, row: Real) -> bool:
-    """Return whether a motion along a row (1, n) is possible while all constraints hold.
-
-    It is not if the row is round-off, or the constraints leave hardly any of its mobility.
-    """
-    (e, M, loops), length = equations.mass_and_loops(q), equations.system.length
-    own = mobility(M, loops, row, length)
-    if own <= contact.least_mobilities(M, row, length).item():
-        return False
-    left = mobility(M, equations.rows.jacobian(e), row, length)
-    return left > DEPENDENT_FRICTION_RTOL * own
 
 
 # --- friction ---------------------------------------------------------------------------------
@@ -321,7 +300,7 @@ def _modes_of(
         return contacts
     contacts, slips = contacts.unloaded(), [modes[i].slip for i in stops]
     equations = front.equations.with_contacts(contacts)
-    found = rest_forces(scales, equations, front.time, front.y, stops, slips, at_rest)
+    found = rest_forces(scales, front, equations, stops, slips, at_rest)
     if found is None:
         return None
     for i, press in zip(stops, found.normal, strict=True):
@@ -351,7 +330,8 @@ def _mobile(front: Front, contacts: ContactState, contact: int) -> bool:
     row = front.equations.slip_row(contact, front.e)[None]
     if contacts.modes[contact].closed:
         contacts = contacts.with_mode(contact, FRICTIONLESS)
-    return independent(front.equations.with_contacts(contacts), front.q, row)
+    held = front.equations.with_contacts(contacts).rows.jacobian(front.e)
+    return front.at.independent(held, row)
 
 
 def _sticking_or_slipping(

@@ -1,8 +1,9 @@
 """The front: the state up to which the motion is computed, and the contact modes from there on."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from ..mechanics.arrays import Complex, Real
+from ..mechanics.contact_problem import ContactProblem
 from ..mechanics.contact_state import ContactState
 from ..mechanics.dynamics import Equations, Evaluation
 from ..mechanics.inputs import Inputs, Wall
@@ -85,6 +86,16 @@ class Front:
     equations: Equations
     latched: tuple[Latched, ...]
     touches: tuple[Touch | None, ...]
+    _at: ContactProblem | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def at(self) -> ContactProblem:
+        """What the contacts share at the position; also for later fronts at this position."""
+        known = self._at
+        if known is None or not known.is_at(self.equations.system, self.q):
+            known = ContactProblem(self.equations.system, self.q)
+            object.__setattr__(self, "_at", known)
+        return known
 
     @property
     def q(self) -> Real:
@@ -105,7 +116,7 @@ class Front:
     @property
     def e(self) -> Complex:
         """Directions, (n,)."""
-        return self.equations.system.directions(self.q)
+        return self.at.e
 
     @property
     def contacts(self) -> ContactState:

@@ -12,7 +12,7 @@ from ..mechanics.arrays import Real
 from ..mechanics.modal import fundamental_at, simulated_restitution
 from . import compliant
 from .configuration import Configuration, contact_names
-from .contact_modes import equations_holding, find_holding_stops, mobility, settle
+from .contact_modes import equations_holding, find_holding_stops, settle
 from .front import Front, Latched
 from .records import Impact
 
@@ -92,11 +92,9 @@ def receive(front: Front, impulses: Real) -> Front:
     impulses : (3 b,)
         Impulses of each force along x and y [N s] and about its point [N m s].
     """
-    equations = front.equations
-    e, M, loops = equations.mass_and_loops(front.q)
-    system = equations.system
-    rows = np.vstack([forces.load_rows(system, frame, e) for frame in system.pushed])
-    after = front.v + contact.response(M, loops, rows, system.length) @ impulses
+    system = front.equations.system
+    rows = np.vstack([forces.load_rows(system, frame, front.e) for frame in system.pushed])
+    after = front.v + front.at.response(rows) @ impulses
     work = float(impulses @ (rows @ (front.v + after))) / 2
     front = front.with_velocities(after, work=work)
     return front.with_contacts(front.contacts.without_friction())
@@ -123,10 +121,8 @@ def _captured(
         return True
     equations = equations_holding(scales, landed, holding)
     evaluation = equations.at(front.time, landed.y)
-    e, M, loops = equations.mass_and_loops(landed.q)
-    G = configuration.system.gap_rows.jacobian(e)[[stop]]
     force = float(equations.stop_forces(evaluation.lam)[stop])
-    pressing = force * mobility(M, loops, G, scales.length)
+    pressing = force * landed.at.mobility(landed.at.gaps[[stop]])
     return 2.0 * speed < pressing * SHORTEST_FLIGHT_RTOL * scales.time
 
 
@@ -164,13 +160,11 @@ def _impulses_without_friction(
     restitution: Real,
 ) -> Impulses:
     """Return the impulses of an impact without friction at the stops that are struck."""
-    e, M, loops = front.equations.mass_and_loops(front.q)
-    partners = struck + held
+    at, partners = front.at, struck + held
     mobilities = np.array(front.inputs.mobilities)
-    G = configuration.system.gap_rows.jacobian(e)[partners]
-    length = configuration.system.length
-    X = contact.response(M, loops, G, length)
-    W = contact.contact_mobility(M, G, X, length) + np.diag(mobilities[partners])
+    G = at.gaps[partners]
+    X = at.response(G)
+    W = at.inverse_mass(G, X) + np.diag(mobilities[partners])
     u = front.gaps_and_rates()[1][partners]
     restitutions = np.concatenate([restitution, np.zeros(len(held))])
     P = contact.newton(W, np.minimum(u, 0.0), restitutions, configuration.scales.speed)
@@ -191,32 +185,30 @@ def _impulses_with_friction(
     restitution and friction.
     """
     v, k, kept, speed = front.v, len(struck), list(held), configuration.scales.speed
-    e, M, loops = front.equations.mass_and_loops(front.q)
-    system = front.equations.system
-    gaps, u = system.gap_rows.jacobian(e), front.equations.gap_rates(front.time, e, v)
+    at, u = front.at, front.equations.gap_rates(front.time, front.e, v)
     mobilities = np.array(front.inputs.mobilities)[struck]
-    T = system.slide_rows.jacobian(e)[struck]
-    both = np.vstack([gaps[struck], T])
+    T = at.slides[struck]
+    both = np.vstack([at.gaps[struck], T])
     rates = np.concatenate([u[struck], T @ v])
     while True:
-        rows = np.vstack([loops, gaps[kept]])
-        X = contact.response(M, rows, both, system.length)
-        W = contact.contact_mobility(M, both, X, system.length)
+        rows = np.vstack([at.loops, at.gaps[kept]])
+        X = at.response_beside(rows, both)
+        W = at.inverse_mass(both, X)
         W[range(k), range(k)] += mobilities
         if k == 1:
             P = np.array(contact.stronge(W, rates, float(mu[0]), float(restitution[0]), speed))
         else:
             P = contact.several(W, rates, mu, restitution, speed)
         after = v + X @ P
-        left = M @ (after - v) - both.T @ P
+        left = at.M @ (after - v) - both.T @ P
         solution = np.linalg.lstsq(rows.T, left, rcond=REACTION_RANK_RTOL)[0]
-        reaction = dict(zip(kept, solution[len(loops) :].tolist(), strict=True))
+        reaction = dict(zip(kept, solution[len(at.loops) :].tolist(), strict=True))
         pulling = [i for i, p in reaction.items() if p < 0.0]
         if not pulling:
             break
         kept = [i for i in kept if i not in pulling]
     released = [i for i in held if i not in kept]
-    closing = front.equations.gap_rates(front.time, e, after)[released]
+    closing = front.equations.gap_rates(front.time, at.e, after)[released]
     if closing.min(initial=0.0) < -configuration.scales.zero_speed:
         none = np.zeros(len(held))
         return _impulses_with_friction(
@@ -244,10 +236,9 @@ def _after_impact(
     u = front.equations.gap_rates(front.time, e, v)
     front = _with_pushed_walls(front, normal)
     u_after = front.equations.gap_rates(front.time, e, after)
-    slides = configuration.system.slide_rows.jacobian(e)
     lost = {i: -P * float(u[i] + u_after[i]) / 2 for i, P in normal.items()}
     for i, P in impulses.tangential.items():
-        lost[i] -= P * float(slides[i] @ (v + after)) / 2
+        lost[i] -= P * float(front.at.slides[i] @ (v + after)) / 2
     old, new = (
         {i: float(one.inputs.walls[i].motion(front.time)[1]) for i in normal}
         for one in (before, front)

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.tolerances import COMPLEMENTARITY_RTOL, LIMIT_RTOL
-from ..mechanics import contact
 from ..mechanics.arrays import Real
 from ..mechanics.complementarity import coulomb
 from ..mechanics.dynamics import Equations
 from .configuration import Scales
+from .front import Front
 
 
 @dataclass(frozen=True)
@@ -44,9 +44,8 @@ class RestForces:
 
 def rest_forces(
     scales: Scales,
+    front: Front,
     equations: Equations,
-    t: float,
-    y: Real,
     stops: Sequence[int],
     slips: Sequence[int],
     at_rest: Sequence[int],
@@ -61,12 +60,10 @@ def rest_forces(
     ----------
     scales : Scales
         Scales of the mechanism.
+    front : Front
+        State, and time at which the accelerations of the walls are taken.
     equations : Equations
         Equations in which all stops are open, and friction points at rest have no friction.
-    t : float
-        Time, at which the accelerations of the walls are taken [s].
-    y : (2 n + 2 + 4 c,)
-        State.
     stops : sequence of int
         Stops that touch.
     slips : sequence of int
@@ -74,11 +71,10 @@ def rest_forces(
     at_rest : sequence of int
         Contacts with friction that do not slide: those of ``stops`` and of the friction points.
     """
-    n, k = equations.n, len(stops)
-    v, (e, M, loops) = y[n : 2 * n], equations.mass_and_loops(y[:n])
-    system, evaluation = equations.system, equations.at(t, y)
+    n, k, at, t, v = equations.n, len(stops), front.at, front.time, front.v
+    e, evaluation = at.e, equations.at(t, front.y)
     a = evaluation.a
-    G = system.gap_rows.jacobian(e)[list(stops)]
+    G = at.gaps[list(stops)]
     T = np.reshape([equations.slip_row(c, e) for c in at_rest], (-1, n))
     # The normal force of a stop that slides acts together with its friction.
     rubs = [
@@ -86,8 +82,7 @@ def rest_forces(
         for i, sign in zip(stops, slips, strict=True)
     ]
     rows, pushes = np.vstack([G, T]), np.vstack([G - np.reshape(rubs, (-1, n)), T])
-    X = contact.response(M, loops, pushes, system.length)
-    W = contact.contact_mobility(M, rows, X, system.length)
+    W = at.inverse_mass(rows, at.response(pushes))
     slide = [equations.slip_acceleration(c, e, v, a) for c in at_rest]
     opening = equations.gap_accelerations(t, e, v, a, evaluation.pressure)
     u = np.concatenate([opening[list(stops)], slide])

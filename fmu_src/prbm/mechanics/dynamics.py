@@ -268,11 +268,6 @@ class Equations:
         x = constraints.solve_saddle(factors, right)
         return Evaluation(x[:n], -x[n:], M, factors, pressure)
 
-    def mass_and_loops(self, q: Real) -> tuple[Complex, Real, Real]:
-        """Return e, the mass matrix (n, n) and the Jacobian of the loops (r, n) at a position."""
-        e = self.system.directions(q)
-        return e, self.system.mass_matrix(e), self.system.loop_rows.jacobian(e)
-
     # -- rates of the state --
 
     def rate(self, t: float, y: Real) -> Real:

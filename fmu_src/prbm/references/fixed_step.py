@@ -18,6 +18,7 @@ from ..hybrid.runge_kutta import rk4
 from ..hybrid.simulation import Simulation
 from ..mechanics import contact
 from ..mechanics.arrays import Real
+from ..mechanics.contact_problem import ContactProblem
 from ..mechanics.contact_state import ContactState
 from ..mechanics.dynamics import Equations
 from ..mechanism.description import Mechanism
@@ -93,9 +94,9 @@ def march(
             elif armed[i]:
                 armed[i] = False
                 impacts.append((t, stop.name))
-                e, M, loops = equations.mass_and_loops(y[:n])
-                G = system.gap_rows.jacobian(e)[[i]]
-                X = contact.response(M, loops, G, system.length)
+                at = ContactProblem(system, y[:n])
+                G = at.gaps[[i]]
+                X = at.response(G)
                 eps = np.array([value(stop, "restitution", simulation.values)])
                 P = contact.newton(G @ X, G @ y[n : 2 * n], eps)
                 y = y.copy()
