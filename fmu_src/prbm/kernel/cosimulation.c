@@ -3,15 +3,17 @@
 #include <math.h>
 #include <string.h>
 
+#include "hybrid/access.h"
 #include "hybrid/arc.h"
 #include "hybrid/compliant.h"
 #include "hybrid/configuration.h"
 #include "hybrid/contact_modes.h"
 #include "hybrid/contact_peaks.h"
+#include "hybrid/errors.h"
 #include "hybrid/events.h"
 #include "hybrid/impacts.h"
+#include "hybrid/moved.h"
 #include "hybrid/peaks.h"
-#include "hybrid/simulation.h"
 #include "hybrid/snapshot.h"
 #include "hybrid/stepping.h"
 #include "hybrid/walls.h"

@@ -5,7 +5,7 @@
  * constraints can therefore integrate them without opening the loops. */
 #include <math.h>
 
-#include "hybrid/simulation.h"
+#include "hybrid/access.h"
 #include "dependents.h"
 
 /* List the coordinates that are not independent, in ascending order. */

@@ -7,8 +7,8 @@
 #include "core/sections.h"
 #include "core/tables.h"
 #include "engine.h"
-#include "hybrid/simulation.h"
 #include "values.h"
+#include "hybrid/access.h"
 
 enum { FIRST_IMPACTS = 16 }; /* number of impacts for which there is memory at first */
 enum { CALL_STEPS = 50, CALL_COORDINATES = 30 }; /* steps of a call, up to so many coordinates */

@@ -1,10 +1,11 @@
 /* Event indicators of model exchange: the guards of events divided by their scales. */
 #include <math.h>
 
+#include "core/gaps.h"
+#include "hybrid/access.h"
 #include "hybrid/configuration.h"
 #include "hybrid/events.h"
 #include "hybrid/guards.h"
-#include "hybrid/simulation.h"
 #include "hybrid/walls.h"
 #include "indicators.h"
 

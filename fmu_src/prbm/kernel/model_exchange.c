@@ -5,17 +5,20 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/gaps.h"
+#include "hybrid/access.h"
 #include "hybrid/compliant.h"
 #include "hybrid/configuration.h"
 #include "hybrid/contact_modes.h"
+#include "hybrid/contact_names.h"
 #include "hybrid/contact_peaks.h"
 #include "hybrid/events.h"
 #include "hybrid/guards.h"
 #include "hybrid/impacts.h"
+#include "hybrid/moved.h"
 #include "hybrid/peaks.h"
 #include "hybrid/present.h"
 #include "hybrid/rest.h"
-#include "hybrid/simulation.h"
 #include "hybrid/snapshot.h"
 #include "hybrid/walls.h"
 #include "dependents.h"

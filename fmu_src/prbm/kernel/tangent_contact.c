@@ -1,6 +1,6 @@
 /* Directional derivatives of the contacts at compliant stops. */
+#include "core/gaps.h"
 #include "core/vectors.h"
-#include "hybrid/simulation.h"
 #include "tangent_contact.h"
 
 /* The indentation of a stop, its rate, and their changes. */

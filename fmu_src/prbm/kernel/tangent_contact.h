@@ -2,7 +2,7 @@
 #ifndef PRBM_TANGENT_CONTACT_H
 #define PRBM_TANGENT_CONTACT_H
 
-#include "tangent.h"
+#include "tangent_rows.h"
 
 /* Compute the changes of the forces of pressed stops, and add those of their loads. */
 PRBM void pressure_changes(const Tangent *t);

@@ -1,7 +1,7 @@
 /* Directional derivatives of the event indicators. */
+#include "core/gaps.h"
+#include "hybrid/access.h"
 #include "hybrid/events.h"
-#include "hybrid/guards.h"
-#include "hybrid/simulation.h"
 #include "indicators.h"
 #include "tangent_contact.h"
 #include "tangent_indicators.h"

@@ -2,7 +2,7 @@
 #ifndef PRBM_TANGENT_INDICATORS_H
 #define PRBM_TANGENT_INDICATORS_H
 
-#include "tangent.h"
+#include "tangent_rows.h"
 
 /* Compute the changes of the indicators of all contacts that are watched. */
 PRBM void indicator_changes(const Tangent *t, double *out);

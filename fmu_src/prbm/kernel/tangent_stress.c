@@ -3,7 +3,6 @@
 
 #include "core/sections.h"
 #include "core/vectors.h"
-#include "hybrid/simulation.h"
 #include "tangent_contact.h"
 #include "tangent_stress.h"
 

@@ -2,7 +2,7 @@
 #ifndef PRBM_TANGENT_STRESS_H
 #define PRBM_TANGENT_STRESS_H
 
-#include "tangent.h"
+#include "tangent_rows.h"
 
 /* Compute the changes of the stress of flexures; those of its peaks are zero. */
 PRBM void stress_changes(const Tangent *t, double *out);

@@ -2,10 +2,11 @@
 #include <string.h>
 
 #include "core/vectors.h"
+#include "hybrid/access.h"
 #include "hybrid/arc.h"
 #include "hybrid/outputs.h"
 #include "hybrid/present.h"
-#include "hybrid/simulation.h"
+#include "hybrid/release.h"
 #include "hybrid/snapshot.h"
 #include "indicators.h"
 #include "model_exchange.h"

@@ -2,7 +2,7 @@
 #ifndef PRBM_BLOCK_MAP_H
 #define PRBM_BLOCK_MAP_H
 
-#include "core/evaluation.h"
+#include "core/evaluated.h"
 
 /* Place the memory for the maps of all blocks, which belongs to the first map until it is
  * divided. */

@@ -12,16 +12,6 @@ PRBM bool rate(const Equations *equations, double t, const double *y, const Refe
  * the result.  Rates depend on the time only if walls move. */
 PRBM bool rate_at_time(const Equations *equations, const double *y, const Reference *near,
                        Evaluation *result, double *dy, Problem *problem);
-/* The displacement of a wall by the force of its compliant stop, or its rate.  extra: the states of
- * compliant stops, or NULL for zeros. */
-PRBM double give_of(const Equations *q, int i, const double *extra, Extra which);
-/* The gap of a stop, its rate and its acceleration; extra as above. */
-PRBM double gap(const Equations *equations, int i, double t, const Complex *e,
-                const double *extra);
-PRBM double gap_rate(const Equations *equations, int i, double t, const Complex *e,
-                     const double *v, const double *extra);
-PRBM double gap_acceleration(const Equations *equations, int i, double t, const Complex *e,
-                             const double *v, const Evaluation *found);
 PRBM void base_reaction(const Equations *equations, const Complex *e, const double *v,
                         const double *a, Complex *force, double *moment, Scratch *scratch);
 /* Compute the second derivatives (d,) of the arms. */

@@ -7,13 +7,6 @@
 #include "core/matrix.h"
 #include "core/vectors.h"
 
-PRBM Parts place_parts(Memory *memory, size_t count) {
-    Parts parts;
-    parts.re = place(memory, count, sizeof(double));
-    parts.im = place(memory, count, sizeof(double));
-    return parts;
-}
-
 PRBM void equations_place(Equations *equations, const System *system, Memory *memory) {
     size_t s = (size_t)system->s, f = (size_t)system->f;
     size_t r = (size_t)system->r + 2 * s + f, d = (size_t)system->d, wide = (size_t)system->wide;
@@ -113,12 +106,6 @@ static void set_rows(Equations *q) {
     list_slipping(q);
     Rows active = {system, q->r, q->B, q->c, q->z, q->on};
     q->active = active;
-}
-
-PRBM Parts parts_from(Parts parts, int start) {
-    parts.re += start;
-    parts.im += start;
-    return parts;
 }
 
 /* Set the real and imaginary parts of the rows, with columns for stretches, padded. */
@@ -240,4 +227,8 @@ PRBM WallMotion wall_motion(const Wall *wall, double t) {
     double ahead = wall->offset + slope * s;
     double v = wall->rate + left * (left * slope - 2.0 * ahead) / T;
     return (WallMotion){x + left * left * ahead, v, (2.0 * ahead - 4.0 * left * slope) / (T * T)};
+}
+
+PRBM bool held_stop(const Equations *equations, int contact) {
+    return is_stop(equations->system, contact) && is_held(&equations->contacts, contact);
 }

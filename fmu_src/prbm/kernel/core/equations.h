@@ -63,10 +63,10 @@ PRBM void equations_place(Equations *equations, const System *system, Memory *me
 PRBM void set_equations(Equations *equations, const Inputs *inputs,
                         const ContactState *contacts, double omega);
 PRBM WallMotion wall_motion(const Wall *wall, double t);
-PRBM Parts place_parts(Memory *memory, size_t count);
-PRBM Parts parts_from(Parts parts, int start);
 PRBM int place_in(const int *list, int index);
 PRBM int held_at(const Equations *q, int stop);
 PRBM double friction_coefficient(const Equations *q, int contact);
+/* The contacts at which events may occur. */
+PRBM bool held_stop(const Equations *equations, int contact);
 
 #endif

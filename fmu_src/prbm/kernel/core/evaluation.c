@@ -4,9 +4,9 @@
 #include <string.h>
 
 #include "core/block_map.h"
-#include "core/dynamics.h"
 #include "core/evaluation.h"
 #include "core/forces.h"
+#include "core/gaps.h"
 #include "core/kinetics.h"
 #include "core/matrix.h"
 #include "core/vectors.h"

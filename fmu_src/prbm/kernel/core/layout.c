@@ -5,7 +5,6 @@
 #include "core/flexure.h"
 #include "core/layout.h"
 #include "core/system.h"
-#include "core/tables.h"
 
 static int link_count(const Mechanism *m, const Flexure *flexure) {
     return links_of(kind_of(m, flexure), flexure->type_at_start, flexure->type_at_end);

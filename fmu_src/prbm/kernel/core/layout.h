@@ -4,6 +4,7 @@
 
 #include "core/mechanism.h"
 #include "core/reader.h"
+
 PRBM void count_coordinates(Reader *reader, Mechanism *m);
 PRBM void lay_out_coordinates(Reader *reader, Mechanism *m);
 PRBM void lay_out_inputs(Mechanism *m);

@@ -53,3 +53,10 @@ PRBM Complex *take_complex(Scratch *scratch, int rows, int columns) {
 PRBM int *take_integers(Scratch *scratch, int count) {
     return (int *)(void *)take(scratch, (size_t)count);
 }
+
+PRBM Parts place_parts(Memory *memory, size_t count) {
+    Parts parts;
+    parts.re = place(memory, count, sizeof(double));
+    parts.im = place(memory, count, sizeof(double));
+    return parts;
+}

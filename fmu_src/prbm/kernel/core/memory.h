@@ -39,5 +39,6 @@ PRBM double *take(Scratch *scratch, size_t count);
 PRBM double *take_matrix(Scratch *scratch, int rows, int columns);
 PRBM Complex *take_complex(Scratch *scratch, int rows, int columns);
 PRBM int *take_integers(Scratch *scratch, int count);
+PRBM Parts place_parts(Memory *memory, size_t count);
 
 #endif

@@ -345,3 +345,9 @@ PRBM Complex unit(double degrees) {
     }
     return e;
 }
+
+PRBM Parts parts_from(Parts parts, int start) {
+    parts.re += start;
+    parts.im += start;
+    return parts;
+}

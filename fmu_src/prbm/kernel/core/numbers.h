@@ -7,6 +7,7 @@
 #include <emmintrin.h>
 #endif
 
+#include "core/complex.h"
 #include "core/platform.h"
 
 /* Return the square root, rounded once.  The function sqrt of some C libraries (MinGW) computes with
@@ -19,16 +20,6 @@ static inline double square_root(double x) {
     return sqrt(x);
 #endif
 }
-
-typedef struct {
-    double re, im;
-} Complex;
-
-/* Complex vectors with separate real and imaginary parts, padded with zeros to an even length for
- * operations on pairs. */
-typedef struct {
-    double *re, *im;
-} Parts;
 
 PRBM void unit_vectors(int n, const double *q, Complex *e); /* exp(i q), as np.exp(1j * q) */
 PRBM double natural_log(double x);                          /* x > 0 */
@@ -52,5 +43,6 @@ PRBM double modulus(Complex a);
  * start. */
 SHARED bool turned_directions(int even, const double *q, const double *start, Parts e_start,
                               Parts parts, Complex *e);
+PRBM Parts parts_from(Parts parts, int start);
 
 #endif

@@ -2,9 +2,9 @@
  * Equations.project_near in mechanics/dynamics.py. */
 #include <math.h>
 
+#include "core/block_map.h"
 #include "core/matrix.h"
 #include "core/projection.h"
-#include "core/block_map.h"
 #include "core/vectors.h"
 
 /* The constant part of an active constraint at time t. */

@@ -2,7 +2,6 @@
 #include <math.h>
 
 #include "core/dynamics.h"
-#include "core/matrix.h"
 #include "core/runge_kutta.h"
 #include "core/vectors.h"
 

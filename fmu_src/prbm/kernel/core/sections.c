@@ -3,9 +3,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/collection.h"
-#include "core/free_body.h"
-#include "core/matrix.h"
 #include "core/sections.h"
 #include "core/vectors.h"
 

@@ -2,7 +2,6 @@
 #include <math.h>
 
 #include "core/constraints.h"
-#include "core/matrix.h"
 #include "core/modal.h"
 #include "core/start.h"
 

@@ -6,7 +6,6 @@
 #include <math.h>
 
 #include "core/constraints.h"
-#include "core/contact.h"
 #include "core/forces.h"
 #include "core/matrix.h"
 #include "core/statics.h"

@@ -6,90 +6,10 @@
  * stretch s, and a linear function of the coordinates.  The elements of e are E for angles and -i E
  * for stretches, so that the derivative of E by its direction is i e for both.
  */
-#include "core/system.h"
-#include "core/block_map.h"
-#include "core/free_body.h"
 #include "core/kinetics.h"
 #include "core/matrix.h"
+#include "core/system.h"
 #include "core/vectors.h"
-
-static BodyFrame *place_frames(Memory *memory, size_t count, size_t d) {
-    BodyFrame *frames = place(memory, count, sizeof *frames);
-    Complex *rows = place(memory, count * d, sizeof *rows);
-    for (size_t i = 0; memory->base && i < count; i++) {
-        frames[i].A = rows + i * d;
-    }
-    return frames;
-}
-
-static Place *place_origins(Memory *memory, size_t count, size_t d) {
-    Place *origins = place(memory, count, sizeof *origins);
-    Complex *rows = place(memory, count * d, sizeof *rows);
-    for (size_t i = 0; memory->base && i < count; i++) {
-        origins[i].A = rows + i * d;
-    }
-    return origins;
-}
-
-PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memory) {
-    const Mechanism *m = mechanism;
-    size_t n = (size_t)m->coordinate_count, r = (size_t)m->loop_count;
-    size_t p = (size_t)m->mass_count, s = (size_t)m->stop_count, f = (size_t)m->friction_count;
-    size_t b = (size_t)m->body_count, d = (size_t)m->direction_count;
-    System result = {0};
-    result.mechanism = mechanism;
-    result.n = (int)n;
-    result.even = even_length((int)n);
-    result.d = (int)d;
-    result.wide = even_length((int)d);
-    result.mapped = m->map.mapped;
-    result.r = (int)r;
-    result.s = (int)s;
-    result.f = (int)f;
-    result.b = (int)b;
-    result.q0 = place(memory, n, sizeof(double));
-    result.e0 = place(memory, d, sizeof(Complex));
-    result.J = place(memory, d, sizeof(double));
-    result.K = place(memory, n * n, sizeof(double));
-    result.H = place(memory, d * d, sizeof(Complex));
-    result.A = place(memory, p * d, sizeof(Complex));
-    result.c = place(memory, p, sizeof(Complex));
-    result.m = place(memory, p, sizeof(double));
-    result.S = place(memory, d, sizeof(Complex));
-    result.loops = place(memory, r * d, sizeof(Complex));
-    result.loops_c = place(memory, r, sizeof(double));
-    result.gaps = place(memory, s * d, sizeof(Complex));
-    result.slides = place(memory, s * d, sizeof(Complex));
-    result.gaps_c = place(memory, s, sizeof(double));
-    result.gaps_z = place(memory, s, sizeof(Complex));
-    result.slides_z = place(memory, s, sizeof(Complex));
-    result.on = place(memory, s, sizeof(int));
-    result.rubs = place(memory, f * d, sizeof(Complex));
-    result.lifts = place(memory, f * d, sizeof(Complex));
-    result.lifts_c = place(memory, f, sizeof(double));
-    result.release = place(memory, d, sizeof(Complex));
-    result.released.A = place(memory, d, sizeof(Complex));
-    result.bodies = place_frames(memory, b, d);
-    result.pushed = place_frames(memory, (size_t)m->force_count, d);
-    result.probes = place_frames(memory, (size_t)m->probe_count, d);
-    result.origins = place_origins(memory, b + 1, d);
-    result.corners = place(memory, (size_t)m->corner_count * d, sizeof(Complex));
-    result.corners_c = place(memory, (size_t)m->corner_count, sizeof(Complex));
-    result.stretch_count = m->stretch_count;
-    result.stretches = m->stretches;
-    result.spring = place(memory, (size_t)m->spring_count, sizeof(Spring));
-    result.grounded = place(memory, (size_t)result.even, sizeof(double));
-    result.factors = place(memory, (size_t)m->map.count, sizeof(double));
-    result.blocks = place(memory, d, sizeof(Block));
-    place_maps(&result, memory);
-    result.mass_blocks = place(memory, n, sizeof(Block));
-    result.coupling = place(memory, d * d, sizeof(Complex));
-    result.own = place(memory, d, sizeof(double));
-    result.straight = place(memory, (size_t)result.even, sizeof(double));
-    result.calculated = place(memory, (size_t)m->type_count, sizeof(double));
-    place_free_bodies(&result, memory);
-    *system = result;
-}
 
 /* --- arms ------------------------------------------------------------------------------------- */
 

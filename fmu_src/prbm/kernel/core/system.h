@@ -149,7 +149,6 @@ typedef struct {
     double least_mobility;    /* of the shortest row that is not round-off [1/kg] */
 } System;
 
-PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memory);
 /* Return the arm that a direction turns or stretches. */
 PRBM int arm_of(const System *system, int j);
 /* Return direction j of coordinates x (n,), or its rate if x are rates. */

@@ -4,7 +4,8 @@
 
 #include <string.h>
 
-#include "core/numbers.h"
+#include "core/complex.h"
+#include "core/platform.h"
 
 /* Lanes: two numbers if the compiler has vectors, else one.  An operation applies to each
  * number. */

@@ -3,8 +3,8 @@
 
 #include <string.h>
 
-#include "fmi/types2.h"
 #include "fmi/fmu.h"
+#include "fmi/types2.h"
 
 /* --- the state machine of the standard -------------------------------------------------------- */
 

@@ -49,14 +49,6 @@ PRBM Instance *allowed(void *handle, const Rule *rule) {
     return NULL;
 }
 
-PRBM bool given(const Instance *instance, const Rule *rule, size_t count, const void *pointer) {
-    if (count > 0 && !pointer) {
-        refuse(instance, FMU_ERROR, "%s was called with a pointer that is NULL", rule->function);
-        return false;
-    }
-    return true;
-}
-
 /* --- rejected values -------------------------------------------------------------------------- */
 
 PRBM bool is_parameter(const Mechanism *mechanism, int slot) {

@@ -104,3 +104,11 @@ PRBM void log_impact(void *listener, const Impact *impact) {
            impact->count, impact->stop, impact->time, impact->approach_speed,
            impact->rebound_speed, impact->energy_lost);
 }
+
+PRBM bool given(const Instance *instance, const Rule *rule, size_t count, const void *pointer) {
+    if (count > 0 && !pointer) {
+        refuse(instance, FMU_ERROR, "%s was called with a pointer that is NULL", rule->function);
+        return false;
+    }
+    return true;
+}

@@ -1,9 +1,9 @@
 /* The latest step and its dense output: the twin of hybrid/arc.py. */
 #include <string.h>
 
+#include "hybrid/access.h"
 #include "hybrid/arc.h"
-#include "hybrid/simulation.h"
-#include "hybrid/stepping.h"
+#include "hybrid/errors.h"
 
 PRBM void forget_arc(Simulation *sim) {
     sim->stepping.has_middle = false;

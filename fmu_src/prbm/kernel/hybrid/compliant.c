@@ -5,24 +5,13 @@
 #include "core/matrix.h"
 #include "core/modal.h"
 #include "core/vectors.h"
-#include "hybrid/arc.h"
+#include "hybrid/access.h"
 #include "hybrid/compliant.h"
 #include "hybrid/configuration.h"
 #include "hybrid/contact_modes.h"
 #include "hybrid/contact_peaks.h"
-#include "hybrid/impacts.h"
-#include "hybrid/simulation.h"
-#include "hybrid/stepping.h"
-
-/* --- access ----------------------------------------------------------------------------------- */
-
-static const Stop *stop_of(const Simulation *sim, int stop) {
-    return &sim->configuration.mechanism->stops[stop];
-}
-
-PRBM double *extra_of(const Simulation *sim, double *y, int stop) {
-    return y + sim->configuration.mechanism->first_extra + stop_of(sim, stop)->extra;
-}
+#include "hybrid/errors.h"
+#include "hybrid/phases.h"
 
 /* Coordinates, rates and M phi at the first touch of a compliant stop, (3 n,). */
 static double *first_state(const Simulation *sim, int stop) {
@@ -31,95 +20,6 @@ static double *first_state(const Simulation *sim, int stop) {
 
 static double rest_speed_of(const Simulation *sim, int stop) {
     return field_value(sim, stop_of(sim, stop)->rest_speed);
-}
-
-/* --- phases ----------------------------------------------------------------------------------- */
-
-/* Set the contact of a stop.  A contact that becomes free, or begins, has no friction. */
-static void set_phase(Simulation *sim, int stop, Phase phase, double speed, double depth) {
-    Touching touching = {phase, speed, depth}, *now = &sim->state.touching[stop];
-    ContactMode *mode = &sim->state.modes[stop];
-    if (*mode != CONTACT_OPEN && now->phase == phase && now->reference_speed == speed &&
-        now->depth == depth) {
-        return;
-    }
-    *now = touching;
-    if (phase == PHASE_NONE) {
-        *mode = CONTACT_OPEN;
-    } else if (phase == PHASE_FREE || *mode == CONTACT_OPEN) {
-        *mode = CONTACT_FRICTIONLESS;
-    }
-    sim->state.has_k1 = false;
-    set_inputs(sim);
-}
-
-/* Compute the second derivative of the indentation of a stop at the front. */
-static bool indentation_acceleration(Simulation *sim, int stop, double *result,
-                                     Problem *problem) {
-    size_t mark = sim->scratch.used;
-    const double *q = sim->state.front, *v = q + system_of(sim)->n;
-    double t = sim->state.front_time;
-    bool ok = evaluate_equations(&sim->equations, t, q, v, extra_states(sim, q), NULL,
-                                 &sim->at_front, problem);
-    *result = ok ? -gap_acceleration(&sim->equations, stop, t, directions_at(sim, q), v,
-                                     &sim->at_front)
-                 : 0.0;
-    sim->scratch.used = mark;
-    return ok;
-}
-
-static bool rephase_one(Simulation *sim, int stop, double rate, Problem *problem) {
-    Touching touching = sim->state.touching[stop];
-    double speed = greater(touching.reference_speed, rate), acceleration = 0.0;
-    set_phase(sim, stop, PHASE_PRESSED, speed, 0.0);
-    if (rate >= touching.reference_speed) {
-        set_phase(sim, stop, PHASE_RISING, speed, 0.0);
-        if (!indentation_acceleration(sim, stop, &acceleration, problem)) {
-            return false;
-        }
-        if (!(acceleration > 0.0)) {
-            set_phase(sim, stop, PHASE_PRESSED, speed, 0.0);
-        }
-    } else if (damping_ratio(&sim->equations.laws[stop], &sim->state.touching[stop], rate) < 0.0) {
-        set_phase(sim, stop, PHASE_FREE, speed, 0.0);
-    }
-    return true;
-}
-
-PRBM bool rephase(Simulation *sim, Problem *problem) {
-    double gaps[STOPS_MAX], rates[STOPS_MAX];
-    bool ok = true;
-    if (sim->equations.pressed_count == 0) {
-        return true;
-    }
-    gaps_and_rates(sim, gaps, rates);
-    for (int i = 0; ok && i < system_of(sim)->s; i++) {
-        if (is_pressed(&sim->state.touching[i])) {
-            ok = rephase_one(sim, i, -rates[i], problem);
-        }
-    }
-    return ok;
-}
-
-PRBM void unsettle(Simulation *sim) {
-    for (int i = 0; i < system_of(sim)->s; i++) {
-        const Touching *touching = &sim->state.touching[i];
-        if (touching->phase == PHASE_SETTLED) {
-            set_phase(sim, i, PHASE_PRESSED, touching->reference_speed, 0.0);
-        }
-    }
-}
-
-PRBM bool press_released(Simulation *sim) {
-    bool any = false;
-    for (int i = 0; i < system_of(sim)->s; i++) {
-        Touching *touching = &sim->state.touching[i];
-        if (touching->phase == PHASE_SETTLED && sim->state.modes[i] == CONTACT_OPEN) {
-            set_phase(sim, i, PHASE_PRESSED, touching->reference_speed, 0.0);
-            any = true;
-        }
-    }
-    return any;
 }
 
 /* --- resets ----------------------------------------------------------------------------------- */
@@ -536,40 +436,4 @@ PRBM bool settles_here(Simulation *sim, bool *result, Problem *problem) {
         *result = *result || (due && is_balanced(&rest));
     }
     return true;
-}
-
-/* --- errors of steps -------------------------------------------------------------------------- */
-
-PRBM double contact_error(Simulation *sim, double h) {
-    size_t mark = sim->scratch.used;
-    const System *system = system_of(sim);
-    const Stepping *stepping = &sim->stepping;
-    const double *y = sim->state.arc.y, *y1 = stepping->end;
-    int n = system->n;
-    double worst = 0.0, *row = take(&sim->scratch, (size_t)n);
-    double *change = take(&sim->scratch, (size_t)n);
-    Complex *e = directions_at(sim, y);
-    Rows gaps = gap_rows(system);
-    for (int j = 0; j < n; j++) {
-        change[j] = y1[j] - y[j];
-    }
-    for (int k = 0; k < sim->equations.pressed_count; k++) {
-        int i = sim->equations.pressed[k];
-        double speed = sim->equations.contacts.touching[i].reference_speed;
-        row_jacobian(&gaps, i, e, row);
-        double depth = greater(greater(fabs(dot(n, row, change)), speed * h),
-                               INDENTATION_MIN_RTOL * system->length);
-        double squares[2];
-        int give = system->mechanism->first_extra + stop_of(sim, i)->extra + EXTRA_GIVE;
-        for (int part = 0; part < 2; part++) {
-            const double *error = part == 0 ? stepping->error : stepping->coarse_error;
-            double d = (dot(n, row, error) + error[give]) / depth;
-            double rate = (dot(n, row, error + n) + error[give + 1]) / speed;
-            squares[part] = d * d + rate * rate;
-        }
-        double size = square_root(squares[0] + squares[1]);
-        worst = greater(worst, size > 0.0 ? squares[0] / size : size);
-    }
-    sim->scratch.used = mark;
-    return worst;
 }

@@ -9,20 +9,11 @@ PRBM bool switch_phase(Simulation *sim, int stop, Problem *problem);
 PRBM bool separate(Simulation *sim, int stop, Problem *problem); /* at the end of a contact */
 /* Begin the contacts of stops that are penetrated at the start. */
 PRBM bool preload(Simulation *sim, Problem *problem);
-/* Set the phases of all contacts for the present rates. */
-PRBM bool rephase(Simulation *sim, Problem *problem);
-/* Make settled stops forces, before impulses act. */
-PRBM void unsettle(Simulation *sim);
-/* Make the settled stops that are open forces; return whether there are any. */
-PRBM bool press_released(Simulation *sim);
 /* Settle the contacts at the front that have been calm for a contact time.  balances (s,): the
  * indentations at which the other calm contacts would be in balance, 0 for all other stops. */
 PRBM bool settle_calm(Simulation *sim, double *balances, Problem *problem);
 /* Whether settle_calm would settle a contact in model exchange, where the front is the present. */
 PRBM bool settles_here(Simulation *sim, bool *result, Problem *problem);
-/* Return the error of the contacts in a step of size h, relative to their scales. */
-PRBM double contact_error(Simulation *sim, double h);
-PRBM double *extra_of(const Simulation *sim, double *y, int stop); /* states of a stop in y (ny,) */
 /* Let the displacement of a wall by the force of its stop become its motion at time t; extra: the
  * states of the stop. */
 PRBM void fold_give(Wall *wall, double t, double *extra);

@@ -2,13 +2,13 @@
 #include <math.h>
 #include <string.h>
 
-#include "hybrid/compliant.h"
+#include "core/gaps.h"
+#include "hybrid/access.h"
 #include "hybrid/configuration.h"
 #include "hybrid/contact_modes.h"
-#include "hybrid/guards.h"
-#include "hybrid/impacts.h"
+#include "hybrid/contact_names.h"
+#include "hybrid/phases.h"
 #include "hybrid/rest.h"
-#include "hybrid/simulation.h"
 
 static const ContactFailure JAMMED = {
     "no forces satisfy the laws of contact and friction",
@@ -529,50 +529,4 @@ PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const
         }
     }
     return contacts_fail(sim, &UNSETTLED, count, candidates, problem);
-}
-
-PRBM void gaps_and_rates(Simulation *sim, double *gaps, double *rates) {
-    size_t mark = sim->scratch.used;
-    double *front = sim->state.front, t = sim->state.front_time;
-    const double *extra = extra_states(sim, front);
-    Complex *e = directions_at(sim, front);
-    for (int i = 0; i < system_of(sim)->s; i++) {
-        gaps[i] = gap(&sim->equations, i, t, e, extra);
-        rates[i] = gap_rate(&sim->equations, i, t, e, front + system_of(sim)->n, extra);
-    }
-    sim->scratch.used = mark;
-}
-
-/* Open the closed stops whose gaps have a rate after a change of a wall's velocity or an impulse.
- * Return a stop that is struck, or -1: a stop whose body touches the wall and moves towards it. */
-static int release_moving(Simulation *sim) {
-    const System *system = system_of(sim);
-    int struck = -1;
-    double gaps[STOPS_MAX], rates[STOPS_MAX], bound = zero_speed(&sim->configuration);
-    gaps_and_rates(sim, gaps, rates);
-    for (int i = 0; i < system->s; i++) {
-        bool closed = held_stop(&sim->equations, i);
-        bool compliant = system->mechanism->stops[i].compliant;
-        if (closed && fabs(rates[i]) > bound) {
-            set_mode(sim, i, CONTACT_OPEN);
-            (void)press_released(sim);
-        } else if (compliant || closed || gaps[i] > TOUCHING_RTOL * system->length) {
-            continue;
-        }
-        struck = rates[i] < -bound && !compliant ? i : struck;
-    }
-    return struck;
-}
-
-/* Choose the contact state after changes of the walls' velocities or impulses. */
-PRBM bool settle_moved(Simulation *sim, Problem *problem) {
-    int struck = release_moving(sim);
-    if (!rephase(sim, problem)) {
-        return false;
-    }
-    if (struck >= 0) {
-        return impact(sim, struck, problem);
-    }
-    return project(&sim->equations, sim->state.time, sim->state.front, &sim->scratch, problem) &&
-           settle(sim, NULL, 0, NULL, problem);
 }

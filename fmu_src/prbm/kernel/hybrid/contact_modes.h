@@ -17,8 +17,5 @@ PRBM const Equations *equations_holding(Simulation *sim, const HoldingSet *holdi
                                         const double *q, const double *v);
 PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const Event *event,
                  Problem *problem);
-/* Compute the gaps of all stops at the front, and their rates. */
-PRBM void gaps_and_rates(Simulation *sim, double *gaps, double *rates);
-PRBM bool settle_moved(Simulation *sim, Problem *problem); /* after velocities have jumped */
 
 #endif

@@ -3,11 +3,12 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/gaps.h"
 #include "core/vectors.h"
+#include "hybrid/access.h"
 #include "hybrid/arc.h"
 #include "hybrid/contact_modes.h"
 #include "hybrid/contact_peaks.h"
-#include "hybrid/simulation.h"
 
 PRBM bool check_depth(const Simulation *sim, int stop, double depth, double time,
                       Problem *problem) {

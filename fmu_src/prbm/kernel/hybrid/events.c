@@ -1,11 +1,12 @@
 /* Events: the table of guards and resets, the first event of a step, and the limit of the number of
  * events: the twin of hybrid/events.py. */
+#include "hybrid/access.h"
 #include "hybrid/compliant.h"
 #include "hybrid/contact_modes.h"
 #include "hybrid/events.h"
 #include "hybrid/guards.h"
 #include "hybrid/impacts.h"
-#include "hybrid/simulation.h"
+#include "hybrid/phases.h"
 
 /* --- resets ----------------------------------------------------------------------------------- */
 

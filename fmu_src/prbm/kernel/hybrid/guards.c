@@ -2,12 +2,12 @@
  * a step: the twin of hybrid/guards.py. */
 #include <math.h>
 
+#include "core/gaps.h"
+#include "hybrid/access.h"
 #include "hybrid/arc.h"
 #include "hybrid/configuration.h"
+#include "hybrid/contact_names.h"
 #include "hybrid/guards.h"
-#include "hybrid/rest.h"
-#include "hybrid/simulation.h"
-#include "hybrid/walls.h"
 
 /* --- guards ----------------------------------------------------------------------------------- */
 
@@ -68,10 +68,6 @@ PRBM double reversal_guard(const Equations *equations, const Instant *at, int co
 }
 
 /* --- contacts and steps in which events may occur --------------------------------------------- */
-
-PRBM bool held_stop(const Equations *equations, int contact) {
-    return is_stop(equations->system, contact) && is_held(&equations->contacts, contact);
-}
 
 PRBM bool sticking_contact(const Equations *equations, int contact) {
     return equations->contacts.modes[contact] == CONTACT_STICK;

@@ -36,8 +36,6 @@ PRBM double gap_guard(const Equations *equations, const Instant *at, int contact
 PRBM double indentation_guard(const Equations *equations, const Instant *at, int contact);
 PRBM double switching_guard(const Equations *equations, const Instant *at, int contact);
 PRBM double rising_guard(const Equations *equations, const Instant *at, int contact);
-/* The contacts at which events may occur. */
-PRBM bool held_stop(const Equations *equations, int contact);
 PRBM bool sticking_contact(const Equations *equations, int contact);
 PRBM bool slipping_contact(const Equations *equations, int contact);
 PRBM bool pressed_stop(const Equations *equations, int contact);

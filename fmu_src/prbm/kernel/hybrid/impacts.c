@@ -2,13 +2,15 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/gaps.h"
+#include "hybrid/access.h"
 #include "hybrid/compliant.h"
 #include "hybrid/configuration.h"
 #include "hybrid/contact_modes.h"
-#include "hybrid/guards.h"
+#include "hybrid/contact_names.h"
 #include "hybrid/impacts.h"
+#include "hybrid/phases.h"
 #include "hybrid/rest.h"
-#include "hybrid/simulation.h"
 #include "hybrid/walls.h"
 
 /* Compute the velocities after = v + X P. */
@@ -355,31 +357,6 @@ static bool captured(Simulation *sim, int stop, const Hits *hits, const double *
 }
 
 /* --- bookkeeping ------------------------------------------------------------------------------ */
-
-/* Report an impact at angles q, with the rates v before and after. */
-PRBM void report_impact(const Simulation *sim, int i, const double *q, const double *v,
-                          const double *after) {
-    const Latched *last = &sim->state.latched[i];
-    Impact report = {i,
-                     sim->configuration.mechanism->stops[i].name,
-                     last->time,
-                     last->approach_speed,
-                     last->rebound_speed,
-                     last->impulse,
-                     last->energy_lost,
-                     last->modal_restitution,
-                     last->impulse_sum,
-                     last->peak_force,
-                     last->indentation,
-                     last->contact_duration,
-                     last->count,
-                     q,
-                     v,
-                     after};
-    if (sim->on_impact) {
-        sim->on_impact(sim->listener, &report);
-    }
-}
 
 /* Gap rates before and after an impact, and losses of energy, by stop. */
 typedef struct {

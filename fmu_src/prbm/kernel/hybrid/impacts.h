@@ -4,8 +4,6 @@
 
 #include "hybrid/state.h"
 
-PRBM void report_impact(const Simulation *sim, int i, const double *q, const double *v,
-                        const double *after);
 PRBM bool impact(Simulation *sim, int hit, Problem *problem);
 PRBM bool impulses_changed(const Simulation *sim);
 PRBM const double *given_impulses(const Simulation *sim);

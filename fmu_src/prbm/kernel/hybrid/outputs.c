@@ -1,14 +1,13 @@
 /* The outputs at the present state: the twin of hybrid/outputs.py. */
 #include <string.h>
 
+#include "core/gaps.h"
 #include "core/sections.h"
-#include "hybrid/compliant.h"
+#include "hybrid/access.h"
 #include "hybrid/configuration.h"
 #include "hybrid/contact_peaks.h"
-#include "hybrid/impacts.h"
 #include "hybrid/outputs.h"
 #include "hybrid/peaks.h"
-#include "hybrid/simulation.h"
 
 static void output_bodies(const Simulation *sim, double *out) {
     const System *system = system_of(sim);

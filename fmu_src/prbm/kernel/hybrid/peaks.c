@@ -3,8 +3,8 @@
 
 #include "core/sections.h"
 #include "core/vectors.h"
+#include "hybrid/access.h"
 #include "hybrid/peaks.h"
-#include "hybrid/simulation.h"
 
 static int peak_count(const Simulation *sim) {
     return sim->configuration.mechanism->stressed_count;

@@ -1,16 +1,7 @@
 /* The present moment, and the record of the present quantities that are up to date. */
+#include "hybrid/access.h"
 #include "hybrid/guards.h"
 #include "hybrid/present.h"
-#include "hybrid/simulation.h"
-
-PRBM void forget_present(Simulation *sim) {
-    sim->present.fresh = NOTHING;
-    sim->untouched = false;
-}
-
-PRBM void forget_outputs(Simulation *sim) {
-    sim->present.fresh &= FRONT;
-}
 
 PRBM bool moment_at(Simulation *sim, const double *y, Moment *now, Problem *problem) {
     Present *present = &sim->present;

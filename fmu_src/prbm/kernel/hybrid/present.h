@@ -11,8 +11,6 @@ typedef struct {
     const Evaluation *evaluation;
 } Moment;
 
-PRBM void forget_present(Simulation *sim); /* after a change of time, states or values */
-PRBM void forget_outputs(Simulation *sim); /* after a change of the front or the equations */
 /* Evaluate the rates of the present state y, unless they are up to date. */
 PRBM bool moment_at(Simulation *sim, const double *y, Moment *now, Problem *problem);
 

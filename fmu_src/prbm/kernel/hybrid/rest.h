@@ -4,7 +4,7 @@
 
 #include "hybrid/state.h"
 
-enum { CONTACTS_MAX = 2 * STOPS_MAX, NAMES_LENGTH = PROBLEM_LENGTH / 2 };
+enum { CONTACTS_MAX = 2 * STOPS_MAX };
 
 /* stops: stops that touch, with the signs of their sliding velocities.  contacts: those of these
  * stops and of the friction points that have friction and do not slide. */
@@ -22,25 +22,9 @@ typedef struct {
     double mobility[CONTACTS_MAX];
 } RestForces;
 
-typedef struct {
-    char text[NAMES_LENGTH];
-} ContactNames;
-
-/* A failure of the choice of contact modes. */
-typedef struct {
-    const char *cause, *remedy;
-} ContactFailure;
-
 /* Compute the forces that satisfy the laws of all contacts; solved is false if there are none.  In
  * the trial equations all stops must be open, and friction points at rest without friction. */
 PRBM bool rest_forces(Simulation *sim, const double *q, const double *v,
                       const RestContacts *rest, RestForces *found, Problem *problem);
-PRBM const char *contact_name(const Mechanism *m, int contact);
-PRBM bool has_contact(int count, const int *contacts, int contact);
-/* List the names of contacts; names that do not fit are replaced by "...". */
-PRBM void list_contacts(const Mechanism *m, int count, const int *contacts, ContactNames *names);
-/* Set the problem of contacts; return false. */
-PRBM bool contacts_fail(const Simulation *sim, const ContactFailure *failure, int count,
-                        const int *contacts, Problem *problem);
 
 #endif

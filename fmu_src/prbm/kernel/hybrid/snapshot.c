@@ -2,10 +2,9 @@
 #include <math.h>
 #include <string.h>
 
+#include "hybrid/access.h"
 #include "hybrid/arc.h"
 #include "hybrid/configuration.h"
-#include "hybrid/present.h"
-#include "hybrid/simulation.h"
 #include "hybrid/snapshot.h"
 
 /* Numbers of a simulation, of a stop, and further ones of a compliant stop. */

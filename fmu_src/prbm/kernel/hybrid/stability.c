@@ -1,7 +1,7 @@
 /* The fastest mode and the longest stable step: the twin of hybrid/stability.py. */
 #include <math.h>
 
-#include "hybrid/simulation.h"
+#include "hybrid/access.h"
 #include "hybrid/stability.h"
 
 /* Set the torques (n,) of the springs, K w, for changes w of the coordinates. */

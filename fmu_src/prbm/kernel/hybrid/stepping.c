@@ -2,11 +2,12 @@
 #include <math.h>
 
 #include "core/vectors.h"
+#include "hybrid/access.h"
 #include "hybrid/arc.h"
 #include "hybrid/compliant.h"
+#include "hybrid/errors.h"
 #include "hybrid/events.h"
 #include "hybrid/peaks.h"
-#include "hybrid/simulation.h"
 #include "hybrid/stability.h"
 #include "hybrid/stepping.h"
 #include "hybrid/walls.h"
@@ -14,28 +15,7 @@
 #define STEP_ERROR_EXPONENT (1.0 / (double)STEP_ORDER)
 #define STEP_TREND_EXPONENT (STEP_ERROR_EXPONENT - STEP_TREND_FACTOR * STEP_MEMORY_EXPONENT)
 
-/* --- errors ----------------------------------------------------------------------------------- */
-
-/* Return the root mean square of an error x.  That of angles is in rad, that of rates and energies
- * relative to the larger of their sizes in y and y1. */
-static double error_norm(const Simulation *sim, const double *x, const double *y,
-                         const double *y1) {
-    const double *least = sim->configuration.least, *share = sim->configuration.share;
-    int ny = state_size(sim);
-    Lanes sum[SUMS] = {NO_LANES};
-    for (int j = 0; j < ny; j += LANES) {
-        Lanes size = larger(magnitudes(lanes_at(y + j)), magnitudes(lanes_at(y1 + j)));
-        Lanes ratio = lanes_at(x + j) / larger(lanes_at(least + j), lanes_at(share + j) * size);
-        sum[SUM_OF(j)] += ratio * ratio;
-    }
-    return square_root(total(sum) / sim->configuration.controlled);
-}
-
 /* --- step sizes ------------------------------------------------------------------------------- */
-
-PRBM double longest_step(const Simulation *sim) {
-    return STEP_MAX_RTOL * sim->configuration.scales.time;
-}
 
 /* Choose the first step size by the size of the rates (Hairer, II.4). */
 static double first_step(const Simulation *sim) {
@@ -46,12 +26,6 @@ static double first_step(const Simulation *sim) {
         return longest_step(sim);
     }
     return greater(allowed / size, FIRST_STEP_MIN_RTOL * sim->configuration.scales.time);
-}
-
-/* A step size rounded to four binary digits, so that round-off in the errors does not change it. */
-PRBM double rounded_step(double h) {
-    double shifted = STEP_ROUNDING_FACTOR * h;
-    return shifted - (shifted - h);
 }
 
 /* Choose the next step size from the error relative to the allowed error; return whether the step
@@ -115,43 +89,6 @@ static double step_error(Simulation *sim, double h, Problem *problem) {
         error = greater(error, contact_error(sim, h) / CONTACT_ERROR_FACTOR);
     }
     return error / (STEP_ERROR_FACTOR * sim->state.tolerance);
-}
-
-PRBM double embedded_error(Simulation *sim) {
-    Stepping *stepping = &sim->stepping;
-    const Arc *arc = &sim->state.arc;
-    if (stepping->embedded_error < 0.0) {
-        fine_error_of(state_size(sim), arc->k, arc->h, stepping->error);
-        stepping->embedded_error = error_norm(sim, stepping->error, arc->y, arc->y);
-    }
-    return stepping->embedded_error;
-}
-
-PRBM double difference(Simulation *sim, const double *y, const double *z) {
-    size_t mark = sim->scratch.used;
-    int ny = state_size(sim);
-    double *change = take(&sim->scratch, (size_t)ny);
-    for (int j = 0; j < ny; j += LANES) {
-        set_lanes(change + j, lanes_at(z + j) - lanes_at(y + j));
-    }
-    double size = error_norm(sim, change, y, z);
-    sim->scratch.used = mark;
-    return size;
-}
-
-PRBM bool check_projection(Simulation *sim, double t, const double *y, const double *projected,
-                           Problem *problem) {
-    double size = difference(sim, y, projected);
-    double most = PROJECTION_FACTOR * square_root(sim->state.tolerance);
-    if (!(size <= most)) {
-        return fail(problem,
-                    "at t = %.9g s closing the loops would change the motion by %.3g of its size, "
-                    "more than %.3g: links of a loop form a straight line, where the motion is not "
-                    "unique; change the inputs, the stops or the release so that the mechanism "
-                    "does not pass this shape",
-                    t, size, most);
-    }
-    return true;
 }
 
 /* Compute a step and project its end, which becomes the front.  Return the error relative to the

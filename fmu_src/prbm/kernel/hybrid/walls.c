@@ -1,10 +1,8 @@
 /* Moving walls: the twin of hybrid/walls.py. */
 #include <math.h>
 
+#include "hybrid/access.h"
 #include "hybrid/configuration.h"
-#include "hybrid/contact_modes.h"
-#include "hybrid/impacts.h"
-#include "hybrid/simulation.h"
 #include "hybrid/walls.h"
 
 /* The reference that the inputs of a stop define at the present time.  In model exchange, where
@@ -111,29 +109,4 @@ PRBM double follow_cubics(Simulation *sim) {
 PRBM double jump_allowed(const Simulation *sim, int i) {
     return greater(field_value(sim, sim->configuration.mechanism->stops[i].rest_speed),
                    REST_SPEED_MIN_FACTOR * zero_speed(&sim->configuration));
-}
-
-/* Keep held stops on walls whose velocities have jumped by less than rest_speed; otherwise the
- * stops open or are struck.  Impulses may pull, but not more than the forces lam (r,) press within
- * the given time; NULL: without limit. */
-PRBM bool follow_walls(Simulation *sim, const double *lam, double time, Problem *problem) {
-    size_t mark = sim->scratch.used;
-    const Equations *q = &sim->equations;
-    int ny = state_size(sim), n = system_of(sim)->n, h = q->first_hold;
-    double gaps[STOPS_MAX], rates[STOPS_MAX], *y = sim->state.front, t = sim->state.front_time;
-    double *P = take(&sim->scratch, (size_t)q->r), *after = take(&sim->scratch, (size_t)ny);
-    copy(ny, y, after);
-    gaps_and_rates(sim, gaps, rates);
-    bool ok = project_with_impulses(q, t, after, P, &sim->scratch, problem), follows = ok;
-    for (int k = 0; follows && k < q->held_count; k++) {
-        double pull = lam ? greater(lam[h + k], 0.0) * time : HUGE_VAL;
-        follows = fabs(rates[q->held[k]]) <= jump_allowed(sim, q->held[k]) && P[h + k] >= -pull;
-    }
-    for (int k = 0; follows && k < q->held_count; k++) {
-        after[2 * n] -= P[h + k] * rates[q->held[k]] / 2;
-        after[2 * n + 1] += push_wall(sim, q->held[k], P[h + k]);
-    }
-    copy(follows ? ny : 0, after, y);
-    sim->scratch.used = mark;
-    return ok && (follows || settle_moved(sim, problem));
 }

@@ -13,6 +13,5 @@ PRBM double jump_allowed(const Simulation *sim, int i);
 PRBM void turn_walls(Simulation *sim);
 PRBM double push_wall(Simulation *sim, int i, double P);
 PRBM double follow_cubics(Simulation *sim);
-PRBM bool follow_walls(Simulation *sim, const double *lam, double time, Problem *problem);
 
 #endif

@@ -1,6 +1,6 @@
-/* Directional derivatives: the changes, and those of rows and contacts. */
-#ifndef PRBM_TANGENT_H
-#define PRBM_TANGENT_H
+/* Changes of rows, gaps and rates along a tangent, for directional derivatives. */
+#ifndef PRBM_TANGENT_ROWS_H
+#define PRBM_TANGENT_ROWS_H
 
 #include "values.h"
 
@@ -23,6 +23,11 @@ typedef struct {
     Complex *pull;                  /* (d,) of the arms: torques, + i times forces along them */
 } Tangent;
 
+/* An arm E, its complex rate w and acceleration alpha, and its changes dphi and dw, see Tangent. */
+typedef struct {
+    Complex E, w, alpha, dphi, dw;
+} Arm;
+
 PRBM double rate_change(const Tangent *t, const Rows *rows, int i);
 PRBM double gap_change(const Tangent *t, int i);
 PRBM double gap_rate_change(const Tangent *t, int i);
@@ -35,5 +40,13 @@ PRBM void add_pull(const Tangent *t, const Rows *rows, int i, double force);
 PRBM double limit_change(const Tangent *t, int contact);
 /* Sign of the sliding velocity of a contact. */
 PRBM int sliding_sign(const Tangent *t, int contact);
+/* Change of E w: E (i dphi w + dw) */
+PRBM Complex swing_change(const Arm *arm);
+/* Second derivative of an arm divided by the arm, E''/E = i w' - w^2 */
+PRBM Complex bend_of(const Arm *arm);
+/* Change of E'' at constant w': E (i dphi (i w' - w^2) - 2 w dw) */
+PRBM Complex bend_change(const Arm *arm);
+PRBM Complex times_i(Complex z);
+PRBM Arm arm_at(const Tangent *t, int j);
 
 #endif

@@ -1,0 +1,34 @@
+/* Gaps of the stops, their rates and their accelerations. */
+#include "core/gaps.h"
+
+PRBM double give_of(const Equations *q, int i, const double *extra, Extra which) {
+    if (extra == NULL) {
+        return 0.0;
+    }
+    const Stop *stop = &q->system->mechanism->stops[i];
+    return stop->compliant ? extra[stop->extra + (int)which] : 0.0;
+}
+
+PRBM double gap(const Equations *equations, int i, double t, const Complex *e,
+                const double *extra) {
+    Rows rows = gap_rows(equations->system);
+    return row_value(&rows, i, e) + rows.c[i] + wall_motion(&equations->inputs.walls[i], t).x +
+           give_of(equations, i, extra, EXTRA_GIVE);
+}
+
+PRBM double gap_rate(const Equations *equations, int i, double t, const Complex *e,
+                     const double *v, const double *extra) {
+    Rows rows = gap_rows(equations->system);
+    return row_rate(&rows, i, e, v) + wall_motion(&equations->inputs.walls[i], t).v +
+           give_of(equations, i, extra, EXTRA_GIVE_RATE);
+}
+
+PRBM double gap_acceleration(const Equations *equations, int i, double t, const Complex *e,
+                             const double *v, const Evaluation *found) {
+    const Equations *q = equations;
+    Rows rows = gap_rows(q->system);
+    double result = row_rate(&rows, i, e, found->a) - row_convective(&rows, i, e, v) +
+                    wall_motion(&q->inputs.walls[i], t).a;
+    bool pressed = is_pressed(&q->contacts.touching[i]);
+    return pressed ? result + q->inputs.mobilities[i] * found->pressure[i] : result;
+}

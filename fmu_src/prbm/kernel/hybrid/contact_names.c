@@ -1,0 +1,44 @@
+/* Names of contacts in messages. */
+#include <stdio.h>
+#include <string.h>
+
+#include "hybrid/contact_names.h"
+
+PRBM const char *contact_name(const Mechanism *m, int contact) {
+    return contact < m->stop_count ? m->stops[contact].name
+                                   : m->frictions[contact - m->stop_count].name;
+}
+
+PRBM bool has_contact(int count, const int *contacts, int contact) {
+    for (int k = 0; k < count; k++) {
+        if (contacts[k] == contact) {
+            return true;
+        }
+    }
+    return false;
+}
+
+PRBM void list_contacts(const Mechanism *m, int count, const int *contacts, ContactNames *names) {
+    size_t length = 0, size = sizeof names->text;
+    names->text[0] = '\0';
+    for (int i = 0; i < m->stop_count + m->friction_count; i++) {
+        if (!has_contact(count, contacts, i)) {
+            continue;
+        }
+        if (length + strlen(contact_name(m, i)) + sizeof ", " + sizeof ", ..." > size) {
+            (void)snprintf(names->text + length, size - length, ", ...");
+            return;
+        }
+        (void)snprintf(names->text + length, size - length, "%s%s", length > 0 ? ", " : "",
+                       contact_name(m, i));
+        length = strlen(names->text);
+    }
+}
+
+PRBM bool contacts_fail(const Simulation *sim, const ContactFailure *failure, int count,
+                        const int *contacts, Problem *problem) {
+    ContactNames names;
+    list_contacts(sim->configuration.mechanism, count, contacts, &names);
+    return fail(problem, "%s at t = %.9g s (%s): %s", failure->cause, sim->state.front_time,
+                names.text, failure->remedy);
+}

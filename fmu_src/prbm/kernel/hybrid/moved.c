@@ -1,0 +1,67 @@
+/* Contacts after the walls or the velocities have changed. */
+#include "hybrid/access.h"
+#include "hybrid/configuration.h"
+#include "hybrid/contact_modes.h"
+#include "hybrid/impacts.h"
+#include "hybrid/moved.h"
+#include "hybrid/phases.h"
+#include "hybrid/walls.h"
+
+/* Open the closed stops whose gaps have a rate after a change of a wall's velocity or an impulse.
+ * Return a stop that is struck, or -1: a stop whose body touches the wall and moves towards it. */
+static int release_moving(Simulation *sim) {
+    const System *system = system_of(sim);
+    int struck = -1;
+    double gaps[STOPS_MAX], rates[STOPS_MAX], bound = zero_speed(&sim->configuration);
+    gaps_and_rates(sim, gaps, rates);
+    for (int i = 0; i < system->s; i++) {
+        bool closed = held_stop(&sim->equations, i);
+        bool compliant = system->mechanism->stops[i].compliant;
+        if (closed && fabs(rates[i]) > bound) {
+            set_mode(sim, i, CONTACT_OPEN);
+            (void)press_released(sim);
+        } else if (compliant || closed || gaps[i] > TOUCHING_RTOL * system->length) {
+            continue;
+        }
+        struck = rates[i] < -bound && !compliant ? i : struck;
+    }
+    return struck;
+}
+
+/* Choose the contact state after changes of the walls' velocities or impulses. */
+PRBM bool settle_moved(Simulation *sim, Problem *problem) {
+    int struck = release_moving(sim);
+    if (!rephase(sim, problem)) {
+        return false;
+    }
+    if (struck >= 0) {
+        return impact(sim, struck, problem);
+    }
+    return project(&sim->equations, sim->state.time, sim->state.front, &sim->scratch, problem) &&
+           settle(sim, NULL, 0, NULL, problem);
+}
+
+/* Keep held stops on walls whose velocities have jumped by less than rest_speed; otherwise the
+ * stops open or are struck.  Impulses may pull, but not more than the forces lam (r,) press within
+ * the given time; NULL: without limit. */
+PRBM bool follow_walls(Simulation *sim, const double *lam, double time, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    const Equations *q = &sim->equations;
+    int ny = state_size(sim), n = system_of(sim)->n, h = q->first_hold;
+    double gaps[STOPS_MAX], rates[STOPS_MAX], *y = sim->state.front, t = sim->state.front_time;
+    double *P = take(&sim->scratch, (size_t)q->r), *after = take(&sim->scratch, (size_t)ny);
+    copy(ny, y, after);
+    gaps_and_rates(sim, gaps, rates);
+    bool ok = project_with_impulses(q, t, after, P, &sim->scratch, problem), follows = ok;
+    for (int k = 0; follows && k < q->held_count; k++) {
+        double pull = lam ? greater(lam[h + k], 0.0) * time : HUGE_VAL;
+        follows = fabs(rates[q->held[k]]) <= jump_allowed(sim, q->held[k]) && P[h + k] >= -pull;
+    }
+    for (int k = 0; follows && k < q->held_count; k++) {
+        after[2 * n] -= P[h + k] * rates[q->held[k]] / 2;
+        after[2 * n + 1] += push_wall(sim, q->held[k], P[h + k]);
+    }
+    copy(follows ? ny : 0, after, y);
+    sim->scratch.used = mark;
+    return ok && (follows || settle_moved(sim, problem));
+}

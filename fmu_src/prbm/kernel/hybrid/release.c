@@ -1,0 +1,147 @@
+/* The start of a motion: the twin of hybrid/release.py. */
+#include <string.h>
+
+#include "core/gaps.h"
+#include "core/start.h"
+#include "hybrid/access.h"
+#include "hybrid/compliant.h"
+#include "hybrid/configuration.h"
+#include "hybrid/contact_modes.h"
+#include "hybrid/impacts.h"
+#include "hybrid/peaks.h"
+#include "hybrid/phases.h"
+#include "hybrid/release.h"
+#include "hybrid/stability.h"
+#include "hybrid/walls.h"
+
+static void free_contacts(Simulation *sim) {
+    const Mechanism *m = sim->configuration.mechanism;
+    for (int contact = 0; contact < contact_count(sim); contact++) {
+        bool stop = contact < m->stop_count;
+        sim->state.modes[contact] = stop ? CONTACT_OPEN : CONTACT_FRICTIONLESS;
+    }
+}
+
+PRBM void clear_stops(Simulation *sim) {
+    State *state = &sim->state;
+    size_t s = (size_t)sim->configuration.mechanism->stop_count;
+    memset(state->latched, 0, s * sizeof *state->latched);
+    memset(state->touching, 0, s * sizeof *state->touching);
+    memset(state->touches, 0, s * sizeof *state->touches);
+    memset(state->walls, 0, s * sizeof *state->walls);
+    memset(state->driven, 0, s * sizeof *state->driven);
+    free_contacts(sim);
+}
+
+PRBM void clear_progress(State *state, double start_time) {
+    const Event none = {EVENT_NONE, 0, 0.0};
+    const SimulationMode cosimulation = {false, 0.0};
+    state->mode = cosimulation;
+    state->started = state->has_k1 = state->arc.valid = state->interrupted = false;
+    state->time = state->front_time = state->window_since = start_time;
+    state->point = start_time;
+    state->longest = state->arc.start = state->arc.h = state->arc.before.time = 0.0;
+    state->step_size = state->log_of_error = state->fastest_rate = 0.0;
+    state->tolerance = state->frequency = state->angle = state->energy = 0.0;
+    state->window_count = 0;
+    state->pending = none;
+}
+
+static bool check_tolerance(double x, Problem *problem) {
+    if (!(x >= TOLERANCE_MIN && x <= TOLERANCE_MAX)) {
+        return fail(problem, "tolerance = %g must lie between %g and %g", x, TOLERANCE_MIN,
+                    TOLERANCE_MAX);
+    }
+    return true;
+}
+
+PRBM double simulation_requested(const Simulation *simulation, double tolerance) {
+    int parameter = simulation->configuration.mechanism->tolerance;
+    return tolerance == 0.0 ? simulation->state.values[parameter] : tolerance;
+}
+
+static bool start_state(Simulation *sim, Problem *problem) {
+    const Mechanism *m = sim->configuration.mechanism;
+    const System *system = system_of(sim);
+    size_t mark = sim->scratch.used, n = (size_t)system->n;
+    double *front = sim->state.front;
+    double *q = take(&sim->scratch, n);
+    double speed = evaluate(m->release.velocity, sim->state.acting_values);
+    bool ok = start_shape(system, sim->state.acting_values, q, &sim->scratch, problem);
+    if (ok) {
+        zeros(state_size(sim), front);
+        copy((int)n, q, front);
+        ok = release_velocity(system, q, speed, front + n, &sim->scratch, problem);
+    }
+    sim->scratch.used = mark;
+    return ok;
+}
+
+/* Reject a penetrated wall at the start.  Apply the impact if a wall is struck at the start. */
+static bool check_walls(Simulation *sim, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    int n = system_of(sim)->n, struck = -1;
+    const double *front = sim->state.front, t = sim->state.front_time;
+    Complex *e = directions_at(sim, front);
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        double distance = gap(&sim->equations, i, t, e, NULL);
+        if (sim->configuration.mechanism->stops[i].compliant && distance < 0.0) {
+            continue; /* A preload. */
+        }
+        if (distance < -release_penetration(&sim->configuration)) {
+            double wall = sim->state.walls[i].position;
+            const char *name = sim->configuration.mechanism->stops[i].name;
+            return fail(problem,
+                        "the wall %s is penetrated by %.6g m at release: %s.position = %.6g m, "
+                        "the hit point is at %.6g m; move the stop or release further back",
+                        name, -distance, name, wall, wall - distance);
+        }
+        if (struck < 0 && distance <= release_penetration(&sim->configuration) &&
+            gap_rate(&sim->equations, i, t, e, front + n, NULL) < 0.0) {
+            struck = i;
+        }
+    }
+    sim->scratch.used = mark;
+    return preload(sim, problem) && (struck < 0 || impact(sim, struck, problem));
+}
+
+/* Release the mechanism in its start shape, and choose the contact state there. */
+static bool release_mechanism(Simulation *sim, Problem *problem) {
+    int rigid[STOPS_MAX], count = 0;
+    State *state = &sim->state;
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        rigid[count] = i;
+        count += !sim->configuration.mechanism->stops[i].compliant;
+    }
+    clear_stops(sim);
+    place_walls(sim);
+    copy(LOADS * sim->configuration.mechanism->force_count, given_impulses(sim), state->received);
+    set_inputs(sim);
+    return start_state(sim, problem) &&
+           project(&sim->equations, state->time, state->front, &sim->scratch, problem) &&
+           check_walls(sim, problem) &&
+           rephase(sim, problem) && settle(sim, rigid, count, NULL, problem) &&
+           find_fastest(sim, problem);
+}
+
+PRBM bool start_motion(Simulation *sim, double start_time, double tolerance, SimulationMode mode,
+                       Problem *problem) {
+    State *state = &sim->state;
+    Configuration *configuration = &sim->configuration;
+    clear_progress(state, start_time);
+    state->tolerance = simulation_requested(sim, tolerance);
+    state->mode = mode;
+    state->log_of_error = natural_log(STEP_ERROR_MIN);
+    if (!check_tolerance(state->tolerance, problem) || !take_values(sim, problem) ||
+        !fundamental_frequency(&configuration->system, &state->frequency, &sim->scratch,
+                               problem)) {
+        return false;
+    }
+    if (!set_scales(configuration, state->frequency, &sim->scratch, problem)) {
+        return false;
+    }
+    state->tolerance = lesser(state->tolerance, TOLERANCE_USED_MAX);
+    clear_peaks(sim);
+    state->started = release_mechanism(sim, problem) && restart_peaks(sim, problem);
+    return state->started;
+}
