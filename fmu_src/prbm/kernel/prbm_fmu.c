@@ -3,12 +3,15 @@
  *
  * With -DPRBM_FMI=2 or 3 the library has the functions of that version only.  With -DPRBM_TABLES
  * the tables of the mechanism come from mechanism_tables.h instead of the FMU's folder resources.
+ *
+ * The files are the layers of the kernel, the lowest first: each uses only functions and types of
+ * earlier files.
  */
 #include "generated.h"
 #include "kernel.h"
 #include "motion.h"
-#include "core/memory.c"
 #include "core/numbers.c"
+#include "core/memory.c"
 #include "core/matrix.c"
 #include "core/mechanism.c"
 #include "core/flexure.c"

@@ -1,4 +1,4 @@
-/* Gaps of the stops, their rates and their accelerations. */
+/* Gaps of the stops, their rates and their accelerations: as in mechanics/dynamics.py. */
 #include "core/gaps.h"
 
 PRBM double give_of(const Equations *q, int i, const double *extra, Extra which) {

@@ -4,7 +4,6 @@
 #include "core/beam.h"
 #include "core/flexure.h"
 #include "core/layout.h"
-#include "core/system.h"
 
 static int link_count(const Mechanism *m, const Flexure *flexure) {
     return links_of(kind_of(m, flexure), flexure->type_at_start, flexure->type_at_end);

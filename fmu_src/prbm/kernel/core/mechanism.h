@@ -4,6 +4,9 @@
 
 #include "core/memory.h"
 
+/* Values in place of the direction of a body: not yet placed by the assembly, or the ground. */
+enum { NOWHERE = -2, FIXED = -1 };
+
 /* constant + sum(factor * parameter) */
 typedef struct {
     double constant;

@@ -4,9 +4,6 @@
 
 #include "core/mechanism.h"
 
-/* Values in place of the direction of a body: not yet placed by the assembly, or the ground. */
-enum { NOWHERE = -2, FIXED = -1 };
-
 /* A point of a body, z = c + A E, with the coordinate j and the direction arm of the body, and the
  * drawn position. */
 typedef struct {
