@@ -99,11 +99,15 @@ def test_files_use_functions_of_earlier_files_only(tmp_path):
 
 
 def test_calls_and_includes_upwards_are_found(tmp_path):
-    (tmp_path / UNIT).write_text('#include "low.c"\n#include "high.c"\n')
-    (tmp_path / "low.h").write_text('#include "high.h"\n')
-    (tmp_path / "low.c").write_text("int high(void);\nint low(void) { return high(); }\n")
-    (tmp_path / "high.h").write_text('#include "low.h"\n')
-    (tmp_path / "high.c").write_text("int low(void);\nint high(void) { return low(); }\n")
+    (tmp_path / UNIT).write_text('#include "low.c"\n#include "high.c"\n', encoding="utf-8")
+    (tmp_path / "low.h").write_text('#include "high.h"\n', encoding="utf-8")
+    (tmp_path / "low.c").write_text(
+        "int high(void);\nint low(void) { return high(); }\n", encoding="utf-8"
+    )
+    (tmp_path / "high.h").write_text('#include "low.h"\n', encoding="utf-8")
+    (tmp_path / "high.c").write_text(
+        "int low(void);\nint high(void) { return low(); }\n", encoding="utf-8"
+    )
     assert upward_includes(tmp_path) == ["low.h includes high.h"]
     assert circles(tmp_path) == ["high", "low"]
     assert upward_calls(tmp_path, tmp_path / "one.o") == ["low.c uses high of high.c"]

@@ -15,6 +15,7 @@
 #define PRBM_KERNEL_H
 
 #include "core/platform.h"
+#include "core/complex.h"
 #include "core/numbers.h"
 #include "core/memory.h"
 #include "core/matrix.h"
@@ -33,7 +34,9 @@
 #include "core/contact_state.h"
 #include "core/compliance.h"
 #include "core/equations.h"
+#include "core/evaluated.h"
 #include "core/evaluation.h"
+#include "core/gaps.h"
 #include "core/dynamics.h"
 #include "core/sections.h"
 #include "core/projection.h"
