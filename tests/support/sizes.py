@@ -28,7 +28,7 @@ PAGES = "fmu_src/prbm/validation/"
 WALLS_MAX = 120  # Lines of code of all C functions that exist only for moving walls.
 
 WALLS_FILE = "fmu_src/prbm/kernel/hybrid/walls.c"
-WALL_FUNCTIONS = ("wall_motion", "wall_inputs", "walls_changed")
+WALL_FUNCTIONS = ("wall_motion", "wall_inputs", "walls_changed", "follow_walls")
 """Functions of other C files that exist only for moving walls."""
 
 C_NOISE = re.compile(

@@ -25,6 +25,7 @@
 #include "core/profile.h"
 #include "core/beam.h"
 #include "core/system.h"
+#include "core/placement.h"
 #include "core/assembly.h"
 #include "core/free_body.h"
 #include "core/kinetics.h"
