@@ -26,8 +26,10 @@ ROOT = Path(__file__).resolve().parents[2]
 """Root folder of the project."""
 
 SUPPORT = Path(__file__).resolve().parent
-CASES = ROOT / "tests" / "cases"  # Public cases; README.md has their values and sources.
 """Folder of the modules that the tests import."""
+
+CASES = ROOT / "tests" / "cases"
+"""Folder of the public cases; README.md has their values."""
 
 
 @cache

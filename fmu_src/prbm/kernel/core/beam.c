@@ -1,6 +1,4 @@
 /* A beam whose bending moment is a polynomial: the twin of mechanics/beam.py. */
-#include <math.h>
-
 #include "core/beam.h"
 #include "core/matrix.h"
 

@@ -8,7 +8,8 @@
  * the rows in the factored saddle-point matrix do not change. */
 PRBM void factored_response(const ScaledFactors *factors, int n, int k, const double *rows,
                             double *X, Scratch *scratch);
-/* The same, with the rows held (r, n) whose rates do not change.  length: the size of the mechanism [m]. */
+/* The same, with the rows held (r, n) whose rates do not change.  length: the size of the mechanism
+ * [m]. */
 PRBM bool response(int n, int r, int k, const double *M, const double *held, const double *rows,
                    double length, double *X, Scratch *scratch, Problem *problem);
 /* Return the mobility below which no motion along a row (n,) is possible: SINGULAR_RTOL of that

@@ -1,6 +1,4 @@
 /* Rates of the state, powers, stops and base reactions: the twin of mechanics/dynamics.py. */
-#include <math.h>
-
 #include "core/dynamics.h"
 #include "core/forces.h"
 #include "core/vectors.h"

@@ -1,6 +1,5 @@
 /* Accelerations and multipliers, from loads, mass matrix, rows and their factors at a state: the
  * twin of Equations.evaluate in mechanics/dynamics.py. */
-#include <math.h>
 #include <string.h>
 
 #include "core/block_map.h"

@@ -1,6 +1,4 @@
 /* Factors of a saddle-point matrix, block by block, for repeated solution. */
-#include <math.h>
-
 #include "core/factors.h"
 #include "core/matrix.h"
 #include "core/vectors.h"

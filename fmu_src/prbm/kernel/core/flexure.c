@@ -1,6 +1,4 @@
 /* Flexures as rigid segments, torsion and axial springs: the twin of mechanism/flexure.py. */
-#include <math.h>
-
 #include "core/flexure.h"
 
 PRBM bool stub(int pivots, const double *gamma, double *gamma0, Problem *problem) {

@@ -13,7 +13,8 @@ PRBM void add_scaled(int n, double a, const double *x, double *y); /* y += a x *
 PRBM bool lu_factor(int n, double *a, int *pivot);
 PRBM void lu_solve(int n, const double *a, const int *pivot, double *b);
 /* Factorise a symmetric matrix as L L^T by Cholesky's method; false if a pivot is not positive, or
- * round-off of its diagonal element.  The lower triangle is read and overwritten by L; the diagonal is stored inverted. */
+ * round-off of its diagonal element.  The lower triangle is read and overwritten by L; the diagonal
+ * is stored inverted. */
 PRBM bool cholesky(int n, double *a);
 PRBM void forward(int n, const double *a, double *b);  /* b := L^-1 b */
 PRBM void backward(int n, const double *a, double *b); /* b := L^-T b */

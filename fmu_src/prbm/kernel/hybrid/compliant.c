@@ -1,4 +1,4 @@
-/* Contacts at compliant stops: first touch, phases, settling, separation, and their outputs: the
+/* Contacts at compliant stops: first touch, switches of the phase, settling and separation: the
  * twin of hybrid/compliant.py. */
 #include <math.h>
 

@@ -6,7 +6,7 @@
 #include "hybrid/errors.h"
 
 PRBM double error_norm(const Simulation *sim, const double *x, const double *y,
-                         const double *y1) {
+                       const double *y1) {
     const double *least = sim->configuration.least, *share = sim->configuration.share;
     int ny = state_size(sim);
     Lanes sum[SUMS] = {NO_LANES};

@@ -1,4 +1,6 @@
 /* Contacts after the walls or the velocities have changed. */
+#include <math.h>
+
 #include "hybrid/access.h"
 #include "hybrid/configuration.h"
 #include "hybrid/contact_modes.h"

@@ -1,7 +1,5 @@
 /* Forces of all contacts at rest together: the twin of hybrid/rest.py. */
 #include <math.h>
-#include <stdio.h>
-#include <string.h>
 
 #include "core/gaps.h"
 #include "hybrid/access.h"

@@ -1,5 +1,4 @@
-/* The parts of a simulation, its values and its start: the twin of hybrid/simulation.py. */
-#include <math.h>
+/* The memory of a simulation, and its values: the twin of hybrid/simulation.py. */
 #include <stdlib.h>
 #include <string.h>
 
