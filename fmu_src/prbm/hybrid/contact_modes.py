@@ -345,22 +345,25 @@ def _sticking_or_slipping(
     """Return the modes, with those of contacts at rest chosen by their forces.
 
     If contacts can stick only together, those with friction below its limit stick, because they are
-    independent of each other; the others have friction at its limit, or none.
+    independent of each other; the others have friction at its limit, or none.  If all of them are
+    at their limits and one of them has slipped, they slip together.  A contact without a normal
+    force has no friction in either direction of slip, and changes it as soon as it moves.
     """
     slack, size = scales.zero_acceleration / found.mobility, np.abs(found.friction)
     at_limit = size >= found.limit - slack
-    for j in np.argsort(np.where(at_limit, 2, size <= slack), kind="stable"):
+    yields = at_limit & np.array([c in slipped for c in at_rest])
+    taken = contacts  # Sticking contacts, and those that have slipped in their place.
+    for j in np.argsort(np.where(at_limit, 3 - yields, size <= slack), kind="stable"):
         c, force = at_rest[j], found.friction[j]
         if not contacts.modes[c].closed or (c in contacts.pressed and contacts.is_free(c)):
             continue
         if abs(found.slide[j]) > scales.zero_acceleration:
-            mode = ContactMode.slipping(found.slide[j])
-        elif not (at_limit[j] and c in slipped) and _mobile(front, contacts, c):
-            mode = STICK
+            taking = mode = ContactMode.slipping(found.slide[j])
         else:
-            limited = at_limit[j] and found.limit[j] > 0.0
-            mode = ContactMode.slipping(-force) if limited else FRICTIONLESS
-        contacts = contacts.with_mode(c, mode)
+            yielding = ContactMode.slipping(-force) if at_limit[j] else FRICTIONLESS
+            taking = STICK if found.limit[j] > 0.0 and _mobile(front, taken, c) else yielding
+            mode = yielding if yields[j] else taking
+        contacts, taken = contacts.with_mode(c, mode), taken.with_mode(c, taking)
     return contacts
 
 

@@ -234,45 +234,49 @@ static ContactMode turning_mode(const Simulation *sim, int contact, const Fricti
 }
 
 /* Choose by its force whether a contact at rest begins to slip, sticks, has friction at its limit,
- * or is frictionless. */
+ * or is frictionless.  taken: the modes, in which contacts that have slipped stick. */
 static bool mode_of_forces(Simulation *sim, const RestForces *found, int j, int contact,
-                           bool at_limit, bool slipped, ContactMode *modes, Problem *problem) {
+                           bool at_limit, bool slipped, ContactMode *modes, ContactMode *taken,
+                           Problem *problem) {
     bool mobile = false;
     if (fabs(found->slide[j]) > zero_acceleration(&sim->configuration)) {
-        modes[contact] = slipping_mode(found->slide[j]);
+        modes[contact] = taken[contact] = slipping_mode(found->slide[j]);
         return true;
     }
-    if (!(at_limit && slipped) && !is_mobile(sim, contact, modes, &mobile, problem)) {
+    if (found->limit[j] > 0.0 && !is_mobile(sim, contact, taken, &mobile, problem)) {
         return false;
     }
-    if (mobile) {
-        modes[contact] = CONTACT_STICK;
-    } else if (at_limit && found->limit[j] > 0.0) {
-        modes[contact] = slipping_mode(-found->friction[j]);
-    } else {
-        modes[contact] = CONTACT_FRICTIONLESS;
-    }
+    ContactMode yielding = at_limit ? slipping_mode(-found->friction[j]) : CONTACT_FRICTIONLESS;
+    taken[contact] = mobile ? CONTACT_STICK : yielding;
+    modes[contact] = slipped ? yielding : taken[contact];
     return true;
 }
 
 /* Choose the modes of contacts at rest by their forces.  If contacts can stick only together, those
  * with friction below its limit stick, because they are independent of each other; the others have
- * friction at its limit, or none.  If yielding, no contact sticks at its limit. */
+ * friction at its limit, or none.  If all of them are at their limits and one of them has slipped,
+ * they slip together.  A contact without a normal force has no friction in either direction of slip,
+ * and changes it as soon as it moves.  If yielding, no contact sticks at its limit. */
 static bool stick_or_slip(Simulation *sim, const RestContacts *rest, const RestForces *found,
                           const FrictionEvent *event, bool yielding, ContactMode *modes,
                           Problem *problem) {
-    enum { BELOW_LIMIT, NO_FRICTION, AT_LIMIT };
+    enum { BELOW_LIMIT, NO_FRICTION, SLIPPED, AT_LIMIT };
+    ContactMode taken[CONTACTS_MAX];
     double zero = zero_acceleration(&sim->configuration);
     bool ok = true;
+    memcpy(taken, modes, (size_t)contact_count(sim) * sizeof *modes);
     for (int turn = BELOW_LIMIT; turn <= AT_LIMIT; turn++) {
         for (int j = 0; ok && j < rest->count; j++) {
             int contact = rest->contacts[j];
             double slack = zero / found->mobility[j], size = fabs(found->friction[j]);
             bool at_limit = size >= found->limit[j] - slack;
-            int order = at_limit ? AT_LIMIT : size <= slack ? NO_FRICTION : BELOW_LIMIT;
+            bool slipped = at_limit && (yielding || (event->slips && event->contact == contact));
+            int order = slipped    ? SLIPPED
+                        : at_limit ? AT_LIMIT
+                                   : (size <= slack ? NO_FRICTION : BELOW_LIMIT);
             if (order == turn && modes[contact] != CONTACT_OPEN) {
-                bool slipped = yielding || (event->slips && event->contact == contact);
-                ok = mode_of_forces(sim, found, j, contact, at_limit, slipped, modes, problem);
+                ok = mode_of_forces(sim, found, j, contact, at_limit, slipped, modes, taken,
+                                    problem);
             }
         }
     }
