@@ -59,9 +59,10 @@ def impact(configuration: Configuration, front: Front, hit: int) -> tuple[Front,
         i
         for i in front.contacts.open_stops
         if rates[i] < 0.0 and (i == hit or gaps[i] <= near) and not stops[i].compliant
+        if _can_be_struck(front, i)
     ]
     if not struck:
-        resting = [hit] if abs(rates[hit]) <= zero else []
+        resting = [hit] if rates[hit] <= zero else []
         return settle(configuration, front, resting=resting), []
     front = compliant.unsettled(front)
     held = list(front.contacts.held)
@@ -76,6 +77,16 @@ def impact(configuration: Configuration, front: Front, hit: int) -> tuple[Front,
     resting = [i for i in (*struck, *held) if rates[i] <= zero]
     front = compliant.rephased(front.with_contacts(front.contacts.opened()))
     return settle(configuration, front, resting=resting), impacts
+
+
+def _can_be_struck(front: Front, stop: int) -> bool:
+    """Return whether the gap of a stop can have a rate that is not round-off.
+
+    It cannot where the body moves along a wall at rest and no motion across it is possible, as at
+    the dead centre of a guide.
+    """
+    wall = front.inputs.walls[stop].motion(front.time)[1]
+    return bool(wall != 0.0) or front.at.moves(front.at.gaps[[stop]])
 
 
 def receive(front: Front, impulses: Real) -> Front:

@@ -78,13 +78,17 @@ class ContactProblem:
         """Return the inverse mass along a row (1, n) [1/kg]."""
         return float((row @ self.response(row)).item())
 
+    def moves(self, row: Real) -> bool:
+        """Return whether a motion along a row (1, n) is possible: its mobility is not round-off."""
+        least = contact.least_mobilities(self.M, row, self.system.length)
+        return self.mobility(row) > least.item()
+
     def independent(self, held: Real, row: Real) -> bool:
         """Return whether a motion along a row (1, n) is possible while ``held`` (r, n) rest.
 
         It is not if the row is round-off, or the constraints leave hardly any of its mobility.
         """
-        own = self.mobility(row)
-        if own <= contact.least_mobilities(self.M, row, self.system.length).item():
+        if not self.moves(row):
             return False
         left = float((row @ self.response_beside(held, row)).item())
-        return left > DEPENDENT_FRICTION_RTOL * own
+        return left > DEPENDENT_FRICTION_RTOL * self.mobility(row)

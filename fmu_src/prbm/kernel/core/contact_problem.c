@@ -62,16 +62,24 @@ PRBM bool mobility(ContactProblem *at, const double *row, double *result, Scratc
     return ok;
 }
 
+PRBM bool moves(ContactProblem *at, const double *row, bool *result, Scratch *scratch,
+                Problem *problem) {
+    double own = 0.0;
+    bool ok = mobility(at, row, &own, scratch, problem);
+    *result = ok && own > least_mobility(at->system->n, at->M, row, at->system->length);
+    return ok;
+}
+
 PRBM bool independent(ContactProblem *at, int r, const double *held, const double *row,
                       bool *result, Scratch *scratch, Problem *problem) {
     size_t mark = scratch->used;
     const System *system = at->system;
     int n = system->n;
     double own = 0.0, *X = take(scratch, (size_t)n);
-    bool ok = mobility(at, row, &own, scratch, problem);
-    *result = ok && own > least_mobility(n, at->M, row, system->length);
-    if (*result) {
-        ok = response(n, r, 1, at->M, held, row, system->length, X, scratch, problem);
+    bool ok = moves(at, row, result, scratch, problem);
+    if (ok && *result) {
+        ok = mobility(at, row, &own, scratch, problem) &&
+             response(n, r, 1, at->M, held, row, system->length, X, scratch, problem);
         *result = ok && dot(n, row, X) > DEPENDENT_FRICTION_RTOL * own;
     }
     scratch->used = mark;

@@ -28,6 +28,9 @@ PRBM bool loop_response(ContactProblem *at, int k, const double *rows, double *X
 /* Compute the inverse mass along a row (n,) [1/kg]. */
 PRBM bool mobility(ContactProblem *at, const double *row, double *result, Scratch *scratch,
                    Problem *problem);
+/* Find whether a motion along a row (n,) is possible: its mobility is not round-off. */
+PRBM bool moves(ContactProblem *at, const double *row, bool *result, Scratch *scratch,
+                Problem *problem);
 /* Find whether a motion along a row is possible while the rows held (r, n), loops among them, hold.
  * It is not if the row is round-off, or they leave hardly any of its mobility. */
 PRBM bool independent(ContactProblem *at, int r, const double *held, const double *row,

@@ -426,24 +426,44 @@ static bool latch_impacts(Simulation *sim, const Hits *hits, const Account *acco
 
 /* --- impacts ---------------------------------------------------------------------------------- */
 
+/* Find whether the gap of a stop can have a rate that is not round-off.  It cannot where the body
+ * moves along a wall at rest and no motion across it is possible, as at the dead centre of a guide. */
+static bool can_be_struck(Simulation *sim, int stop, const double *q, bool *result,
+                          Problem *problem) {
+    size_t mark = sim->scratch.used;
+    ContactProblem *at = contact_problem_at(sim, q);
+    double *row = take(&sim->scratch, (size_t)system_of(sim)->n);
+    Rows gaps = gap_rows(system_of(sim));
+    row_jacobian(&gaps, stop, at->e, row);
+    *result = wall_motion(&sim->equations.inputs.walls[stop], sim->state.front_time).v != 0.0;
+    bool ok = *result || moves(at, row, result, &sim->scratch, problem);
+    sim->scratch.used = mark;
+    return ok;
+}
+
 /* List the stops that are struck together with the stop hit, and the held stops. */
-static void find_partners(Simulation *sim, int hit, const double *q, const double *v, Hits *hits,
-                          double *rates) {
+static bool find_partners(Simulation *sim, int hit, const double *q, const double *v, Hits *hits,
+                          double *rates, Problem *problem) {
     size_t mark = sim->scratch.used;
     double near = TOUCHING_RTOL * system_of(sim)->length, t = sim->state.front_time;
     Complex *e = directions_at(sim, q);
     const Stop *stops = sim->configuration.mechanism->stops;
+    bool ok = true;
     hits->struck_count = hits->held_count = 0;
-    for (int i = 0; i < system_of(sim)->s; i++) {
+    for (int i = 0; ok && i < system_of(sim)->s; i++) {
         double distance = gap(&sim->equations, i, t, e, NULL);
         rates[i] = gap_rate(&sim->equations, i, t, e, v, NULL);
         if (held_stop(&sim->equations, i)) {
             hits->held[hits->held_count++] = i;
         } else if (!stops[i].compliant && rates[i] < 0.0 && (i == hit || distance <= near)) {
-            hits->struck[hits->struck_count++] = i;
+            bool struck = false;
+            ok = can_be_struck(sim, i, q, &struck, problem);
+            hits->struck[hits->struck_count] = i;
+            hits->struck_count += struck;
         }
     }
     sim->scratch.used = mark;
+    return ok;
 }
 
 /* Choose the restitution of each stop struck.  If a stop comes to rest, its restitution is 0 and
@@ -503,18 +523,17 @@ PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
         sim->scratch.used = mark;
         return touch(sim, hit, problem);
     }
-    find_partners(sim, hit, q, v, &hits, rates);
-    if (hits.struck_count > 0) {
+    bool ok = find_partners(sim, hit, q, v, &hits, rates, problem);
+    if (ok && hits.struck_count > 0) {
         unsettle(sim);
-        find_partners(sim, hit, q, v, &hits, rates);
+        ok = find_partners(sim, hit, q, v, &hits, rates, problem);
     }
-    if (hits.struck_count == 0) {
+    if (ok && hits.struck_count == 0) {
         sim->scratch.used = mark;
-        return settle(sim, &hit, fabs(rates[hit]) <= zero_speed(&sim->configuration), NULL,
-                      problem);
+        return settle(sim, &hit, rates[hit] <= zero_speed(&sim->configuration), NULL, problem);
     }
-    bool ok = choose_restitutions(sim, q, v, rates, &hits, counted, problem) &&
-              impact_impulses(sim, q, v, &hits, problem);
+    ok = ok && choose_restitutions(sim, q, v, rates, &hits, counted, problem) &&
+         impact_impulses(sim, q, v, &hits, problem);
     if (ok) {
         book_energies(sim, &hits, q, v, &account);
         ok = latch_impacts(sim, &hits, &account, counted, q, v, problem);
