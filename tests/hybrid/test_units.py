@@ -6,7 +6,9 @@ results are therefore the same to the last bit.
 
 import re
 
+import numpy as np
 import pytest
+from fmpy import simulate_fmu
 
 from kernel_simulation import KernelMistake, KernelSimulation
 from prbm.base.errors import PrbmError
@@ -15,7 +17,7 @@ from prbm.fmu.start import interface
 from prbm.hybrid.simulation import Simulation
 from random_mechanisms import seeded
 from scaled import Units, unbounded
-from support import CASES, each_shipped, mechanism
+from support import CASES, each_shipped, mechanism, own_fmu
 
 TIMES = (0.0, 3e-3, 0.01, 0.02)
 CHANGES = tuple(
@@ -94,3 +96,26 @@ def test_the_motion_of_a_public_case_is_the_same_in_all_units(path, monkeypatch)
     times = [DURATIONS[path.stem] * share for share in (0.0, 0.5, 1.0)]
     for change in CHANGES:
         assert_same_motion(KernelSimulation, load(path), change.values[0], monkeypatch, times)
+
+
+@pytest.mark.parametrize("kind", ["native2", "native3"])
+@pytest.mark.parametrize("model", ["PRBDM", "ImpactOscillator"])
+def test_the_results_of_an_fmu_are_the_same_in_all_units(model, kind, monkeypatch, tmp_path):
+    """The units of its variables stay; their values are those of the other mechanism."""
+    results, path, stop, step = {}, tmp_path / "model.fmu", 2.0**-5, 2.0**-10
+    for change in ({}, *(change.values[0] for change in CHANGES[1::2])):
+        with unbounded(monkeypatch):
+            units = Units(**change)
+            given = units.mechanism(mechanism(model))
+            path.write_bytes(own_fmu(kind, given))
+            of = {v.name: units.of(v.unit) for v in interface(given, {})}
+            of["time"] = units.factors["s"]
+        result = simulate_fmu(
+            path, stop_time=stop * of["time"], output_interval=step * of["time"],
+            step_size=step * of["time"],
+        )  # fmt: skip
+        results[tuple(change)] = {name: result[name] / of[name] for name in result.dtype.names}
+    expected = results.pop(())
+    for found in results.values():
+        for name, values in expected.items():
+            np.testing.assert_array_equal(found[name], values, err_msg=name)
