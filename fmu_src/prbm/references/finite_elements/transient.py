@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -12,13 +12,13 @@ from ...base.errors import ParameterError, SimulationError
 from ...hybrid.front import Latched
 from ...hybrid.records import Impact
 from ...mechanics.arrays import Real
-from ...mechanics.modal import simulated_restitution
+from ...mechanics.modal import Modes, simulated_restitution
+from ...mechanism.description import Mechanism
 from ...mechanism.parts import value
 from ...runs.result import Result, structured
+from .equations import Equations
+from .model import ElementModel
 from .statics import Shape
-
-if TYPE_CHECKING:
-    from .elements import FiniteElements
 
 PENETRATION_ATOL = 1e-9  # Penetration of a wall that is round-off [m].
 GAP_CLOSED_RTOL = 1e-10  # Gap at which an impact is located, relative to the size.
@@ -49,12 +49,52 @@ class StepError(SimulationError):
     """A step of the integration did not converge."""
 
 
+class Elements(Protocol):
+    """What a transient needs of :class:`prbm.references.finite_elements.elements.FiniteElements`.
+
+    Shapes q and velocities v are (n,).
+    """
+
+    mechanism: Mechanism
+    model: ElementModel
+    equations: Equations
+    values: dict[str, float]
+    n: int
+
+    @property
+    def M(self) -> Real:
+        """Mass matrix, (n, n)."""
+
+    def release(self) -> tuple[Real, Real]:
+        """Return displacements and velocities at the release."""
+
+    def equilibrium(self, displacement: float | None = None) -> Shape:
+        """Return the equilibrium at a displacement along the release [m]."""
+
+    def modes(self, shape: Shape) -> Modes:
+        """Return the modes at an equilibrium."""
+
+    def displacement(self, q: Real) -> float:
+        """Return the displacement along the release [m]."""
+
+    def gap(self, stop: int, q: Real) -> float:
+        """Return the gap of a stop [m]."""
+
+    def gap_row(self, stop: int, q: Real) -> Real:
+        """Return the derivatives of a gap, (n,)."""
+
+    def impact(
+        self, q: Real, v: Real, struck: int, restitution: float, held: tuple[int, ...]
+    ) -> tuple[Real, float]:
+        """Return the velocities after an impact, and its impulse [N s]."""
+
+
 class Transient:
     """One transient of finite elements.
 
     Parameters
     ----------
-    fe : FiniteElements
+    fe : Elements
         The mechanism.
     step : float
         Step size [s].
@@ -62,7 +102,7 @@ class Transient:
         Spectral radius of the generalised-alpha method, below 1.
     """
 
-    def __init__(self, fe: "FiniteElements", step: float, spectral_radius: float) -> None:
+    def __init__(self, fe: Elements, step: float, spectral_radius: float) -> None:
         self.fe, self.step, self.radius = fe, step, spectral_radius
         fe.mechanism.check_rigid("the transient of finite elements")
         stops = fe.mechanism.stops
