@@ -81,14 +81,7 @@ def settle(
         If no forces satisfy the laws of all contacts, or the equations are singular.
     """
     turning = {} if reversing is None else {reversing: _slide_acceleration(front, reversing)}
-    gaps, rates = front.gaps_and_rates()
-    near = configuration.scales.touching + configuration.scales.penetration
-    zero = configuration.scales.zero_speed
-    candidates = list(front.contacts.held)
-    candidates += [
-        i for i in resting if i not in candidates and gaps[i] <= near and rates[i] <= zero
-    ]
-    before = None
+    candidates, before = _candidates(configuration, front, resting), None
     for _ in range(SETTLE_ITERATIONS_MAX):
         # A compliant stop is a candidate only while it is a constraint.
         candidates = [i for i in candidates if i not in front.contacts.pressed]
@@ -98,6 +91,15 @@ def settle(
         # The projection closes gaps of round-off, which changes the forces of stiff flexures.
         front, before = front.projected(), front.contacts
     raise SimulationError(_failure(configuration, front, candidates, UNSETTLED))
+
+
+def _candidates(configuration: Configuration, front: Front, resting: Sequence[int]) -> list[int]:
+    """Return the held stops, and those of ``resting`` whose gaps are closed and do not open."""
+    gaps, rates = front.gaps_and_rates()
+    near = configuration.scales.touching + configuration.scales.penetration
+    zero, held = configuration.scales.zero_speed, list(front.contacts.held)
+    closed = [i for i in resting if gaps[i] <= near and rates[i] <= zero]
+    return held + [i for i in closed if i not in held]
 
 
 def _chosen(
@@ -285,15 +287,7 @@ def _modes_of(
     their laws, or if another stop that touches would close.
     """
     contacts, rubbing = front.contacts, _with_coefficients(front.equations, stops)
-    slow = {c: abs(rate) * scales.time_resolution(front.time) for c, rate in turning.items()}
-    modes = {c: _sliding_mode(scales, front, c, slow.get(c, 0.0)) for c in {*stops, *rubbing}}
-    # Contacts that cannot move independently are left out: loops and held stops carry their load.
-    at_rest = [c for c in rubbing if modes[c] is FRICTIONLESS and _mobile(front, contacts, c)]
-    for c, rate in turning.items():
-        rests = modes.get(c) is FRICTIONLESS and c not in at_rest
-        if rests and abs(rate) > scales.zero_acceleration:
-            # The other parts impose the motion, as where the links of a loop form a straight line.
-            modes[c] = ContactMode.slipping(rate)
+    modes, at_rest = _sliding_modes(scales, front, {*stops, *rubbing}, rubbing, turning)
     for c in rubbing:
         contacts = contacts.with_mode(c, modes[c]) if contacts.modes[c].closed else contacts
     if not at_rest:
@@ -309,6 +303,29 @@ def _modes_of(
     contacts = _sticking_or_slipping(scales, front, contacts, at_rest, found, slipped)
     slack = dict(zip(at_rest, scales.zero_acceleration / found.mobility, strict=True))
     return contacts if _agrees(scales, front, contacts, every, slack) else None
+
+
+def _sliding_modes(
+    scales: Scales,
+    front: Front,
+    contacts: Collection[int],
+    rubbing: Sequence[int],
+    turning: Mapping[int, float],
+) -> tuple[dict[int, ContactMode], list[int]]:
+    """Return the slip modes of contacts, and those with friction that do not slide.
+
+    Contacts that cannot move independently are left out of these: loops and held stops carry their
+    load.  They slide if the other parts impose the motion after a reversal, as where the links of a
+    loop form a straight line.
+    """
+    slow = {c: abs(rate) * scales.time_resolution(front.time) for c, rate in turning.items()}
+    modes = {c: _sliding_mode(scales, front, c, slow.get(c, 0.0)) for c in contacts}
+    resting = [c for c in rubbing if modes[c] is FRICTIONLESS]
+    at_rest = [c for c in resting if _mobile(front, front.contacts, c)]
+    for c in turning.keys() & (set(resting) - set(at_rest)):
+        if abs(rate := turning[c]) > scales.zero_acceleration:
+            modes[c] = ContactMode.slipping(rate)
+    return modes, at_rest
 
 
 def _with_coefficients(equations: Equations, stops: Sequence[int]) -> list[int]:
@@ -355,7 +372,7 @@ def _sticking_or_slipping(
     taken = contacts  # Sticking contacts, and those that have slipped in their place.
     for j in np.argsort(np.where(at_limit, 3 - yields, size <= slack), kind="stable"):
         c, force = at_rest[j], found.friction[j]
-        if not contacts.modes[c].closed or (c in contacts.pressed and contacts.is_free(c)):
+        if not contacts.modes[c].closed:
             continue
         if abs(found.slide[j]) > scales.zero_acceleration:
             taking = mode = ContactMode.slipping(found.slide[j])

@@ -133,20 +133,26 @@ static double least_pressing(Simulation *sim, int stop, const double *q) {
     return distance > -closing_depth(configuration) / 2.0 ? zero_acceleration(configuration) : 0.0;
 }
 
-/* Find the stops at rest that hold: these are pressed, and the others open.  In this search
- * contacts with a sliding velocity slip, and contacts at rest are frictionless.  If stops can move
- * only together, a subset with independent rows holds. */
-PRBM bool find_holding_stops(Simulation *sim, int count, const int *candidates, const double *q,
-                             const double *v, HoldingSet *holding, Problem *problem) {
-    HoldingSet every = {0, {0}, false}, none = {0, {0}, true};
-    ContactMode modes[CONTACTS_MAX];
-    RestContacts rest;
-    RestForces found;
+/* Return the candidates, each once, in the order of the stops. */
+static HoldingSet in_order(const Simulation *sim, int count, const int *candidates, bool found) {
+    HoldingSet every = {0, {0}, found};
     for (int i = 0; i < system_of(sim)->s; i++) {
         if (has_contact(count, candidates, i)) {
             every.stops[every.count++] = i;
         }
     }
+    return every;
+}
+
+/* Find the stops at rest that hold: these are pressed, and the others open.  In this search
+ * contacts with a sliding velocity slip, and contacts at rest are frictionless.  If stops can move
+ * only together, a subset with independent rows holds. */
+PRBM bool find_holding_stops(Simulation *sim, int count, const int *candidates, const double *q,
+                             const double *v, HoldingSet *holding, Problem *problem) {
+    HoldingSet every = in_order(sim, count, candidates, false), none = {0, {0}, true};
+    ContactMode modes[CONTACTS_MAX];
+    RestContacts rest;
+    RestForces found;
     *holding = none;
     if (every.count == 0) {
         return true;
@@ -233,12 +239,25 @@ static ContactMode turning_mode(const Simulation *sim, int contact, const Fricti
     return slides ? slipping_mode(event->rate) : CONTACT_FRICTIONLESS;
 }
 
+/* The friction of a contact at rest, in the order in which contacts begin to stick: below the limit,
+ * none, at the limit if the contact has slipped and may not stick, at the limit. */
+typedef enum { BELOW_LIMIT, NO_FRICTION, SLIPPED, AT_LIMIT } FrictionLoad;
+
+static FrictionLoad load_of(const Simulation *sim, const RestForces *found, int j, bool slipped) {
+    double slack = zero_acceleration(&sim->configuration) / found->mobility[j];
+    double size = fabs(found->friction[j]);
+    if (size >= found->limit[j] - slack) {
+        return slipped ? SLIPPED : AT_LIMIT;
+    }
+    return size <= slack ? NO_FRICTION : BELOW_LIMIT;
+}
+
 /* Choose by its force whether a contact at rest begins to slip, sticks, has friction at its limit,
  * or is frictionless.  taken: the modes, in which contacts that have slipped stick. */
 static bool mode_of_forces(Simulation *sim, const RestForces *found, int j, int contact,
-                           bool at_limit, bool slipped, ContactMode *modes, ContactMode *taken,
+                           FrictionLoad load, ContactMode *modes, ContactMode *taken,
                            Problem *problem) {
-    bool mobile = false;
+    bool mobile = false, at_limit = load >= SLIPPED;
     if (fabs(found->slide[j]) > zero_acceleration(&sim->configuration)) {
         modes[contact] = taken[contact] = slipping_mode(found->slide[j]);
         return true;
@@ -248,7 +267,7 @@ static bool mode_of_forces(Simulation *sim, const RestForces *found, int j, int 
     }
     ContactMode yielding = at_limit ? slipping_mode(-found->friction[j]) : CONTACT_FRICTIONLESS;
     taken[contact] = mobile ? CONTACT_STICK : yielding;
-    modes[contact] = slipped ? yielding : taken[contact];
+    modes[contact] = load == SLIPPED ? yielding : taken[contact];
     return true;
 }
 
@@ -260,23 +279,16 @@ static bool mode_of_forces(Simulation *sim, const RestForces *found, int j, int 
 static bool stick_or_slip(Simulation *sim, const RestContacts *rest, const RestForces *found,
                           const FrictionEvent *event, bool yielding, ContactMode *modes,
                           Problem *problem) {
-    enum { BELOW_LIMIT, NO_FRICTION, SLIPPED, AT_LIMIT };
     ContactMode taken[CONTACTS_MAX];
-    double zero = zero_acceleration(&sim->configuration);
     bool ok = true;
     memcpy(taken, modes, (size_t)contact_count(sim) * sizeof *modes);
     for (int turn = BELOW_LIMIT; turn <= AT_LIMIT; turn++) {
         for (int j = 0; ok && j < rest->count; j++) {
             int contact = rest->contacts[j];
-            double slack = zero / found->mobility[j], size = fabs(found->friction[j]);
-            bool at_limit = size >= found->limit[j] - slack;
-            bool slipped = at_limit && (yielding || (event->slips && event->contact == contact));
-            int order = slipped    ? SLIPPED
-                        : at_limit ? AT_LIMIT
-                                   : (size <= slack ? NO_FRICTION : BELOW_LIMIT);
-            if (order == turn && modes[contact] != CONTACT_OPEN) {
-                ok = mode_of_forces(sim, found, j, contact, at_limit, slipped, modes, taken,
-                                    problem);
+            bool slipped = yielding || (event->slips && event->contact == contact);
+            FrictionLoad load = load_of(sim, found, j, slipped);
+            if (load == (FrictionLoad)turn && modes[contact] != CONTACT_OPEN) {
+                ok = mode_of_forces(sim, found, j, contact, load, modes, taken, problem);
             }
         }
     }
@@ -288,31 +300,43 @@ static bool rubs_pressed(const Simulation *sim, int contact) {
     return presses(sim, contact) && sim->state.touching[contact].phase != PHASE_FREE;
 }
 
+/* Choose the mode of a contact with friction if it slides or cannot move independently, and add it
+ * to the contacts at rest otherwise. */
+static bool sort_rubbing(Simulation *sim, int contact, const FrictionEvent *event,
+                         const ContactMode *modes, RestContacts *rest, ContactMode *sliding,
+                         Problem *problem) {
+    bool mobile = false;
+    *sliding = sliding_mode(sim, contact, event);
+    if (*sliding != CONTACT_FRICTIONLESS) {
+        return true;
+    }
+    if (!is_mobile(sim, contact, modes, &mobile, problem)) {
+        return false;
+    }
+    if (mobile) {
+        rest->contacts[rest->count++] = contact;
+    } else {
+        *sliding = turning_mode(sim, contact, event);
+    }
+    return true;
+}
+
 /* Collect the given stops, and the contacts with friction at rest, pressed stops among them.
  * Contacts that cannot move independently are left out: loops and held stops carry their load.
  * sliding: the modes of the contacts with friction that slide. */
 static bool find_rest(Simulation *sim, const HoldingSet *stops, const FrictionEvent *event,
                       const ContactMode *modes, RestContacts *rest,
                       ContactMode *sliding, Problem *problem) {
-    bool ok = true, mobile = false;
+    bool ok = true;
     rest->stop_count = rest->count = 0;
     for (int contact = 0; ok && contact < contact_count(sim); contact++) {
-        bool stop = is_stop(system_of(sim), contact) &&
-                    has_contact(stops->count, stops->stops, contact);
+        bool held = has_contact(stops->count, stops->stops, contact);
+        bool takes_part = held || !is_stop(system_of(sim), contact) || rubs_pressed(sim, contact);
         sliding[contact] = CONTACT_FRICTIONLESS;
-        if (is_stop(system_of(sim), contact) && !stop && !rubs_pressed(sim, contact)) {
-            continue;
+        if (takes_part && friction_of(sim, contact) > 0.0) {
+            ok = sort_rubbing(sim, contact, event, modes, rest, &sliding[contact], problem);
         }
-        if (friction_of(sim, contact) > 0.0) {
-            sliding[contact] = sliding_mode(sim, contact, event);
-        }
-        if (friction_of(sim, contact) > 0.0 && sliding[contact] == CONTACT_FRICTIONLESS) {
-            ok = is_mobile(sim, contact, modes, &mobile, problem);
-            rest->contacts[rest->count] = contact;
-            rest->count += ok && mobile;
-            sliding[contact] = mobile ? CONTACT_FRICTIONLESS : turning_mode(sim, contact, event);
-        }
-        if (stop) {
+        if (held) {
             rest->stops[rest->stop_count] = contact;
             rest->slips[rest->stop_count++] = slip_sign(sliding[contact]);
         }
@@ -333,43 +357,60 @@ static bool friction_jams(const Simulation *sim, const HoldingSet *touching, Pro
     return contacts_fail(sim, &JAMMED, count, all, problem);
 }
 
+/* Set the modes of the contacts with friction that are closed, and those that slide. */
+static void set_sliding(const Simulation *sim, const ContactMode *sliding, ContactMode *modes) {
+    for (int contact = 0; contact < contact_count(sim); contact++) {
+        bool rubs = modes[contact] != CONTACT_OPEN && friction_of(sim, contact) > 0.0;
+        modes[contact] = rubs ? sliding[contact] : modes[contact];
+    }
+}
+
+/* Close the stops whose force presses, and open the others. */
+static void hold_pressed(Simulation *sim, const RestContacts *rest, const RestForces *found,
+                         const ContactMode *sliding, ContactMode *modes) {
+    for (int k = 0; k < rest->stop_count; k++) {
+        int i = rest->stops[k];
+        ContactMode closed = friction_of(sim, i) > 0.0 ? sliding[i] : CONTACT_FRICTIONLESS;
+        bool pressed = found->normal[k] > least_pressing(sim, i, sim->state.front);
+        modes[i] = pressed ? closed : CONTACT_OPEN;
+    }
+}
+
+/* Compute the forces of the contacts at rest with all rigid stops open. */
+static bool forces_at_rest(Simulation *sim, const RestContacts *rest, ContactMode *modes,
+                           RestForces *found, Problem *problem) {
+    const double *q = sim->state.front;
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        modes[i] = presses(sim, i) ? modes[i] : CONTACT_OPEN;
+    }
+    try_contacts(sim, modes);
+    return rest_forces(sim, q, q + system_of(sim)->n, rest, found, problem);
+}
+
 /* Choose the modes by the forces of some stops and of the contacts with friction.  *agree is false
  * if no forces satisfy their laws, or if another stop that touches would close. */
 static bool modes_by_forces(Simulation *sim, const HoldingSet *stops, const HoldingSet *touching,
                             const FrictionEvent *event, bool yielding, ContactMode *modes,
                             bool *agree, Problem *problem) {
-    const System *system = system_of(sim);
-    const double *q = sim->state.front, *v = q + system->n;
+    const double *q = sim->state.front, *v = q + system_of(sim)->n;
     ContactMode sliding[CONTACTS_MAX];
     RestContacts rest;
     RestForces found;
     if (!find_rest(sim, stops, event, modes, &rest, sliding, problem)) {
         return false;
     }
-    for (int contact = 0; contact < contact_count(sim); contact++) {
-        bool rubs = modes[contact] != CONTACT_OPEN && friction_of(sim, contact) > 0.0;
-        modes[contact] = rubs ? sliding[contact] : modes[contact];
-    }
+    set_sliding(sim, sliding, modes);
     *agree = rest.count == 0;
     if (*agree) {
         return true;
     }
-    for (int i = 0; i < system->s; i++) {
-        modes[i] = presses(sim, i) ? modes[i] : CONTACT_OPEN;
-    }
-    try_contacts(sim, modes);
-    if (!rest_forces(sim, q, v, &rest, &found, problem)) {
+    if (!forces_at_rest(sim, &rest, modes, &found, problem)) {
         return false;
     }
     if (!found.solved) {
         return true;
     }
-    for (int k = 0; k < rest.stop_count; k++) {
-        int i = rest.stops[k];
-        ContactMode closed = friction_of(sim, i) > 0.0 ? sliding[i] : CONTACT_FRICTIONLESS;
-        bool pressed = found.normal[k] > least_pressing(sim, i, q);
-        modes[i] = pressed ? closed : CONTACT_OPEN;
-    }
+    hold_pressed(sim, &rest, &found, sliding, modes);
     if (!stick_or_slip(sim, &rest, &found, event, yielding, modes, problem)) {
         return false;
     }
@@ -502,7 +543,6 @@ static void remove_pressed(const Simulation *sim, HoldingSet *stops) {
 PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const Event *event,
                  Problem *problem) {
     FrictionEvent friction;
-    HoldingSet all = {0, {0}, true};
     int candidates[2 * STOPS_MAX];
     ContactMode modes[CONTACTS_MAX];
     size_t bytes = (size_t)contact_count(sim) * sizeof *modes;
@@ -510,11 +550,7 @@ PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const
         return false;
     }
     int count = resting_candidates(sim, touching, touching_count, candidates);
-    for (int i = 0; i < system_of(sim)->s; i++) {
-        if (has_contact(count, candidates, i)) {
-            all.stops[all.count++] = i;
-        }
-    }
+    HoldingSet all = in_order(sim, count, candidates, true);
     for (int k = 0; k < SETTLE_ITERATIONS_MAX; k++) {
         if (!choose_modes(sim, &all, &friction, modes, problem)) {
             return false;
