@@ -3,16 +3,20 @@
     python docs/draw_architecture.py
 
 writes ``docs/figures/architecture.png``.  The layers are those that import-linter checks
-(``pyproject.toml``); the imports are read from the modules.  The metadata of the picture contain
-both as JSON, and a test compares them with the present modules.
+(``pyproject.toml``); the imports are read from the modules.  A panel has the layers of the kernel:
+the order in which ``prbm_fmu.c`` includes its files.  The metadata of the picture contain all of
+this as JSON, and a test compares them with the present files.
 """
 
 import ast
 import json
+import re
 import sys
+import textwrap
 import tomllib
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -101,9 +105,19 @@ def extent(package: str) -> str:
     return " + ".join(texts).replace(",", "\u202f")
 
 
+def kernel_layers() -> list[list[str]]:
+    """Return the C files of each folder of the kernel after its name, highest folder first."""
+    source = (PACKAGE / "kernel" / "prbm_fmu.c").read_text(encoding="utf-8")
+    files = re.findall(r'^#include "(?:(\w+)/)?(\w+)\.c"', source, re.MULTILINE)
+    folders = groupby(files, key=lambda file: file[0])
+    found = [[folder or "kernel", *(name for _, name in group)] for folder, group in folders]
+    return found[::-1]
+
+
 def data() -> dict[str, list[list[str]]]:
-    """Return the picture as data: the layers and the arrows."""
-    return {"layers": layers(), "arrows": [list(arrow) for arrow in sorted(imports())]}
+    """Return the picture as data: the layers, the arrows and the layers of the kernel."""
+    arrows = [list(arrow) for arrow in sorted(imports())]
+    return {"layers": layers(), "arrows": arrows, "kernel": kernel_layers()}
 
 
 def draw() -> Figure:
@@ -111,7 +125,7 @@ def draw() -> Figure:
     rows = layers()
     order = [name for row in rows for name in row]
     found = imports()
-    figure = Figure(figsize=(11.0, 10.6), dpi=150)
+    figure = Figure(figsize=(13.1, 10.6), dpi=150)
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     _bands(axes, rows, order)
@@ -120,7 +134,8 @@ def draw() -> Figure:
     for name, (x, y) in place.items():
         _box(axes, name, x, y)
     _key(axes)
-    axes.set(xlim=(-0.5, 20.9), ylim=(-ROW * (len(order) - 1) - 0.75, 0.75))
+    _kernel(axes)
+    axes.set(xlim=(-0.5, 25.0), ylim=(-ROW * (len(order) - 1) - 0.75, 0.75))
     axes.set_axis_off()
     return figure
 
@@ -168,10 +183,10 @@ def _box(axes: Axes, name: str, x: float, y: float) -> None:
 
 def _key(axes: Axes) -> None:
     """Explain lines, dots and colours in the empty corner."""
-    panel = FancyBboxPatch((12.5, -3.02), 8.1, 3.32, boxstyle="round,pad=0,rounding_size=0.12",
+    panel = FancyBboxPatch((16.6, -3.02), 8.1, 3.32, boxstyle="round,pad=0,rounding_size=0.12",
                            facecolor="white", edgecolor=LINE, linewidth=0.7)  # fmt: skip
     axes.add_patch(panel)
-    x, y = 12.9, -0.22
+    x, y = 17.0, -0.22
     style: dict[str, Any] = {"va": "center", "size": 9.5, "color": INK}
     axes.plot([x + 0.2] * 2, [y + 0.35, y - 0.2], color=LINE, linewidth=1.0)
     axes.annotate("", (x + 1.0, y - 0.2), (x + 0.2, y - 0.2), arrowprops=ARROW)
@@ -188,6 +203,23 @@ def _key(axes: Axes) -> None:
                                facecolor=colour, edgecolor=INK, linewidth=0.7)  # fmt: skip
         axes.add_patch(patch)
         axes.text(x + 1.25, low + 0.15, text, **style)
+
+
+def _kernel(axes: Axes) -> None:
+    """List the C files of the kernel, the highest layer first."""
+    left, right, y, step = 17.4, 24.7, -3.42, 0.235
+    style: dict[str, Any] = {"va": "top", "color": INK, "zorder": 5}
+    axes.text(left + 0.15, y - 0.12, "the C kernel: a file uses those after it and below", size=9.5,
+              **style)  # fmt: skip
+    low = y - 0.6
+    for folder, *names in kernel_layers():
+        rows = textwrap.wrap(", ".join(reversed(names)), 54)
+        axes.text(left + 0.15, low, folder, size=8.5, weight="bold", **style)
+        axes.text(left + 1.35, low, "\n".join(rows), size=7.2, linespacing=1.25, **style)
+        low -= step * len(rows) + 0.14
+    panel = FancyBboxPatch((left, low), right - left, y - low, facecolor=ORANGE, edgecolor=LINE,
+                           boxstyle="round,pad=0,rounding_size=0.12", linewidth=0.7)  # fmt: skip
+    axes.add_patch(panel)
 
 
 def main(arguments: Sequence[str]) -> int:
