@@ -18,7 +18,7 @@ from ..mechanics.contact_state import ContactMode, ContactState
 from ..mechanics.dynamics import Equations
 from .configuration import Configuration, Scales, contact_names
 from .front import Front
-from .rest import RestForces, rest_forces
+from .rest import RestForces, rest_forces, sticking
 
 FRICTIONLESS, STICK = ContactMode.FRICTIONLESS, ContactMode.STICK
 
@@ -297,10 +297,12 @@ def _modes_of(
     found = rest_forces(scales, front, equations, stops, slips, at_rest)
     if found is None:
         return None
-    for i, press in zip(stops, found.normal, strict=True):
-        if press > _least_pressing(scales, front, i):
-            contacts = contacts.held_with(i, modes[i] if i in rubbing else FRICTIONLESS)
-    contacts = _sticking_or_slipping(scales, front, contacts, at_rest, found, slipped)
+    pressed = [
+        k for k, i in enumerate(stops) if found.normal[k] > _least_pressing(scales, front, i)
+    ]
+    for i in (stops[k] for k in pressed):
+        contacts = contacts.held_with(i, modes[i] if i in rubbing else FRICTIONLESS)
+    contacts = _sticking_or_slipping(scales, contacts, at_rest, found, pressed, slipped)
     slack = dict(zip(at_rest, scales.zero_acceleration / found.mobility, strict=True))
     return contacts if _agrees(scales, front, contacts, every, slack) else None
 
@@ -353,10 +355,10 @@ def _mobile(front: Front, contacts: ContactState, contact: int) -> bool:
 
 def _sticking_or_slipping(
     scales: Scales,
-    front: Front,
     contacts: ContactState,
     at_rest: Sequence[int],
     found: RestForces,
+    pressed: Sequence[int],
     slipped: Collection[int | None],
 ) -> ContactState:
     """Return the modes, with those of contacts at rest chosen by their forces.
@@ -366,21 +368,24 @@ def _sticking_or_slipping(
     at their limits and one of them has slipped, they slip together.  A contact without a normal
     force has no friction in either direction of slip, and changes it as soon as it moves.
     """
-    slack, size = scales.zero_acceleration / found.mobility, np.abs(found.friction)
-    at_limit = size >= found.limit - slack
-    yields = at_limit & np.array([c in slipped for c in at_rest])
-    taken = contacts  # Sticking contacts, and those that have slipped in their place.
-    for j in np.argsort(np.where(at_limit, 3 - yields, size <= slack), kind="stable"):
-        c, force = at_rest[j], found.friction[j]
-        if not contacts.modes[c].closed:
-            continue
-        if abs(found.slide[j]) > scales.zero_acceleration:
-            taking = mode = ContactMode.slipping(found.slide[j])
+    zero = scales.zero_acceleration
+    slack, at_limit = zero / found.mobility, found.at_limit(zero)
+    closed = [contacts.modes[c].closed for c in at_rest]
+    moves, small = np.abs(found.slide) > zero, np.abs(found.friction) <= slack
+    leaving = [j for j, c in enumerate(at_rest) if c in slipped]
+    order = np.where(at_limit, 3, small)
+    order[leaving] = np.minimum(order[leaving], 2)
+    rests = [j for j in np.argsort(order, kind="stable").tolist() if closed[j] and not moves[j]]
+    sticks, force = sticking(found, pressed, rests, leaving, zero)
+    for j in np.flatnonzero(closed).tolist():
+        if moves[j]:
+            mode = ContactMode.slipping(found.slide[j])
+        elif j in sticks:
+            mode = STICK
         else:
-            yielding = ContactMode.slipping(-force) if at_limit[j] else FRICTIONLESS
-            taking = STICK if found.limit[j] > 0.0 and _mobile(front, taken, c) else yielding
-            mode = yielding if yields[j] else taking
-        contacts, taken = contacts.with_mode(c, mode), taken.with_mode(c, taking)
+            full = abs(force[j]) >= found.limit[j] - slack[j]
+            mode = ContactMode.slipping(-force[j]) if full else FRICTIONLESS
+        contacts = contacts.with_mode(at_rest[j], mode)
     return contacts
 
 

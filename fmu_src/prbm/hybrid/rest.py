@@ -5,10 +5,11 @@ to slip.  Such forces exist if no contact slides and no walls close in on the me
 friction of sliding contacts may exclude them (Painleve's paradox).
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.tolerances import COMPLEMENTARITY_RTOL, LIMIT_RTOL
 from ..mechanics.arrays import Real
@@ -31,15 +32,25 @@ class RestForces:
         Friction forces and their limits [N].
     slide : (m,)
         Accelerations of sliding [m/s^2].
-    mobility : (m,)
-        Accelerations of sliding by unit friction forces [1/kg].
+    W : (k + m, k + m)
+        Accelerations of the gaps, and of sliding, by unit forces [1/kg].
     """
 
     normal: Real
     friction: Real
     limit: Real
     slide: Real
-    mobility: Real
+    W: Real
+
+    @property
+    def mobility(self) -> Real:
+        """Accelerations of sliding by unit friction forces, (m,) [1/kg]."""
+        return self.W.diagonal()[len(self.normal) :]
+
+    def at_limit(self, zero: float) -> NDArray[np.bool_]:
+        """Return whether the friction forces reach their limits up to a round-off [m/s^2], (m,)."""
+        reached: NDArray[np.bool_] = np.abs(self.friction) >= self.limit - zero / self.mobility
+        return reached
 
 
 def rest_forces(
@@ -107,4 +118,87 @@ def rest_forces(
     own = normal[:, None] == np.arange(k)  # Friction of a stop.
     together = alone + ((W[:k, k:].T * P[k:, None]) * own).sum(axis=0)
     pressing = np.where(P[:k] > 0.0, np.maximum(alone, np.abs(together)), 0.0)
-    return RestForces(pressing, P[k:], limit, sliding, W.diagonal()[k:])
+    return RestForces(pressing, P[k:], limit, sliding, W)
+
+
+def sticking(
+    found: RestForces,
+    holding: Sequence[int],
+    candidates: Sequence[int],
+    slipped: Collection[int],
+    zero: float,
+) -> tuple[list[int], Real]:
+    """Return the contacts at rest that stick, independent of each other, and the friction forces.
+
+    A contact is dependent if its friction cannot accelerate it by more than round-off while stops
+    hold and contacts stick that came before: the split of the load among them is arbitrary.  Its
+    force is then passed on to them, until it is zero or one of them reaches its limit; that one
+    gives its place to the contact.  Contacts at their limits keep their forces.
+
+    Parameters
+    ----------
+    found : RestForces
+        Forces.
+    holding : sequence of int
+        Indices of the normal forces of stops that hold.
+    candidates : sequence of int
+        Indices of the friction forces of contacts that may stick, in the order of preference.
+    slipped : collection of int
+        Those which slip if they are at their limits.  If they are independent, they take the place
+        of a sticking contact nevertheless.
+    zero : float
+        Acceleration that is round-off [m/s^2].
+
+    Examples
+    --------
+    Two points on one block share the load of 3 N.  The limit of the first is reached; the second
+    takes its place, and the rest of the load.
+
+    >>> share = RestForces(np.zeros(0), np.array([1.0, 2.0]), np.array([1.5, 4.0]), np.zeros(2),
+    ...                    np.ones((2, 2)))
+    >>> sticks, forces = sticking(share, [], [0, 1], [], 1e-9)
+    >>> sticks, forces.tolist()
+    ([1], [1.5, 1.5])
+    """
+    k, A, force = len(found.normal), found.W.copy(), found.friction.copy()
+    sticks: list[int] = []
+    at_limit = found.at_limit(zero)
+    for i in holding:
+        _sweep(A, i)
+    for j in candidates:
+        if A[k + j, k + j] * found.limit[j] > zero:
+            _sweep(A, k + j)
+            sticks += [] if at_limit[j] and j in slipped else [j]
+        elif sticks and not at_limit[j]:
+            full = _pass_on(A[k:, k + j], force, found.limit, j, sticks)
+            if full is not None:
+                _sweep(A, k + full)
+                _sweep(A, k + j)
+                sticks[sticks.index(full)] = j
+    return sticks, force
+
+
+def _pass_on(shares: Real, force: Real, limit: Real, j: int, sticks: Sequence[int]) -> int | None:
+    """Pass on the force of contact j to sticking contacts, until it is zero or one is at its limit.
+
+    Return that contact, or None.  ``shares`` are the forces at the others by a unit force at j.
+    """
+    rooms = []
+    for other in sticks:
+        grows = shares[other] * force[j]
+        room = limit[other] - np.sign(grows) * force[other]
+        rooms.append(max(room, 0.0) / abs(grows) if grows else np.inf)
+    first = int(np.argmin(rooms))
+    part = min(1.0, rooms[first])
+    passed = part * force[j]
+    for other in sticks:
+        force[other] += shares[other] * passed
+    force[j] -= passed
+    return sticks[first] if part < 1.0 else None
+
+
+def _sweep(A: Real, p: int) -> None:
+    """Exchange force and acceleration p as given and unknown; twice is the identity."""
+    pivot, row, column = A[p, p], A[p].copy(), A[:, p].copy()
+    A -= np.outer(column, row / pivot)
+    A[p], A[:, p], A[p, p] = row / pivot, -column / pivot, 1.0 / pivot

@@ -149,6 +149,7 @@ static HoldingSet in_order(const Simulation *sim, int count, const int *candidat
  * only together, a subset with independent rows holds. */
 PRBM bool find_holding_stops(Simulation *sim, int count, const int *candidates, const double *q,
                              const double *v, HoldingSet *holding, Problem *problem) {
+    size_t mark = sim->scratch.used;
     HoldingSet every = in_order(sim, count, candidates, false), none = {0, {0}, true};
     ContactMode modes[CONTACTS_MAX];
     RestContacts rest;
@@ -165,7 +166,9 @@ PRBM bool find_holding_stops(Simulation *sim, int count, const int *candidates, 
         rest.slips[k] = slip_sign(modes[every.stops[k]]);
     }
     equations_holding(sim, &none, q, v);
-    if (!rest_forces(sim, q, v, &rest, &found, problem)) {
+    bool ok = rest_forces(sim, q, v, &rest, &found, problem);
+    sim->scratch.used = mark;
+    if (!ok) {
         return false;
     }
     for (int k = 0; found.solved && k < every.count; k++) {
@@ -239,36 +242,22 @@ static ContactMode turning_mode(const Simulation *sim, int contact, const Fricti
     return slides ? slipping_mode(event->rate) : CONTACT_FRICTIONLESS;
 }
 
-/* The friction of a contact at rest, in the order in which contacts begin to stick: below the limit,
- * none, at the limit if the contact has slipped and may not stick, at the limit. */
-typedef enum { BELOW_LIMIT, NO_FRICTION, SLIPPED, AT_LIMIT } FrictionLoad;
-
-static FrictionLoad load_of(const Simulation *sim, const RestForces *found, int j, bool slipped) {
-    double slack = zero_acceleration(&sim->configuration) / found->mobility[j];
-    double size = fabs(found->friction[j]);
-    if (size >= found->limit[j] - slack) {
-        return slipped ? SLIPPED : AT_LIMIT;
+/* List the contacts at rest that may stick: those with friction below its limit first, then those
+ * without friction, those that have slipped, and the others.  Return their number. */
+static int order_resting(const RestContacts *rest, const RestForces *found, double zero,
+                         const bool *leaves, const ContactMode *modes, int *order) {
+    enum { BELOW_LIMIT, NO_FRICTION, SLIPPED, AT_LIMIT };
+    int count = 0;
+    for (int turn = BELOW_LIMIT; turn <= AT_LIMIT; turn++) {
+        for (int j = 0; j < rest->count; j++) {
+            bool none = fabs(found->friction[j]) <= zero / found->mobility[j];
+            int full = leaves[j] ? SLIPPED : AT_LIMIT, free = none ? NO_FRICTION : BELOW_LIMIT;
+            order[count] = j;
+            count += (at_limit(found, j, zero) ? full : free) == turn &&
+                     modes[rest->contacts[j]] != CONTACT_OPEN && !(fabs(found->slide[j]) > zero);
+        }
     }
-    return size <= slack ? NO_FRICTION : BELOW_LIMIT;
-}
-
-/* Choose by its force whether a contact at rest begins to slip, sticks, has friction at its limit,
- * or is frictionless.  taken: the modes, in which contacts that have slipped stick. */
-static bool mode_of_forces(Simulation *sim, const RestForces *found, int j, int contact,
-                           FrictionLoad load, ContactMode *modes, ContactMode *taken,
-                           Problem *problem) {
-    bool mobile = false, at_limit = load >= SLIPPED;
-    if (fabs(found->slide[j]) > zero_acceleration(&sim->configuration)) {
-        modes[contact] = taken[contact] = slipping_mode(found->slide[j]);
-        return true;
-    }
-    if (found->limit[j] > 0.0 && !is_mobile(sim, contact, taken, &mobile, problem)) {
-        return false;
-    }
-    ContactMode yielding = at_limit ? slipping_mode(-found->friction[j]) : CONTACT_FRICTIONLESS;
-    taken[contact] = mobile ? CONTACT_STICK : yielding;
-    modes[contact] = load == SLIPPED ? yielding : taken[contact];
-    return true;
+    return count;
 }
 
 /* Choose the modes of contacts at rest by their forces.  If contacts can stick only together, those
@@ -276,23 +265,26 @@ static bool mode_of_forces(Simulation *sim, const RestForces *found, int j, int 
  * friction at its limit, or none.  If all of them are at their limits and one of them has slipped,
  * they slip together.  A contact without a normal force has no friction in either direction of slip,
  * and changes it as soon as it moves.  If yielding, no contact sticks at its limit. */
-static bool stick_or_slip(Simulation *sim, const RestContacts *rest, const RestForces *found,
-                          const FrictionEvent *event, bool yielding, ContactMode *modes,
-                          Problem *problem) {
-    ContactMode taken[CONTACTS_MAX];
-    bool ok = true;
-    memcpy(taken, modes, (size_t)contact_count(sim) * sizeof *modes);
-    for (int turn = BELOW_LIMIT; turn <= AT_LIMIT; turn++) {
-        for (int j = 0; ok && j < rest->count; j++) {
-            int contact = rest->contacts[j];
-            bool slipped = yielding || (event->slips && event->contact == contact);
-            FrictionLoad load = load_of(sim, found, j, slipped);
-            if (load == (FrictionLoad)turn && modes[contact] != CONTACT_OPEN) {
-                ok = mode_of_forces(sim, found, j, contact, load, modes, taken, problem);
-            }
+static void stick_or_slip(Simulation *sim, const RestContacts *rest, RestForces *found,
+                          const bool *holds, const FrictionEvent *event, bool yielding,
+                          ContactMode *modes) {
+    double zero = zero_acceleration(&sim->configuration);
+    bool sticks[CONTACTS_MAX], leaves[CONTACTS_MAX];
+    int order[CONTACTS_MAX];
+    for (int j = 0; j < rest->count; j++) {
+        leaves[j] = yielding || (event->slips && event->contact == rest->contacts[j]);
+    }
+    int count = order_resting(rest, found, zero, leaves, modes, order);
+    choose_sticking(rest, found, holds, count, order, leaves, zero, sticks, &sim->scratch);
+    for (int j = 0; j < rest->count; j++) {
+        ContactMode *mode = &modes[rest->contacts[j]];
+        ContactMode kept = at_limit(found, j, zero) ? slipping_mode(-found->friction[j])
+                                                    : CONTACT_FRICTIONLESS;
+        bool slides = fabs(found->slide[j]) > zero;
+        if (*mode != CONTACT_OPEN) {
+            *mode = slides ? slipping_mode(found->slide[j]) : sticks[j] ? CONTACT_STICK : kept;
         }
     }
-    return ok;
 }
 
 /* Whether a compliant stop is pressed and not free of force. */
@@ -367,12 +359,12 @@ static void set_sliding(const Simulation *sim, const ContactMode *sliding, Conta
 
 /* Close the stops whose force presses, and open the others. */
 static void hold_pressed(Simulation *sim, const RestContacts *rest, const RestForces *found,
-                         const ContactMode *sliding, ContactMode *modes) {
+                         const ContactMode *sliding, ContactMode *modes, bool *holds) {
     for (int k = 0; k < rest->stop_count; k++) {
         int i = rest->stops[k];
         ContactMode closed = friction_of(sim, i) > 0.0 ? sliding[i] : CONTACT_FRICTIONLESS;
-        bool pressed = found->normal[k] > least_pressing(sim, i, sim->state.front);
-        modes[i] = pressed ? closed : CONTACT_OPEN;
+        holds[k] = found->normal[k] > least_pressing(sim, i, sim->state.front);
+        modes[i] = holds[k] ? closed : CONTACT_OPEN;
     }
 }
 
@@ -392,8 +384,10 @@ static bool forces_at_rest(Simulation *sim, const RestContacts *rest, ContactMod
 static bool modes_by_forces(Simulation *sim, const HoldingSet *stops, const HoldingSet *touching,
                             const FrictionEvent *event, bool yielding, ContactMode *modes,
                             bool *agree, Problem *problem) {
+    size_t mark = sim->scratch.used;
     const double *q = sim->state.front, *v = q + system_of(sim)->n;
     ContactMode sliding[CONTACTS_MAX];
+    bool holds[STOPS_MAX];
     RestContacts rest;
     RestForces found;
     if (!find_rest(sim, stops, event, modes, &rest, sliding, problem)) {
@@ -404,18 +398,15 @@ static bool modes_by_forces(Simulation *sim, const HoldingSet *stops, const Hold
     if (*agree) {
         return true;
     }
-    if (!forces_at_rest(sim, &rest, modes, &found, problem)) {
-        return false;
+    bool ok = forces_at_rest(sim, &rest, modes, &found, problem);
+    if (ok && found.solved) {
+        hold_pressed(sim, &rest, &found, sliding, modes, holds);
+        stick_or_slip(sim, &rest, &found, holds, event, yielding, modes);
+        try_contacts(sim, modes);
+        ok = modes_agree(sim, q, v, touching, &rest, &found, agree, problem);
     }
-    if (!found.solved) {
-        return true;
-    }
-    hold_pressed(sim, &rest, &found, sliding, modes);
-    if (!stick_or_slip(sim, &rest, &found, event, yielding, modes, problem)) {
-        return false;
-    }
-    try_contacts(sim, modes);
-    return modes_agree(sim, q, v, touching, &rest, &found, agree, problem);
+    sim->scratch.used = mark;
+    return ok;
 }
 
 /* Choose the modes of all contacts with friction: first with the stops that hold if contacts at

@@ -92,13 +92,14 @@ static double accepted_violation(const Simulation *sim, int k, int m, const doub
 
 PRBM bool rest_forces(Simulation *sim, const double *q, const double *v,
                       const RestContacts *rest, RestForces *found, Problem *problem) {
-    size_t mark = sim->scratch.used;
     const System *system = system_of(sim);
     int n = system->n, k = rest->stop_count, m = rest->count, size = k + m;
+    double *W = found->W = take_matrix(&sim->scratch, size, size);
+    size_t mark = sim->scratch.used;
     ContactProblem *at = contact_problem_at(sim, q);
     double *rows = take_matrix(&sim->scratch, size, n);
     double *pushes = take_matrix(&sim->scratch, size, n);
-    double *X = take_matrix(&sim->scratch, n, size), *W = take_matrix(&sim->scratch, size, size);
+    double *X = take_matrix(&sim->scratch, n, size);
     double *u = take(&sim->scratch, (size_t)size), *P = take(&sim->scratch, (size_t)size);
     double *friction = take(&sim->scratch, (size_t)m), *fixed = take(&sim->scratch, (size_t)m);
     int *normal = take_integers(&sim->scratch, m);
@@ -132,4 +133,83 @@ PRBM bool rest_forces(Simulation *sim, const double *q, const double *v,
     }
     sim->scratch.used = mark;
     return ok;
+}
+
+/* --- contacts that stick ---------------------------------------------------------------------- */
+
+PRBM bool at_limit(const RestForces *found, int j, double zero) {
+    return fabs(found->friction[j]) >= found->limit[j] - zero / found->mobility[j];
+}
+
+/* Exchange force and acceleration p as given and unknown; twice is the identity. */
+static void sweep(int size, double *A, int p) {
+    double pivot = A[p * size + p];
+    for (int i = 0; i < size; i++) {
+        double factor = A[i * size + p] / pivot;
+        for (int j = 0; i != p && j < size; j++) {
+            A[i * size + j] -= j == p ? 0.0 : factor * A[p * size + j];
+        }
+    }
+    for (int i = 0; i < size; i++) {
+        A[i * size + p] = i == p ? 1.0 / pivot : -A[i * size + p] / pivot;
+        A[p * size + i] = i == p ? 1.0 / pivot : A[p * size + i] / pivot;
+    }
+}
+
+/* Pass on the force of contact j to sticking contacts, until it is zero or one is at its limit.
+ * Return that contact, or -1.  shares[i * stride]: the force at contact i by a unit force at j. */
+static int pass_on(int m, const double *shares, int stride, RestForces *found, int j,
+                   const bool *sticks) {
+    int full = -1;
+    double part = 1.0;
+    for (int i = 0; i < m; i++) {
+        double grows = shares[i * stride] * found->friction[j];
+        if (sticks[i] && grows != 0.0) {
+            double force = grows > 0.0 ? found->friction[i] : -found->friction[i];
+            double room = greater(found->limit[i] - force, 0.0) / fabs(grows);
+            full = room < part ? i : full;
+            part = lesser(room, part);
+        }
+    }
+    double passed = part * found->friction[j];
+    for (int i = 0; i < m; i++) {
+        found->friction[i] += sticks[i] ? shares[i * stride] * passed : 0.0;
+    }
+    found->friction[j] -= passed;
+    return full;
+}
+
+PRBM void choose_sticking(const RestContacts *rest, RestForces *found, const bool *holds, int count,
+                          const int *candidates, const bool *leaves, double zero, bool *sticks,
+                          Scratch *scratch) {
+    size_t mark = scratch->used;
+    int k = rest->stop_count, m = rest->count, size = k + m;
+    double *A = take_matrix(scratch, size, size);
+    bool limited[CONTACTS_MAX];
+    copy(size * size, found->W, A);
+    for (int i = 0; i < k; i++) {
+        if (holds[i]) {
+            sweep(size, A, i);
+        }
+    }
+    for (int j = 0; j < m; j++) {
+        limited[j] = at_limit(found, j, zero);
+        sticks[j] = false;
+    }
+    for (int c = 0; c < count; c++) {
+        int j = candidates[c], own = k + j;
+        if (A[own * size + own] * found->limit[j] > zero) {
+            sweep(size, A, own);
+            sticks[j] = !(limited[j] && leaves[j]);
+        } else if (!limited[j]) {
+            int full = pass_on(m, A + k * size + own, size, found, j, sticks);
+            if (full >= 0) {
+                sweep(size, A, k + full);
+                sweep(size, A, own);
+                sticks[full] = false;
+                sticks[j] = true;
+            }
+        }
+    }
+    scratch->used = mark;
 }

@@ -20,11 +20,26 @@ typedef struct {
     double normal[STOPS_MAX];
     double friction[CONTACTS_MAX], limit[CONTACTS_MAX], slide[CONTACTS_MAX];
     double mobility[CONTACTS_MAX];
+    double *W; /* (k + m, k + m) accelerations of gaps and of sliding by unit forces, in scratch */
 } RestForces;
 
 /* Compute the forces that satisfy the laws of all contacts; solved is false if there are none.  In
- * the trial equations all stops must be open, and friction points at rest without friction. */
+ * the trial equations all stops must be open, and friction points at rest without friction.  The
+ * caller releases found->W. */
 PRBM bool rest_forces(Simulation *sim, const double *q, const double *v,
                       const RestContacts *rest, RestForces *found, Problem *problem);
+
+/* Whether a friction force reaches its limit up to a round-off zero [m/s^2]. */
+PRBM bool at_limit(const RestForces *found, int j, double zero);
+/* Choose the contacts at rest that stick, independent of each other, see hybrid/rest.py, and change
+ * the friction forces accordingly.
+ *
+ * holds: the stops that hold, (k,)
+ * candidates: indices of contacts that may stick, in the order of preference
+ * leaves: those which slip if they are at their limits, (m,)
+ * sticks: the result, (m,) */
+PRBM void choose_sticking(const RestContacts *rest, RestForces *found, const bool *holds, int count,
+                          const int *candidates, const bool *leaves, double zero, bool *sticks,
+                          Scratch *scratch);
 
 #endif
