@@ -33,7 +33,7 @@ DURATIONS = {
     "micro": 6e-6, "qiu10": 1e-5, "rhombus": 4e-3, "shockpoint": 0.01, "timo": 3e-4,
     "williams": 2e-3,
 }  # fmt: skip
-SEEDS = [*range(4), *(pytest.param(k, marks=pytest.mark.slow) for k in range(4, 84))]
+SEEDS = [*range(4), *(pytest.param(k, marks=pytest.mark.slow) for k in range(4, 44))]
 each_change = pytest.mark.parametrize("factors", CHANGES)
 
 
@@ -94,7 +94,7 @@ def test_the_motion_of_a_random_mechanism_is_the_same_in_all_units(seed, monkeyp
 @pytest.mark.parametrize("path", sorted(CASES.glob("*.toml")), ids=lambda path: path.stem)
 def test_the_motion_of_a_public_case_is_the_same_in_all_units(path, monkeypatch):
     times = [DURATIONS[path.stem] * share for share in (0.0, 0.5, 1.0)]
-    for change in CHANGES:
+    for change in CHANGES[::2]:
         assert_same_motion(KernelSimulation, load(path), change.values[0], monkeypatch, times)
 
 
