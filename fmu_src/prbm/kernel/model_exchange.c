@@ -242,13 +242,13 @@ static double stop_drift(const Simulation *sim, const Instant *at, int i) {
  * event is above the errors of solvers at usual tolerances: an event restarts a solver, whose error
  * in its first steps is large. */
 static double drift(const Simulation *sim, const Instant *at) {
-    const Equations *q = &sim->equations;
+    const Equations *eq = &sim->equations;
     double most = 0.0;
-    for (int k = 0; k < q->held_count; k++) {
-        most = greater(most, stop_drift(sim, at, q->held[k]));
+    for (int k = 0; k < eq->held_count; k++) {
+        most = greater(most, stop_drift(sim, at, eq->held[k]));
     }
-    for (int k = q->first_stick; k < q->r; k++) {
-        most = greater(most, speed_drift(sim, row_rate(&q->active, k, at->e, at->v)));
+    for (int k = eq->first_stick; k < eq->r; k++) {
+        most = greater(most, speed_drift(sim, row_rate(&eq->active, k, at->e, at->v)));
     }
     return most;
 }

@@ -14,7 +14,7 @@
 
 /* Compute the changes of the arms from dq and dv. */
 static void move_arms(const Tangent *t) {
-    const System *system = t->q->system;
+    const System *system = t->eq->system;
     turning(system, t->dq, t->dphi);
     turning(system, t->dv, t->dw);
     for (int j = 0; j < system->d; j++) {
@@ -29,7 +29,7 @@ static void move_arms(const Tangent *t) {
 
 /* Compute the changes of the dependent coordinates from the loops, with the right side s. */
 static void solve_dependents(const Tangent *t, const Loops *loops, double *changes) {
-    int r = t->q->system->r;
+    int r = t->eq->system->r;
     lu_solve(r, loops->a, loops->pivot, loops->s);
     for (int k = 0; k < r; k++) {
         changes[loops->dependent[k]] = loops->s[k];
@@ -71,13 +71,13 @@ static bool tangent_coordinates(Tangent *t, const double *dx, Problem *problem) 
 
 /* Element i of the product H x, for x of the arms */
 static Complex through_mass(const Tangent *t, int i, const Complex *x) {
-    int d = t->q->system->d;
-    return along_arms(d, t->q->system->H + i * d, x);
+    int d = t->eq->system->d;
+    return along_arms(d, t->eq->system->H + i * d, x);
 }
 
 /* Compute the changes of the loads of the inputs on the arms: dw, and the moments dmoment. */
 static void load_row_change(const Tangent *t, Complex *dw, double *dmoment) {
-    const System *system = t->q->system;
+    const System *system = t->eq->system;
     const Mechanism *m = system->mechanism;
     const double *base = t->du + m->input.base;
     int d = system->d;
@@ -114,12 +114,12 @@ static Complex inertial_change(const Tangent *t, int j) {
 
 /* Compute the change of the loads on the arms: forces, moments, inertia, damping with the mass. */
 static void arm_load_change(const Tangent *t, const Complex *dw, const double *dmoment) {
-    const Equations *q = t->q;
-    for (int j = 0; j < q->system->d; j++) {
-        if (arm_of(q->system, j) == j) {
-            Complex load = plus(product(dw[j], t->e[j]), product(q->w[j], t->dE[j]));
-            load.re += dmoment[j] - q->mass_damping * q->system->J[j] * t->dw[j].re;
-            Complex lost = scaled(-q->mass_damping, momentum_change(t, j));
+    const Equations *eq = t->eq;
+    for (int j = 0; j < eq->system->d; j++) {
+        if (arm_of(eq->system, j) == j) {
+            Complex load = plus(product(dw[j], t->e[j]), product(eq->w[j], t->dE[j]));
+            load.re += dmoment[j] - eq->mass_damping * eq->system->J[j] * t->dw[j].re;
+            Complex lost = scaled(-eq->mass_damping, momentum_change(t, j));
             t->pull[j] = plus(plus(load, inertial_change(t, j)), lost);
         }
     }
@@ -127,27 +127,27 @@ static void arm_load_change(const Tangent *t, const Complex *dw, const double *d
 
 /* Add the change of the loads of the springs and their damping. */
 static void spring_change(const Tangent *t) {
-    const Equations *q = t->q;
-    const System *system = q->system;
+    const Equations *eq = t->eq;
+    const System *system = eq->system;
     int n = system->n;
     for (int i = 0; i < n; i++) {
         for (int j = 0; j < n; j++) {
-            t->dx[i] -= system->K[i * n + j] * (t->dq[j] + q->beta * t->dv[j]);
+            t->dx[i] -= system->K[i * n + j] * (t->dq[j] + eq->beta * t->dv[j]);
         }
     }
 }
 
 static void rub_change(const Tangent *t) {
-    const Equations *q = t->q;
+    const Equations *eq = t->eq;
     Scratch *scratch = &t->sim->scratch;
     size_t mark = scratch->used;
-    double *row = take(scratch, (size_t)q->system->n);
-    for (int k = q->slipping_stops; k < q->slipping_count; k++) {
-        int contact = q->slipping[k], i;
-        Rows rows = tangential_rows(q->system, contact, &i);
+    double *row = take(scratch, (size_t)eq->system->n);
+    for (int k = eq->slipping_stops; k < eq->slipping_count; k++) {
+        int contact = eq->slipping[k], i;
+        Rows rows = tangential_rows(eq->system, contact, &i);
         row_jacobian(&rows, i, t->e, row);
-        add_scaled(q->system->n, -sliding_sign(t, contact) * limit_change(t, contact), row, t->dx);
-        add_pull(t, &rows, i, slip_force(q, t->e, t->evaluation, contact));
+        add_scaled(eq->system->n, -sliding_sign(t, contact) * limit_change(t, contact), row, t->dx);
+        add_pull(t, &rows, i, slip_force(eq, t->e, t->evaluation, contact));
     }
     scratch->used = mark;
 }
@@ -155,22 +155,22 @@ static void rub_change(const Tangent *t) {
 /* Add the changes of the loads of lam along the active rows.  Set dlam to minus the changes of the
  * second time derivatives of these rows at constant accelerations. */
 static void row_change(const Tangent *t) {
-    const Equations *q = t->q;
-    Rows walls = slide_rows(q->system);
-    for (int k = 0; k < q->r; k++) {
-        add_pull(t, &q->active, k, t->lam[k]);
-        t->dlam[k] = -second_change(t, &q->active, k);
+    const Equations *eq = t->eq;
+    Rows walls = slide_rows(eq->system);
+    for (int k = 0; k < eq->r; k++) {
+        add_pull(t, &eq->active, k, t->lam[k]);
+        t->dlam[k] = -second_change(t, &eq->active, k);
     }
-    for (int k = 0; k < q->slipping_stops; k++) {
-        int i = q->slipping[k];
-        double share = -q->stop_friction[i] * sliding_sign(t, i);
-        add_pull(t, &walls, i, share * stop_force(q, t->lam, i));
+    for (int k = 0; k < eq->slipping_stops; k++) {
+        int i = eq->slipping[k];
+        double share = -eq->stop_friction[i] * sliding_sign(t, i);
+        add_pull(t, &walls, i, share * stop_force(eq, t->lam, i));
     }
 }
 
 /* Add the pull to the loads: its real part for an angle, its imaginary part for a stretch. */
 static void apply_pull(const Tangent *t) {
-    const System *system = t->q->system;
+    const System *system = t->eq->system;
     for (int j = 0; j < system->d; j++) {
         int a = arm_of(system, j);
         pull(system, j, a == j ? t->pull[j].re : t->pull[a].im, t->dx);
@@ -181,14 +181,14 @@ static void apply_pull(const Tangent *t) {
 
 static void point_changes(const Tangent *t, const BodyFrame *frame, Complex *moved,
                           Complex *speed) {
-    int d = t->q->system->d;
+    int d = t->eq->system->d;
     *moved = along_arms(d, frame->A, t->dE);
     *speed = times_i(along_arms(d, frame->A, t->dswing));
 }
 
 static void body_changes(const Tangent *t, double *out) {
-    for (int i = 0; i < t->q->system->b; i++) {
-        const BodyFrame *frame = &t->q->system->bodies[i];
+    for (int i = 0; i < t->eq->system->b; i++) {
+        const BodyFrame *frame = &t->eq->system->bodies[i];
         double *d = out + PER_BODY * i;
         Complex moved, speed;
         point_changes(t, frame, &moved, &speed);
@@ -205,7 +205,7 @@ static void probe_changes(const Tangent *t, double *out) {
     for (int i = 0; i < t->sim->configuration.mechanism->probe_count; i++) {
         double *d = out + PER_PROBE * i;
         Complex moved, speed;
-        point_changes(t, &t->q->system->probes[i], &moved, &speed);
+        point_changes(t, &t->eq->system->probes[i], &moved, &speed);
         d[PROBE_X] = moved.re;
         d[PROBE_Y] = moved.im;
         d[PROBE_VX] = speed.re;
@@ -226,35 +226,35 @@ static void link_changes(const Tangent *t, double *links, double *stretches_out)
 }
 
 static void stop_changes(const Tangent *t, double *out) {
-    for (int i = 0; i < t->q->system->s; i++) {
-        const double *wall = wall_inputs(t->q->system->mechanism, t->du, i);
+    for (int i = 0; i < t->eq->system->s; i++) {
+        const double *wall = wall_inputs(t->eq->system->mechanism, t->du, i);
         double *d = out + PER_STOP * i;
         d[STOP_GAP] = gap_change(t, i);
         d[STOP_GAP_RATE] = gap_rate_change(t, i);
         d[STOP_POINT_DISPLACEMENT] = wall[0] - d[STOP_GAP];
         d[STOP_POINT_VELOCITY] = wall[1] - d[STOP_GAP_RATE];
     }
-    for (int k = 0; k < t->q->held_count; k++) {
-        double change = t->dlam[t->q->first_hold + k];
-        out[PER_STOP * t->q->held[k] + STOP_FORCE] = change;
+    for (int k = 0; k < t->eq->held_count; k++) {
+        double change = t->dlam[t->eq->first_hold + k];
+        out[PER_STOP * t->eq->held[k] + STOP_FORCE] = change;
     }
 }
 
 /* Add the change of the accelerations to dbend. */
 static void bend_arms(const Tangent *t) {
     Complex *dalpha = t->pull; /* The pull has been applied: reuse its memory. */
-    turning(t->q->system, t->dx, dalpha);
-    for (int j = 0; j < t->q->system->d; j++) {
+    turning(t->eq->system, t->dx, dalpha);
+    for (int j = 0; j < t->eq->system->d; j++) {
         t->dbend[j] = plus(t->dbend[j], times_i(product(t->e[j], dalpha[j])));
     }
 }
 
 static void base_changes(const Tangent *t, double *out) {
-    const System *system = t->q->system;
+    const System *system = t->eq->system;
     const Mechanism *m = system->mechanism;
     int d = system->d;
-    const double *base = t->du + m->input.base, *given = t->q->inputs.forces;
-    Complex field = minus(system->gravity, t->q->inputs.base), force = {0.0, 0.0};
+    const double *base = t->du + m->input.base, *given = t->eq->inputs.forces;
+    Complex field = minus(system->gravity, t->eq->inputs.base), force = {0.0, 0.0};
     double moment = 0.0;
     for (int i = 0; i < system->p; i++) {
         const Complex *A = system->A + i * d;
@@ -285,15 +285,15 @@ static void base_changes(const Tangent *t, double *out) {
 /* Change of the kinetic energy, Re(d(E w)^H H (E w)), plus that of the rotary inertias J. */
 static double kinetic_change(const Tangent *t) {
     double sum = 0.0;
-    for (int i = 0; i < t->q->system->d; i++) {
+    for (int i = 0; i < t->eq->system->d; i++) {
         sum += product(conjugate(t->dswing[i]), through_mass(t, i, t->swing)).re;
-        sum += t->q->system->J[i] * t->w[i].re * t->dw[i].re;
+        sum += t->eq->system->J[i] * t->w[i].re * t->dw[i].re;
     }
     return sum;
 }
 
 static void energy_changes(const Tangent *t, const double *dx, double *out) {
-    const System *system = t->q->system;
+    const System *system = t->eq->system;
     int n = system->n, count = system->mechanism->independent_count;
     out[ENERGY_KINETIC] = kinetic_change(t);
     for (int i = 0; i < n; i++) {
@@ -311,7 +311,7 @@ static void energy_changes(const Tangent *t, const double *dx, double *out) {
 /* Return a copy of t whose coordinates have the constant rates x (n,). */
 static Tangent at_rates(const Tangent *t, const double *x) {
     Scratch *scratch = &t->sim->scratch;
-    int n = t->q->system->n, d = t->q->system->d;
+    int n = t->eq->system->n, d = t->eq->system->d;
     Tangent u = *t;
     Complex **arrays[] = {&u.w, &u.dw, &u.swing, &u.dswing};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) {
@@ -320,8 +320,8 @@ static Tangent at_rates(const Tangent *t, const double *x) {
     u.v = x;
     u.dv = take(scratch, (size_t)n);
     zeros(n, u.dv);
-    turning(t->q->system, x, u.w);
-    turning(t->q->system, u.dv, u.dw);
+    turning(t->eq->system, x, u.w);
+    turning(t->eq->system, u.dv, u.dw);
     for (int j = 0; j < d; j++) {
         Arm arm = arm_at(&u, j);
         u.swing[j] = product(arm.E, arm.w);
@@ -357,29 +357,29 @@ static bool mobility_change(const Tangent *t, int i, double *result, Problem *pr
 }
 
 static double dissipation_change(const Tangent *t) {
-    const Equations *q = t->q;
-    const System *system = q->system;
+    const Equations *eq = t->eq;
+    const System *system = eq->system;
     Rows walls = slide_rows(system);
     int n = system->n;
-    double sum = 2.0 * q->mass_damping * kinetic_change(t);
+    double sum = 2.0 * eq->mass_damping * kinetic_change(t);
     for (int i = 0; i < n; i++) {
         for (int j = 0; j < n; j++) {
-            sum += 2.0 * q->beta * t->v[i] * system->K[i * n + j] * t->dv[j];
+            sum += 2.0 * eq->beta * t->v[i] * system->K[i * n + j] * t->dv[j];
         }
     }
-    for (int k = q->slipping_stops; k < q->slipping_count; k++) {
-        int contact = q->slipping[k], i;
+    for (int k = eq->slipping_stops; k < eq->slipping_count; k++) {
+        int contact = eq->slipping[k], i;
         Rows rows = tangential_rows(system, contact, &i);
         double change = -sliding_sign(t, contact) * limit_change(t, contact);
         sum -= change * row_rate(&rows, i, t->e, t->v) +
-               slip_force(q, t->e, t->evaluation, contact) * rate_change(t, &rows, i);
+               slip_force(eq, t->e, t->evaluation, contact) * rate_change(t, &rows, i);
     }
-    for (int k = 0; k < q->pressed_count; k++) {
-        sum += contact_loss_change(t, q->pressed[k]);
+    for (int k = 0; k < eq->pressed_count; k++) {
+        sum += contact_loss_change(t, eq->pressed[k]);
     }
-    for (int k = 0; k < q->slipping_stops; k++) {
-        int i = q->slipping[k], h = q->first_hold + held_at(q, i);
-        sum += q->stop_friction[i] * sliding_sign(t, i) *
+    for (int k = 0; k < eq->slipping_stops; k++) {
+        int i = eq->slipping[k], h = eq->first_hold + held_at(eq, i);
+        sum += eq->stop_friction[i] * sliding_sign(t, i) *
                (t->dlam[h] * row_rate(&walls, i, t->e, t->v) +
                 t->lam[h] * rate_change(t, &walls, i));
     }
@@ -387,23 +387,23 @@ static double dissipation_change(const Tangent *t) {
 }
 
 static double power_change(const Tangent *t, const Complex *dw, const double *dmoment) {
-    const Equations *q = t->q;
-    const System *system = q->system;
+    const Equations *eq = t->eq;
+    const System *system = eq->system;
     int d = system->d;
-    double sum = along_arms(d, dw, t->swing).re + along_arms(d, q->w_input, t->dswing).re;
+    double sum = along_arms(d, dw, t->swing).re + along_arms(d, eq->w_input, t->dswing).re;
     for (int j = 0; j < d; j++) {
-        sum += dmoment[j] * t->w[j].re + q->moment[j] * t->dw[j].re;
+        sum += dmoment[j] * t->w[j].re + eq->moment[j] * t->dw[j].re;
     }
-    for (int k = 0; k < q->held_count; k++) {
-        int i = q->held[k], h = q->first_hold + k;
+    for (int k = 0; k < eq->held_count; k++) {
+        int i = eq->held[k], h = eq->first_hold + k;
         double velocity = wall_inputs(system->mechanism, t->du, i)[1];
-        double w = wall_motion(&q->inputs.walls[i], t->at->time).v;
+        double w = wall_motion(&eq->inputs.walls[i], t->at->time).v;
         sum -= t->dlam[h] * w + t->lam[h] * velocity;
     }
-    for (int k = 0; k < q->pressed_count; k++) {
-        int i = q->pressed[k];
+    for (int k = 0; k < eq->pressed_count; k++) {
+        int i = eq->pressed[k];
         double velocity = wall_inputs(system->mechanism, t->du, i)[1];
-        double w = wall_motion(&q->inputs.walls[i], t->at->time).v;
+        double w = wall_motion(&eq->inputs.walls[i], t->at->time).v;
         sum -= t->dpressure[i] * w + t->evaluation->pressure[i] * velocity;
     }
     return sum;
@@ -442,7 +442,7 @@ static Tangent begin_tangent(Simulation *sim, const Moment *now, const double *d
     Complex **arrays[] = {&t.w, &t.alpha, &t.dphi, &t.dw, &t.dE,
                           &t.swing, &t.dswing, &t.bend, &t.dbend, &t.pull};
     t.sim = sim;
-    t.q = &sim->equations;
+    t.eq = &sim->equations;
     t.e = at->at.e;
     t.factors = &at->factors;
     t.evaluation = at;
@@ -458,7 +458,7 @@ static Tangent begin_tangent(Simulation *sim, const Moment *now, const double *d
     t.dq = take(scratch, (size_t)n);
     t.dv = take(scratch, (size_t)n);
     t.dx = take(scratch, (size_t)system->even);
-    t.dlam = take(scratch, (size_t)t.q->r);
+    t.dlam = take(scratch, (size_t)t.eq->r);
     t.dpressure = take(scratch, (size_t)system->s);
     zeros(system->even, t.dx);
     memset(t.pull, 0, (size_t)d * sizeof *t.pull);

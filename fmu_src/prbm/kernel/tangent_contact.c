@@ -10,18 +10,18 @@ typedef struct {
 
 static Indentation indentation_at(const Tangent *t, int stop) {
     const Instant *at = t->at;
-    Indentation result = {-gap(t->q, stop, at->time, t->e, at->extra),
-                 -gap_rate(t->q, stop, at->time, t->e, t->v, at->extra), -gap_change(t, stop),
+    Indentation result = {-gap(t->eq, stop, at->time, t->e, at->extra),
+                 -gap_rate(t->eq, stop, at->time, t->e, t->v, at->extra), -gap_change(t, stop),
                  -gap_rate_change(t, stop)};
     return result;
 }
 
 static const Touching *touching_at(const Tangent *t, int stop) {
-    return &t->q->contacts.touching[stop];
+    return &t->eq->contacts.touching[stop];
 }
 
 static double pressure_change(const Tangent *t, int stop) {
-    const ComplianceLaw *law = &t->q->laws[stop];
+    const ComplianceLaw *law = &t->eq->laws[stop];
     const Touching *touching = touching_at(t, stop);
     Indentation x = indentation_at(t, stop);
     if (touching->phase == PHASE_FREE) {
@@ -32,16 +32,16 @@ static double pressure_change(const Tangent *t, int stop) {
 }
 
 PRBM void pressure_changes(const Tangent *t) {
-    const Equations *q = t->q;
+    const Equations *eq = t->eq;
     Scratch *scratch = &t->sim->scratch;
     size_t mark = scratch->used;
-    double *row = take(scratch, (size_t)q->system->n);
-    Rows gaps = gap_rows(q->system);
-    for (int k = 0; k < q->pressed_count; k++) {
-        int i = q->pressed[k];
+    double *row = take(scratch, (size_t)eq->system->n);
+    Rows gaps = gap_rows(eq->system);
+    for (int k = 0; k < eq->pressed_count; k++) {
+        int i = eq->pressed[k];
         t->dpressure[i] = pressure_change(t, i);
         row_jacobian(&gaps, i, t->e, row);
-        add_scaled(q->system->n, t->dpressure[i], row, t->dx);
+        add_scaled(eq->system->n, t->dpressure[i], row, t->dx);
         add_pull(t, &gaps, i, t->evaluation->pressure[i]);
     }
     scratch->used = mark;
@@ -51,11 +51,11 @@ PRBM double stop_force_change(const Tangent *t, int stop) {
     if (is_pressed(touching_at(t, stop))) {
         return t->dpressure[stop];
     }
-    return is_held(&t->q->contacts, stop) ? stop_force(t->q, t->dlam, stop) : 0.0;
+    return is_held(&t->eq->contacts, stop) ? stop_force(t->eq, t->dlam, stop) : 0.0;
 }
 
 PRBM double contact_loss_change(const Tangent *t, int stop) {
-    const ComplianceLaw *law = &t->q->laws[stop];
+    const ComplianceLaw *law = &t->eq->laws[stop];
     Indentation x = indentation_at(t, stop);
     double damping = t->evaluation->pressure[stop] - elastic_force(law, x.d);
     return (t->dpressure[stop] - contact_stiffness(law, x.d) * x.dd) * x.rate + damping * x.drate;
@@ -63,17 +63,17 @@ PRBM double contact_loss_change(const Tangent *t, int stop) {
 
 PRBM double contact_energy_change(const Tangent *t) {
     double sum = 0.0;
-    for (int i = 0; i < t->q->system->s; i++) {
+    for (int i = 0; i < t->eq->system->s; i++) {
         if (touching_at(t, i)->phase != PHASE_NONE) {
             Indentation x = indentation_at(t, i);
-            sum += elastic_force(&t->q->laws[i], x.d) * x.dd;
+            sum += elastic_force(&t->eq->laws[i], x.d) * x.dd;
         }
     }
     return sum;
 }
 
 PRBM void contact_changes(const Tangent *t, const double *dx, double *out) {
-    const Mechanism *m = t->q->system->mechanism;
+    const Mechanism *m = t->eq->system->mechanism;
     int first = 2 * m->independent_count + 2;
     double *rates = out + m->slots.derivatives + m->independent_count + 2;
     for (int i = 0; i < m->stop_count; i++) {
@@ -86,8 +86,8 @@ PRBM void contact_changes(const Tangent *t, const double *dx, double *out) {
             rates[k + 1] = pressed ? contact_loss_change(t, i) : 0.0;
         }
     }
-    for (int k = 0; k < t->q->pressed_count; k++) {
-        int i = t->q->pressed[k];
+    for (int k = 0; k < t->eq->pressed_count; k++) {
+        int i = t->eq->pressed[k];
         out[m->slots.stops + PER_STOP * i + STOP_FORCE] = t->dpressure[i];
     }
 }
@@ -101,21 +101,21 @@ PRBM double separation_indicator_change(const Tangent *t, int stop) {
 
 /* Change of the second derivative of the indentation. */
 static double bend_change_of(const Tangent *t, int stop) {
-    const System *system = t->q->system;
+    const System *system = t->eq->system;
     Scratch *scratch = &t->sim->scratch;
     size_t mark = scratch->used;
     double *row = take(scratch, (size_t)system->n);
     Rows gaps = gap_rows(system);
     row_jacobian(&gaps, stop, t->e, row);
     double change = dot(system->n, row, t->dx) + second_change(t, &gaps, stop) +
-                    t->q->inputs.mobilities[stop] * t->dpressure[stop];
+                    t->eq->inputs.mobilities[stop] * t->dpressure[stop];
     scratch->used = mark;
     return -change;
 }
 
 PRBM double switch_indicator_change(const Tangent *t, int stop) {
     const Scales *scales = &t->sim->configuration.scales;
-    const ComplianceLaw *law = &t->q->laws[stop];
+    const ComplianceLaw *law = &t->eq->laws[stop];
     const Touching *touching = touching_at(t, stop);
     Indentation x = indentation_at(t, stop);
     double slope = damping_slope(law, touching), ratio = damping_ratio(law, touching, x.rate);

@@ -13,19 +13,19 @@ static double sign_times(double x, double change) {
 
 static double impact_indicator_change(const Tangent *t, int i) {
     const Scales *scales = &t->sim->configuration.scales;
-    bool opens = gap_rate(t->q, i, t->at->time, t->e, t->v, t->at->extra) > 0.0;
+    bool opens = gap_rate(t->eq, i, t->at->time, t->e, t->v, t->at->extra) > 0.0;
     double ahead = opens ? INDICATOR_LEAD_RTOL * scales->time * gap_rate_change(t, i) : 0.0;
     return (gap_change(t, i) + ahead) / scales->length;
 }
 
 /* Change of the force of a held stop, or of the margin of a settled one. */
 static double margin_change(const Tangent *t, int i) {
-    const Touching *touching = &t->q->contacts.touching[i];
-    double change = stop_force(t->q, t->dlam, i);
+    const Touching *touching = &t->eq->contacts.touching[i];
+    double change = stop_force(t->eq, t->dlam, i);
     if (touching->phase != PHASE_SETTLED) {
         return change;
     }
-    double off = stop_force(t->q, t->lam, i) - elastic_force(&t->q->laws[i], touching->depth);
+    double off = stop_force(t->eq, t->lam, i) - elastic_force(&t->eq->laws[i], touching->depth);
     return -sign_times(off, change);
 }
 
@@ -39,11 +39,11 @@ static double release_indicator_change(const Tangent *t, int i) {
 }
 
 static double slip_indicator_change(const Tangent *t, int contact) {
-    const Equations *q = t->q;
-    int row = q->first_stick + place_in(q->sticking, contact);
+    const Equations *eq = t->eq;
+    int row = eq->first_stick + place_in(eq->sticking, contact);
     double friction = sign_times(t->lam[row], t->dlam[row]), limit;
-    if (is_stop(q->system, contact) && is_held(&q->contacts, contact)) {
-        limit = q->stop_friction[contact] * stop_force(q, t->dlam, contact);
+    if (is_stop(eq->system, contact) && is_held(&eq->contacts, contact)) {
+        limit = eq->stop_friction[contact] * stop_force(eq, t->dlam, contact);
     } else {
         limit = limit_change(t, contact);
     }
@@ -53,7 +53,7 @@ static double slip_indicator_change(const Tangent *t, int contact) {
 
 static double reversal_indicator_change(const Tangent *t, int contact) {
     int i;
-    Rows rows = tangential_rows(t->q->system, contact, &i);
+    Rows rows = tangential_rows(t->eq->system, contact, &i);
     return sliding_sign(t, contact) * rate_change(t, &rows, i) /
            guard_scale(t->sim, EVENT_REVERSAL);
 }
@@ -72,7 +72,7 @@ static double indicator_change(const Tangent *t, EventKind kind, int contact) {
 PRBM void indicator_changes(const Tangent *t, double *out) {
     for (EventKind kind = EVENT_NONE + 1; kind < EVENT_KINDS; kind++) {
         for (int contact = 0; contact < contact_count(t->sim); contact++) {
-            if (transition(kind)->watched(t->q, contact)) {
+            if (transition(kind)->watched(t->eq, contact)) {
                 out[indicator_place(t->sim, kind, contact)] = indicator_change(t, kind, contact);
             }
         }

@@ -91,33 +91,33 @@ PRBM void add_pull(const Tangent *t, const Rows *rows, int i, double force) {
 }
 
 static double lift_change(const Tangent *t, int i) {
-    const System *system = t->q->system;
+    const System *system = t->eq->system;
     Rows lifts = plain_rows(system, system->f, system->lifts, system->lifts_c);
     return value_change(t, &lifts, i);
 }
 
 PRBM double limit_change(const Tangent *t, int contact) {
-    if (is_stop(t->q->system, contact)) {
+    if (is_stop(t->eq->system, contact)) {
         bool presses = t->evaluation->pressure[contact] > 0.0;
-        return presses ? t->q->stop_friction[contact] * t->dpressure[contact] : 0.0;
+        return presses ? t->eq->stop_friction[contact] * t->dpressure[contact] : 0.0;
     }
-    int i = contact - t->q->system->s;
-    const double *law = t->q->rub_law + 3 * i;
-    return rub_limit(t->q, i, t->e) > 0.0 ? law[0] * law[2] * lift_change(t, i) : 0.0;
+    int i = contact - t->eq->system->s;
+    const double *law = t->eq->rub_law + 3 * i;
+    return rub_limit(t->eq, i, t->e) > 0.0 ? law[0] * law[2] * lift_change(t, i) : 0.0;
 }
 
 PRBM int sliding_sign(const Tangent *t, int contact) {
-    return slip_sign(t->q->contacts.modes[contact]);
+    return slip_sign(t->eq->contacts.modes[contact]);
 }
 
 PRBM double gap_change(const Tangent *t, int i) {
-    const System *system = t->q->system;
+    const System *system = t->eq->system;
     Rows gaps = gap_rows(system);
     return value_change(t, &gaps, i) + wall_inputs(system->mechanism, t->du, i)[0];
 }
 
 PRBM double gap_rate_change(const Tangent *t, int i) {
-    const System *system = t->q->system;
+    const System *system = t->eq->system;
     Rows gaps = gap_rows(system);
     return rate_change(t, &gaps, i) + wall_inputs(system->mechanism, t->du, i)[1];
 }

@@ -8,7 +8,7 @@
  * exp(s + i theta) is dE = i E dphi with dphi = dtheta - i ds; dw is the change of its rate w. */
 typedef struct {
     Simulation *sim;
-    const Equations *q;
+    const Equations *eq;
     const Complex *e;
     const Factors *factors;
     const Evaluation *evaluation;

@@ -8,13 +8,13 @@
 
 /* Compute the changes of the loads of all mass points. */
 static void load_changes(const Tangent *t, Complex *loads) {
-    const System *system = t->q->system;
+    const System *system = t->eq->system;
     size_t mark = t->sim->scratch.used;
     int d = system->d;
     const double *base = t->du + system->mechanism->input.base;
     Complex *bend = take_complex(&t->sim->scratch, d, 1);
     for (int j = 0; j < d; j++) {
-        Complex rate = scaled(t->q->mass_damping, t->dswing[j]);
+        Complex rate = scaled(t->eq->mass_damping, t->dswing[j]);
         bend[j] = plus(t->dbend[j], complex_of(-rate.im, rate.re));
     }
     for (int i = 0; i < system->p; i++) {
@@ -30,18 +30,18 @@ static void add_change(Complex *on, int body, Complex change) {
 
 /* Add the changes of the forces of closed stops. */
 static void stop_pull_changes(const Tangent *t, Complex *on) {
-    const Equations *q = t->q;
-    const System *system = q->system;
-    for (int k = 0; k < q->held_count + q->pressed_count; k++) {
-        bool held = k < q->held_count;
-        int i = held ? q->held[k] : q->pressed[k - q->held_count], carrier = system->on[i];
+    const Equations *eq = t->eq;
+    const System *system = eq->system;
+    for (int k = 0; k < eq->held_count + eq->pressed_count; k++) {
+        bool held = k < eq->held_count;
+        int i = held ? eq->held[k] : eq->pressed[k - eq->held_count], carrier = system->on[i];
         const Stop *stop = &system->mechanism->stops[i];
-        bool sticks = q->contacts.modes[i] == CONTACT_STICK;
-        double force = held ? stop_force(q, t->lam, i) : t->evaluation->pressure[i];
+        bool sticks = eq->contacts.modes[i] == CONTACT_STICK;
+        double force = held ? stop_force(eq, t->lam, i) : t->evaluation->pressure[i];
         double dforce = stop_force_change(t, i);
-        double dlimit = held ? q->stop_friction[i] * dforce : limit_change(t, i);
-        double along = sticks ? stick_force(q, t->lam, i) : slip_force(q, t->e, t->evaluation, i);
-        double dalong = sticks ? stick_force(q, t->dlam, i) : -sliding_sign(t, i) * dlimit;
+        double dlimit = held ? eq->stop_friction[i] * dforce : limit_change(t, i);
+        double along = sticks ? stick_force(eq, t->lam, i) : slip_force(eq, t->e, t->evaluation, i);
+        double dalong = sticks ? stick_force(eq, t->dlam, i) : -sliding_sign(t, i) * dlimit;
         Complex change = complex_of(-dforce, dalong);
         if (carrier != FIXED) {
             change = plus(product(t->e[carrier], change),
@@ -55,13 +55,13 @@ static void stop_pull_changes(const Tangent *t, Complex *on) {
 
 /* Add the changes of the forces of friction points and of the inputs. */
 static void pull_changes(const Tangent *t, Complex *on) {
-    const Equations *q = t->q;
-    const System *system = q->system;
+    const Equations *eq = t->eq;
+    const System *system = eq->system;
     const Mechanism *m = system->mechanism;
     for (int i = 0; i < system->f; i++) {
         int contact = system->s + i;
-        bool sticks = q->contacts.modes[contact] == CONTACT_STICK;
-        double size = sticks ? stick_force(q, t->dlam, contact)
+        bool sticks = eq->contacts.modes[contact] == CONTACT_STICK;
+        double size = sticks ? stick_force(eq, t->dlam, contact)
                              : -sliding_sign(t, contact) * limit_change(t, contact);
         Complex change = scaled(size, unit(m->frictions[i].direction));
         add_change(on, m->frictions[i].body, change);
@@ -75,14 +75,14 @@ static void pull_changes(const Tangent *t, Complex *on) {
 
 /* Compute the change of the state at which sections are loaded, in working memory. */
 static SectionState state_change(const Tangent *t) {
-    const System *system = t->q->system;
+    const System *system = t->eq->system;
     Scratch *scratch = &t->sim->scratch;
     double *strained = take(scratch, (size_t)system->n);
     SectionState change = {t->dE, t->dq, strained, take_complex(scratch, system->p, 1),
                            take_complex(scratch, system->b + 1, 1),
                            take_complex(scratch, system->mechanism->flexure_count, 1)};
     for (int j = 0; j < system->n; j++) {
-        strained[j] = t->dq[j] + t->q->beta * t->dv[j];
+        strained[j] = t->dq[j] + t->eq->beta * t->dv[j];
     }
     load_changes(t, change.loads);
     change.on[GROUND] = complex_of(0.0, 0.0);
@@ -98,7 +98,7 @@ static SectionState state_change(const Tangent *t) {
 /* Compute the changes of the stress of a flexure. */
 static void flexure_changes(const Tangent *t, const FreeBody *body, const SectionState *at,
                             const SectionState *change, double *out) {
-    const System *system = t->q->system;
+    const System *system = t->eq->system;
     Scratch *scratch = &t->sim->scratch;
     size_t mark = scratch->used, m = (size_t)body->sections;
     double *left = take(scratch, m), *right = take(scratch, m);
@@ -115,14 +115,14 @@ static void flexure_changes(const Tangent *t, const FreeBody *body, const Sectio
 }
 
 PRBM void stress_changes(const Tangent *t, double *out) {
-    const System *system = t->q->system;
+    const System *system = t->eq->system;
     const Mechanism *m = system->mechanism;
     Scratch *scratch = &t->sim->scratch;
     size_t mark = scratch->used;
     if (m->stressed_count == 0) {
         return;
     }
-    SectionState at = section_state(t->q, t->e, t->y, t->v, t->evaluation, scratch);
+    SectionState at = section_state(t->eq, t->e, t->y, t->v, t->evaluation, scratch);
     SectionState change = state_change(t);
     for (int i = 0, k = 0; i < m->flexure_count; i++) {
         if (has_stress(m, i)) {

@@ -4,63 +4,63 @@
 #include "core/vectors.h"
 
 /* The power that friction dissipates. */
-static double rubbing_power(const Equations *q, const Evaluation *at, const double *v) {
+static double rubbing_power(const Equations *eq, const Evaluation *at, const double *v) {
     double power = 0.0;
-    for (int k = 0; k < q->slipping_count; k++) {
-        double speed = sliding_velocity(q->system, q->slipping[k], at->at.e, v);
-        power -= slip_force(q, at->at.e, at, q->slipping[k]) * speed;
+    for (int k = 0; k < eq->slipping_count; k++) {
+        double speed = sliding_velocity(eq->system, eq->slipping[k], at->at.e, v);
+        power -= slip_force(eq, at->at.e, at, eq->slipping[k]) * speed;
     }
     return power;
 }
 
 /* The power of the inputs and of the moving walls of closed stops. */
-static double input_power(const Equations *q, const Evaluation *at, const double *v) {
-    const System *system = q->system;
+static double input_power(const Equations *eq, const Evaluation *at, const double *v) {
+    const System *system = eq->system;
     double power = 0.0;
     for (int j = 0; j < system->d; j++) {
-        double load = product(q->w_input[j], at->at.e[j]).re + q->moment[j];
+        double load = product(eq->w_input[j], at->at.e[j]).re + eq->moment[j];
         power += load * direction_of(system, v, j);
     }
-    for (int k = 0; k < q->held_count; k++) {
-        double velocity = wall_motion(&q->inputs.walls[q->held[k]], at->at.time).v;
-        power -= at->lam[q->first_hold + k] * velocity;
+    for (int k = 0; k < eq->held_count; k++) {
+        double velocity = wall_motion(&eq->inputs.walls[eq->held[k]], at->at.time).v;
+        power -= at->lam[eq->first_hold + k] * velocity;
     }
     return power;
 }
 
 /* Compute the rates of the states of compliant stops.  Add the losses and the work of the walls to
  * the rates of the energies.  The walls of settled stops do not give way. */
-RARE void compliant_rates(const Equations *q, const Evaluation *at, double *dy) {
-    const Mechanism *m = q->system->mechanism;
-    double *energies = dy + 2 * q->system->n;
+RARE void compliant_rates(const Equations *eq, const Evaluation *at, double *dy) {
+    const Mechanism *m = eq->system->mechanism;
+    double *energies = dy + 2 * eq->system->n;
     for (int i = 0; i < m->stop_count; i++) {
         if (!m->stops[i].compliant) {
             continue;
         }
-        bool pressed = is_pressed(&q->contacts.touching[i]);
+        bool pressed = is_pressed(&eq->contacts.touching[i]);
         const double *now = at->at.extra + m->stops[i].extra;
         double *rates = energies + 2 + m->stops[i].extra;
         double force = pressed ? at->pressure[i]
-                       : is_held(&q->contacts, i) ? stop_force(q, at->lam, i)
+                       : is_held(&eq->contacts, i) ? stop_force(eq, at->lam, i)
                                                   : 0.0;
         rates[EXTRA_GIVE] = now[EXTRA_GIVE_RATE];
-        rates[EXTRA_GIVE_RATE] = pressed ? q->inputs.mobilities[i] * force : 0.0;
+        rates[EXTRA_GIVE_RATE] = pressed ? eq->inputs.mobilities[i] * force : 0.0;
         rates[EXTRA_IMPULSE] = force;
         rates[EXTRA_LOSS] = pressed ? at->contact_loss[i] : 0.0;
         if (pressed) {
-            double velocity = wall_motion(&q->inputs.walls[i], at->at.time).v;
+            double velocity = wall_motion(&eq->inputs.walls[i], at->at.time).v;
             energies[0] += at->contact_loss[i];
             energies[1] -= force * (velocity + now[EXTRA_GIVE_RATE]);
         }
     }
 }
 
-SIZED bool rates_of_length(int even, const Equations *q, const double *y, const Reference *near,
+SIZED bool rates_of_length(int even, const Equations *eq, const double *y, const Reference *near,
                            Evaluation *result, double *dy) {
-    int n = q->system->n;
+    int n = eq->system->n;
     pad_of(even, n, y, result->at.angle);
     pad_second(even, n, y, result->at.speed);
-    if (!motion_of_length(even, q, near, result)) {
+    if (!motion_of_length(even, eq, near, result)) {
         return false;
     }
     join(even, n, result->at.speed, result->a, dy);
@@ -68,43 +68,43 @@ SIZED bool rates_of_length(int even, const Equations *q, const double *y, const 
 }
 
 /* The code for the vector lengths of the guides is compiled separately, so that loops unroll. */
-static bool rates_of_motion(const Equations *q, const double *y, const Reference *near,
+static bool rates_of_motion(const Equations *eq, const double *y, const Reference *near,
                             Evaluation *result, double *dy) {
-    int even = q->system->even;
+    int even = eq->system->even;
     switch (even) {
-    case 4: return rates_of_length(4, q, y, near, result, dy);
-    case 8: return rates_of_length(8, q, y, near, result, dy);
-    default: return rates_of_length(even, q, y, near, result, dy);
+    case 4: return rates_of_length(4, eq, y, near, result, dy);
+    case 8: return rates_of_length(8, eq, y, near, result, dy);
+    default: return rates_of_length(even, eq, y, near, result, dy);
     }
 }
 
 /* Add to the rates of the energies all but the losses of the springs, and compute the rates of the
  * states of compliant stops. */
-static void add_powers(const Equations *q, const Evaluation *result, const double *v, double *dy) {
-    int n = q->system->n;
-    if (q->mass_damping != 0.0) {
-        dy[2 * n] += 2.0 * q->mass_damping * kinetic_energy_of(q, result);
+static void add_powers(const Equations *eq, const Evaluation *result, const double *v, double *dy) {
+    int n = eq->system->n;
+    if (eq->mass_damping != 0.0) {
+        dy[2 * n] += 2.0 * eq->mass_damping * kinetic_energy_of(eq, result);
     }
-    if (q->slipping_count > 0) {
-        dy[2 * n] += rubbing_power(q, result, v);
+    if (eq->slipping_count > 0) {
+        dy[2 * n] += rubbing_power(eq, result, v);
     }
-    if (q->driven) {
-        dy[2 * n + 1] = input_power(q, result, v);
-        compliant_rates(q, result, dy);
+    if (eq->driven) {
+        dy[2 * n + 1] = input_power(eq, result, v);
+        compliant_rates(eq, result, dy);
     }
 }
 
 PRBM bool rate_at_time(const Equations *equations, const double *y, const Reference *near,
                        Evaluation *result, double *dy, Problem *problem) {
-    const Equations *q = equations;
-    int n = q->system->n;
-    if (!rates_of_motion(q, y, near, result, dy)) {
+    const Equations *eq = equations;
+    int n = eq->system->n;
+    if (!rates_of_motion(eq, y, near, result, dy)) {
         return fail(problem, "%s", SINGULAR);
     }
     dy[2 * n] = result->spring_loss;
     dy[2 * n + 1] = 0.0;
-    if (q->more_powers) {
-        add_powers(q, result, y + n, dy);
+    if (eq->more_powers) {
+        add_powers(eq, result, y + n, dy);
     }
     return true;
 }

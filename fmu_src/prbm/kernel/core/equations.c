@@ -38,85 +38,85 @@ PRBM void equations_place(Equations *equations, const System *system, Memory *me
 /* --- contacts --------------------------------------------------------------------------------- */
 
 /* Append row i of some rows to the active rows, with the constant c. */
-static void add_row(Equations *q, const Rows *rows, int i, double c) {
-    int d = q->system->d, on = seen_from(rows, i);
-    memcpy(q->B + q->r * d, rows->B + i * d, (size_t)d * sizeof *rows->B);
-    q->c[q->r] = c;
-    q->on[q->r] = on;
+static void add_row(Equations *eq, const Rows *rows, int i, double c) {
+    int d = eq->system->d, on = seen_from(rows, i);
+    memcpy(eq->B + eq->r * d, rows->B + i * d, (size_t)d * sizeof *rows->B);
+    eq->c[eq->r] = c;
+    eq->on[eq->r] = on;
     if (on != FIXED) {
-        q->z[q->r] = rows->z[i];
-        q->carried[q->carried_count++] = q->r;
+        eq->z[eq->r] = rows->z[i];
+        eq->carried[eq->carried_count++] = eq->r;
     }
-    q->r++;
+    eq->r++;
 }
 
-PRBM double friction_coefficient(const Equations *q, int contact) {
-    return is_stop(q->system, contact) ? q->stop_friction[contact]
-                                       : q->rub_law[3 * (contact - q->system->s)];
+PRBM double friction_coefficient(const Equations *eq, int contact) {
+    return is_stop(eq->system, contact) ? eq->stop_friction[contact]
+                                       : eq->rub_law[3 * (contact - eq->system->s)];
 }
 
 /* List the contacts that slip: held stops, then pressed stops and friction points. */
-static void list_slipping(Equations *q) {
-    const ContactMode *modes = q->contacts.modes;
-    int s = q->system->s;
-    q->slipping_count = 0;
-    for (int k = 0; k < q->held_count; k++) {
-        if (slip_sign(modes[q->held[k]]) != 0) {
-            q->slipping[q->slipping_count++] = q->held[k];
+static void list_slipping(Equations *eq) {
+    const ContactMode *modes = eq->contacts.modes;
+    int s = eq->system->s;
+    eq->slipping_count = 0;
+    for (int k = 0; k < eq->held_count; k++) {
+        if (slip_sign(modes[eq->held[k]]) != 0) {
+            eq->slipping[eq->slipping_count++] = eq->held[k];
         }
     }
-    q->slipping_stops = q->slipping_count;
-    for (int contact = 0; contact < s + q->system->f; contact++) {
-        bool held = contact < s && is_held(&q->contacts, contact);
-        if (!held && slip_sign(modes[contact]) != 0 && friction_coefficient(q, contact) > 0.0) {
-            q->slipping[q->slipping_count++] = contact;
+    eq->slipping_stops = eq->slipping_count;
+    for (int contact = 0; contact < s + eq->system->f; contact++) {
+        bool held = contact < s && is_held(&eq->contacts, contact);
+        if (!held && slip_sign(modes[contact]) != 0 && friction_coefficient(eq, contact) > 0.0) {
+            eq->slipping[eq->slipping_count++] = contact;
         }
     }
 }
 
 /* Set the active rows: those of the loops, of held stops and of sticking contacts. */
-static void set_rows(Equations *q) {
-    const System *system = q->system;
+static void set_rows(Equations *eq) {
+    const System *system = eq->system;
     Rows loops = plain_rows(system, system->r, system->loops, system->loops_c);
     Rows gaps = gap_rows(system), walls = slide_rows(system), rubs = rub_rows(system);
-    q->r = q->carried_count = 0;
+    eq->r = eq->carried_count = 0;
     for (int k = 0; k < system->r; k++) {
-        add_row(q, &loops, k, system->loops_c[k]);
+        add_row(eq, &loops, k, system->loops_c[k]);
     }
-    q->first_hold = q->r;
-    q->held_count = q->sticking_count = q->pressed_count = 0;
+    eq->first_hold = eq->r;
+    eq->held_count = eq->sticking_count = eq->pressed_count = 0;
     for (int i = 0; i < system->s; i++) {
-        const Touching *touching = &q->contacts.touching[i];
-        if (is_held(&q->contacts, i)) {
+        const Touching *touching = &eq->contacts.touching[i];
+        if (is_held(&eq->contacts, i)) {
             double depth = touching->phase == PHASE_SETTLED ? touching->depth : 0.0;
-            q->held[q->held_count++] = i;
-            add_row(q, &gaps, i, system->gaps_c[i] + q->inputs.walls[i].position + depth);
+            eq->held[eq->held_count++] = i;
+            add_row(eq, &gaps, i, system->gaps_c[i] + eq->inputs.walls[i].position + depth);
         } else if (is_pressed(touching)) {
-            q->pressed[q->pressed_count++] = i;
+            eq->pressed[eq->pressed_count++] = i;
         }
     }
-    q->first_stick = q->r;
+    eq->first_stick = eq->r;
     for (int contact = 0; contact < system->s + system->f; contact++) {
         int point = contact - system->s;
-        if (q->contacts.modes[contact] == CONTACT_STICK) {
-            q->sticking[q->sticking_count++] = contact;
-            add_row(q, point < 0 ? &walls : &rubs, point < 0 ? contact : point, 0.0);
+        if (eq->contacts.modes[contact] == CONTACT_STICK) {
+            eq->sticking[eq->sticking_count++] = contact;
+            add_row(eq, point < 0 ? &walls : &rubs, point < 0 ? contact : point, 0.0);
         }
     }
-    list_slipping(q);
-    Rows active = {system, q->r, q->B, q->c, q->z, q->on};
-    q->active = active;
+    list_slipping(eq);
+    Rows active = {system, eq->r, eq->B, eq->c, eq->z, eq->on};
+    eq->active = active;
 }
 
 /* Set the real and imaginary parts of the rows, with columns for stretches, padded. */
-static void set_row_parts(Equations *q) {
-    int d = q->system->d, wide = q->system->wide;
-    for (int k = 0; k < q->r; k++) {
-        spread(q->system, 1, q->B + k * d, q->w); /* w is free memory here. */
-        pad_parts(d, q->w, parts_from(q->B_conjugate, k * wide));
+static void set_row_parts(Equations *eq) {
+    int d = eq->system->d, wide = eq->system->wide;
+    for (int k = 0; k < eq->r; k++) {
+        spread(eq->system, 1, eq->B + k * d, eq->w); /* w is free memory here. */
+        pad_parts(d, eq->w, parts_from(eq->B_conjugate, k * wide));
     }
-    for (int i = 0; i < q->r * wide; i++) {
-        q->B_conjugate.im[i] = -q->B_conjugate.im[i];
+    for (int i = 0; i < eq->r * wide; i++) {
+        eq->B_conjugate.im[i] = -eq->B_conjugate.im[i];
     }
 }
 
@@ -130,87 +130,87 @@ PRBM int place_in(const int *list, int index) {
 }
 
 /* Return the position of a held stop in the list of held stops. */
-PRBM int held_at(const Equations *q, int stop) {
-    return place_in(q->held, stop);
+PRBM int held_at(const Equations *eq, int stop) {
+    return place_in(eq->held, stop);
 }
 
-static void set_laws(Equations *q) {
-    const Mechanism *m = q->system->mechanism;
-    const double *values = q->system->values;
-    q->beta = values[m->damping_beta];
-    q->mass_damping = 2.0 * values[m->damping_zeta] * q->omega;
+static void set_laws(Equations *eq) {
+    const Mechanism *m = eq->system->mechanism;
+    const double *values = eq->system->values;
+    eq->beta = values[m->damping_beta];
+    eq->mass_damping = 2.0 * values[m->damping_zeta] * eq->omega;
     for (int i = 0; i < m->stop_count; i++) {
         const Stop *stop = &m->stops[i];
-        q->stop_friction[i] = evaluate(stop->friction, values);
+        eq->stop_friction[i] = evaluate(stop->friction, values);
         if (stop->compliant) {
-            q->laws[i].stiffness = evaluate(stop->stiffness, values);
-            q->laws[i].exponent = evaluate(stop->exponent, values);
+            eq->laws[i].stiffness = evaluate(stop->stiffness, values);
+            eq->laws[i].exponent = evaluate(stop->exponent, values);
             double restitution = evaluate(stop->restitution, values);
-            if (restitution != q->restitutions[i]) {
-                q->laws[i].damping = damping_factor(restitution);
-                q->restitutions[i] = restitution;
+            if (restitution != eq->restitutions[i]) {
+                eq->laws[i].damping = damping_factor(restitution);
+                eq->restitutions[i] = restitution;
             }
         }
     }
     for (int i = 0; i < m->friction_count; i++) {
-        q->rub_law[3 * i] = evaluate(m->frictions[i].coefficient, values);
-        q->rub_law[3 * i + 1] = evaluate(m->frictions[i].normal_force, values);
-        q->rub_law[3 * i + 2] = evaluate(m->frictions[i].normal_stiffness, values);
+        eq->rub_law[3 * i] = evaluate(m->frictions[i].coefficient, values);
+        eq->rub_law[3 * i + 1] = evaluate(m->frictions[i].normal_force, values);
+        eq->rub_law[3 * i + 2] = evaluate(m->frictions[i].normal_stiffness, values);
     }
 }
 
-static void set_loads(Equations *q) {
-    const System *system = q->system;
+static void set_loads(Equations *eq) {
+    const System *system = eq->system;
     const Mechanism *m = system->mechanism;
     int d = system->d;
-    zeros(system->wide, q->moment);
-    field_row(d, system->S, scaled(-1.0, q->inputs.base), q->w_input);
+    zeros(system->wide, eq->moment);
+    field_row(d, system->S, scaled(-1.0, eq->inputs.base), eq->w_input);
     for (int i = 0; i < m->force_count; i++) {
         const BodyFrame *frame = &system->pushed[i];
-        const double *given = q->inputs.forces + LOADS * i;
-        force_row(d, frame->A, complex_of(given[0], given[1]), q->w);
+        const double *given = eq->inputs.forces + LOADS * i;
+        force_row(d, frame->A, complex_of(given[0], given[1]), eq->w);
         for (int j = 0; j < d; j++) {
-            q->w_input[j] = plus(q->w_input[j], q->w[j]);
+            eq->w_input[j] = plus(eq->w_input[j], eq->w[j]);
         }
-        q->moment[frame->arm] += given[2];
+        eq->moment[frame->arm] += given[2];
     }
-    spread(system, 1, q->w_input, q->w_input);
-    field_row(d, system->S, system->gravity, q->w);
-    spread(system, 1, q->w, q->w);
-    q->driven = false;
+    spread(system, 1, eq->w_input, eq->w_input);
+    field_row(d, system->S, system->gravity, eq->w);
+    spread(system, 1, eq->w, eq->w);
+    eq->driven = false;
     for (int j = 0; j < d; j++) {
-        q->w[j] = plus(q->w_input[j], q->w[j]);
-        q->driven = q->driven || q->w_input[j].re != 0.0 || q->w_input[j].im != 0.0 ||
-                    q->moment[j] != 0.0;
+        eq->w[j] = plus(eq->w_input[j], eq->w[j]);
+        eq->driven = eq->driven || eq->w_input[j].re != 0.0 || eq->w_input[j].im != 0.0 ||
+                    eq->moment[j] != 0.0;
     }
-    pad_parts(d, q->w, q->w_parts);
-    q->walls_move = false;
+    pad_parts(d, eq->w, eq->w_parts);
+    eq->walls_move = false;
     for (int i = 0; i < system->s; i++) {
-        const Wall *wall = &q->inputs.walls[i];
-        q->walls_move = q->walls_move || wall->rate != 0.0 || wall->span > 0.0;
+        const Wall *wall = &eq->inputs.walls[i];
+        eq->walls_move = eq->walls_move || wall->rate != 0.0 || wall->span > 0.0;
     }
-    q->walls_give = false;
+    eq->walls_give = false;
     for (int i = 0; m->compliant_count > 0 && i < system->s; i++) {
-        bool gives = m->stops[i].compliant && q->inputs.mobilities[i] > 0.0;
-        q->walls_give = q->walls_give || gives;
+        bool gives = m->stops[i].compliant && eq->inputs.mobilities[i] > 0.0;
+        eq->walls_give = eq->walls_give || gives;
     }
-    q->driven = q->driven || q->walls_move || m->compliant_count > 0;
-    q->more_powers = q->driven || q->slipping_count > 0 || q->mass_damping != 0.0;
-    q->contacts_or_walls = q->walls_move || q->slipping_count > 0 || q->pressed_count > 0;
+    eq->driven = eq->driven || eq->walls_move || m->compliant_count > 0;
+    eq->more_powers = eq->driven || eq->slipping_count > 0 || eq->mass_damping != 0.0;
+    eq->contacts_or_walls = eq->walls_move || eq->slipping_count > 0 || eq->pressed_count > 0;
 }
 
 PRBM void set_equations(Equations *equations, const Inputs *inputs,
                         const ContactState *contacts, double omega) {
-    Equations *q = equations;
-    size_t count = (size_t)(q->system->s + q->system->f);
-    q->inputs = *inputs;
-    q->omega = omega;
-    memmove(q->contacts.modes, contacts->modes, count * sizeof(ContactMode));
-    memmove(q->contacts.touching, contacts->touching, (size_t)q->system->s * sizeof(Touching));
-    set_laws(q);
-    set_rows(q);
-    set_row_parts(q);
-    set_loads(q);
+    Equations *eq = equations;
+    size_t count = (size_t)(eq->system->s + eq->system->f);
+    eq->inputs = *inputs;
+    eq->omega = omega;
+    memmove(eq->contacts.modes, contacts->modes, count * sizeof(ContactMode));
+    memmove(eq->contacts.touching, contacts->touching, (size_t)eq->system->s * sizeof(Touching));
+    set_laws(eq);
+    set_rows(eq);
+    set_row_parts(eq);
+    set_loads(eq);
 }
 
 /* --- walls ------------------------------------------------------------------------------------ */

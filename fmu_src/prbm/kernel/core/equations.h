@@ -64,8 +64,8 @@ PRBM void set_equations(Equations *equations, const Inputs *inputs,
                         const ContactState *contacts, double omega);
 PRBM WallMotion wall_motion(const Wall *wall, double t);
 PRBM int place_in(const int *list, int index);
-PRBM int held_at(const Equations *q, int stop);
-PRBM double friction_coefficient(const Equations *q, int contact);
+PRBM int held_at(const Equations *eq, int stop);
+PRBM double friction_coefficient(const Equations *eq, int contact);
 /* The contacts at which events may occur. */
 PRBM bool held_stop(const Equations *equations, int contact);
 

@@ -145,10 +145,10 @@ RARE void stretch_squares(const System *system, double *squares) {
 }
 
 /* Compute the loads Re(w e) + moment of the directions, and the squares of their rates. */
-SIZED void find_loads(int even, const Equations *q, Evaluation *result) {
-    const double *moment = q->moment, *v = result->at.turn;
+SIZED void find_loads(int even, const Equations *eq, Evaluation *result) {
+    const double *moment = eq->moment, *v = result->at.turn;
     double *x = result->load, *squares = result->at.squares;
-    Parts w = q->w_parts, e = result->at.e_parts;
+    Parts w = eq->w_parts, e = result->at.e_parts;
     UNROLLED_BY_LANES
     for (int j = 0; j < even; j += LANES) {
         Lanes re = lanes_at(w.re + j) * lanes_at(e.re + j);
@@ -156,8 +156,8 @@ SIZED void find_loads(int even, const Equations *q, Evaluation *result) {
         set_lanes(x + j, lanes_at(moment + j) + (re - im));
         set_lanes(squares + j, lanes_at(v + j) * lanes_at(v + j));
     }
-    if (q->system->stretch_count > 0) {
-        stretch_squares(q->system, squares);
+    if (eq->system->stretch_count > 0) {
+        stretch_squares(eq->system, squares);
     }
 }
 
@@ -172,15 +172,15 @@ static double coriolis(const System *system, const double *turn, int stretch_dir
 
 /* Subtract the forces of springs and their damping from the loads, x -= K (q - q0 + beta v), and
  * compute the power beta v^T K v of the damping. */
-SIZED void add_springs(int even, const Equations *q, Evaluation *result) {
-    const System *system = q->system;
+SIZED void add_springs(int even, const Equations *eq, Evaluation *result) {
+    const System *system = eq->system;
     const double *angle = result->at.angle, *straight = system->straight, *v = result->at.speed;
     double *turns = result->turns, *x = result->a;
     Lanes loss[SUMS] = {NO_LANES};
     UNROLLED_BY_LANES
     for (int j = 0; j < even; j += LANES) {
         Lanes speed = lanes_at(v + j), rate = lanes_at(system->grounded + j);
-        Lanes turn = lanes_at(angle + j) - lanes_at(straight + j) + q->beta * speed;
+        Lanes turn = lanes_at(angle + j) - lanes_at(straight + j) + eq->beta * speed;
         set_lanes(turns + j, turn);
         set_lanes(x + j, lanes_at(x + j) - rate * turn);
         loss[SUM_OF(j)] += rate * (speed * speed);
@@ -194,7 +194,7 @@ SIZED void add_springs(int even, const Equations *q, Evaluation *result) {
         x[b] -= torque;
         sum += spring->rate * (swing * swing);
     }
-    result->spring_loss = q->beta * sum;
+    result->spring_loss = eq->beta * sum;
 }
 
 /* Compute the rows -Im(b e) and, in lam, their convective terms Re(b e) v^2.  B is conj(b). */
@@ -218,14 +218,14 @@ SIZED void convect(int count, int even, Parts B, Parts e, const double *ALONE sq
 }
 
 /* Compute the rows measured relative to a body, and their convective terms without Im(w^2). */
-RARE void carried_rows(const Equations *q, const Kinematics *at, double *rows,
+RARE void carried_rows(const Equations *eq, const Kinematics *at, double *rows,
                        double *convective) {
-    const System *system = q->system;
-    for (int c = 0; c < q->carried_count; c++) {
-        int k = q->carried[c];
+    const System *system = eq->system;
+    for (int c = 0; c < eq->carried_count; c++) {
+        int k = eq->carried[c];
         double *row = rows + k * system->wide;
-        row_by_direction(&q->active, k, at->e, row);
-        convective[k] = row_convective(&q->active, k, at->e, at->speed);
+        row_by_direction(&eq->active, k, at->e, row);
+        convective[k] = row_convective(&eq->active, k, at->e, at->speed);
         for (int l = 0; l < system->stretch_count; l++) {
             int j = system->stretches[l];
             convective[k] -= row[arm_of(system, j)] * coriolis(system, at->turn, j);
@@ -233,35 +233,35 @@ RARE void carried_rows(const Equations *q, const Kinematics *at, double *rows,
     }
 }
 
-SIZED void rows_padded(int even, const Equations *q, const Kinematics *at, double *rows,
+SIZED void rows_padded(int even, const Equations *eq, const Kinematics *at, double *rows,
                           double *convective) {
-    Parts B = q->B_conjugate, e = at->e_parts;
-    switch (q->r) {
+    Parts B = eq->B_conjugate, e = at->e_parts;
+    switch (eq->r) {
     case 1: convect(1, even, B, e, at->squares, rows, convective); break;
     case 2: convect(2, even, B, e, at->squares, rows, convective); break;
     case 3: convect(3, even, B, e, at->squares, rows, convective); break;
     default:
-        for (int k = 0; k < q->r; k++) {
+        for (int k = 0; k < eq->r; k++) {
             convect(1, even, parts_from(B, k * even), e, at->squares, rows + k * even,
                     convective + k);
         }
     }
-    if (q->carried_count > 0) {
-        carried_rows(q, at, rows, convective);
+    if (eq->carried_count > 0) {
+        carried_rows(eq, at, rows, convective);
     }
 }
 
-PRBM void rows_and_convection(const Equations *q, const Kinematics *at, double *rows,
+PRBM void rows_and_convection(const Equations *eq, const Kinematics *at, double *rows,
                               double *convective) {
-    rows_padded(q->system->wide, q, at, rows, convective);
+    rows_padded(eq->system->wide, eq, at, rows, convective);
 }
 
-SHARED void rows_dispatch(int even, const Equations *q, const Kinematics *at, double *rows,
+SHARED void rows_dispatch(int even, const Equations *eq, const Kinematics *at, double *rows,
                            double *convective) {
     if (KNOWN(even)) {
-        rows_padded(even, q, at, rows, convective);
+        rows_padded(even, eq, at, rows, convective);
     } else {
-        rows_and_convection(q, at, rows, convective);
+        rows_and_convection(eq, at, rows, convective);
     }
 }
 
@@ -302,19 +302,19 @@ SIZED void block_inertia(int size, const Complex *ALONE H, const double *ALONE o
 }
 
 /* Compute the block of M that begins at start; add its inertial and damping loads to a. */
-SIZED void block_mass(const Equations *q, Evaluation *result, int size, int start,
+SIZED void block_mass(const Equations *eq, Evaluation *result, int size, int start,
                       const Complex *H, double *M) {
     const Kinematics *at = &result->at;
     double *x = result->a + start;
-    block_inertia(size, H, own_inertia(q->system, at) + start, parts_from(at->e_parts, start),
+    block_inertia(size, H, own_inertia(eq->system, at) + start, parts_from(at->e_parts, start),
                   at->squares + start, M, x);
-    if (q->mass_damping != 0.0) {
-        damp_mass(size, q->mass_damping, M, at->speed + start, x);
+    if (eq->mass_damping != 0.0) {
+        damp_mass(size, eq->mass_damping, M, at->speed + start, x);
     }
 }
 
 /* Factor a block of M into L, and apply L^-1 to loads and rows. */
-SIZED bool factor_any_block(const Equations *q, Evaluation *result, int size, int apart, int start,
+SIZED bool factor_any_block(const Equations *eq, Evaluation *result, int size, int apart, int start,
                             const double *M, double *L) {
     double *inverse = result->factors.inverse + start;
     if (KNOWN(size) && size <= UNROLLED_MAX ? !factor_known(size, apart, M, L, inverse)
@@ -322,34 +322,34 @@ SIZED bool factor_any_block(const Equations *q, Evaluation *result, int size, in
         return false;
     }
     block_forward(size, apart, L, result->a + start);
-    for (int k = 0; k < q->r; k++) {
-        block_forward(size, apart, L, result->factors.Z + k * q->system->even + start);
+    for (int k = 0; k < eq->r; k++) {
+        block_forward(size, apart, L, result->factors.Z + k * eq->system->even + start);
     }
     return true;
 }
 
-RARE bool factor_block(const Equations *q, Evaluation *result, int size, int start, double *L) {
-    return factor_any_block(q, result, size, 0, start, result->block, L);
+RARE bool factor_block(const Equations *eq, Evaluation *result, int size, int start, double *L) {
+    return factor_any_block(eq, result, size, 0, start, result->block, L);
 }
 
-SIZED bool block_motion(const Equations *q, Evaluation *result, int size, int start,
+SIZED bool block_motion(const Equations *eq, Evaluation *result, int size, int start,
                         const Complex *H, double *L) {
-    block_mass(q, result, size, start, H, result->block);
-    return factor_any_block(q, result, size, 0, start, result->block, L);
+    block_mass(eq, result, size, start, H, result->block);
+    return factor_any_block(eq, result, size, 0, start, result->block, L);
 }
 
 /* Compute and factor a small block of M.  Blocks of tiny or huge numbers take the general path. */
-SIZED bool small_block_motion(const Equations *q, Evaluation *result, int size, int start,
+SIZED bool small_block_motion(const Equations *eq, Evaluation *result, int size, int start,
                               const Complex *H, double *L) {
-    const int even = q->system->even, r = q->r;
+    const int even = eq->system->even, r = eq->r;
     double M[SMALL * SMALL], D[SMALL];
-    block_mass(q, result, size, start, H, M);
+    block_mass(eq, result, size, start, H, M);
     if (!small_factor(size, M, L, D)) {
         UNROLLED
         for (int i = 0; i < size * size; i++) {
             result->block[i] = i % size <= i / size ? M[i] : 0.0;
         }
-        return factor_block(q, result, size, start, L);
+        return factor_block(eq, result, size, start, L);
     }
     put_block(size, start, D, result->factors.inverse);
     solve_small(size, start, L, result->a, FORWARD);
@@ -360,17 +360,17 @@ SIZED bool small_block_motion(const Equations *q, Evaluation *result, int size, 
 }
 
 /* Factor a block of the mass matrix in result->mass. */
-SIZED bool mapped_block_motion(const Equations *q, Evaluation *result, int size, int apart,
+SIZED bool mapped_block_motion(const Equations *eq, Evaluation *result, int size, int apart,
                                int start, const double *M, double *L) {
-    if (q->mass_damping != 0.0) {
-        damp_mass(size, q->mass_damping, M, result->at.speed + start, result->a + start);
+    if (eq->mass_damping != 0.0) {
+        damp_mass(size, eq->mass_damping, M, result->at.speed + start, result->a + start);
     }
-    return factor_any_block(q, result, size, apart, start, M, L);
+    return factor_any_block(eq, result, size, apart, start, M, L);
 }
 
 /* Factor the blocks of the mass matrix in result->mass.  Those of guides on two beams of the
  * orders 3 and 5 are compiled separately. */
-RARE bool mapped_blocks_motion(const Equations *q, Evaluation *result) {
+RARE bool mapped_blocks_motion(const Equations *eq, Evaluation *result) {
     bool regular = true;
     const double *M = result->mass;
     double *L = result->factors.L;
@@ -378,11 +378,11 @@ RARE bool mapped_blocks_motion(const Equations *q, Evaluation *result) {
         const Block *block = &result->factors.blocks[k];
         int start = block->start, size = block->size, apart = block->apart;
         if (size == 7 && apart == 3) {
-            regular = mapped_block_motion(q, result, 7, 3, start, M, L) && regular;
+            regular = mapped_block_motion(eq, result, 7, 3, start, M, L) && regular;
         } else if (size == 11 && apart == 5) {
-            regular = mapped_block_motion(q, result, 11, 5, start, M, L) && regular;
+            regular = mapped_block_motion(eq, result, 11, 5, start, M, L) && regular;
         } else {
-            regular = mapped_block_motion(q, result, size, apart, start, M, L) && regular;
+            regular = mapped_block_motion(eq, result, size, apart, start, M, L) && regular;
         }
         M += size * size;
         L += size * size;
@@ -390,21 +390,21 @@ RARE bool mapped_blocks_motion(const Equations *q, Evaluation *result) {
     return regular;
 }
 
-static bool blocks_motion(const Equations *q, Evaluation *result) {
-    if (q->system->mapped) {
-        return mapped_blocks_motion(q, result);
+static bool blocks_motion(const Equations *eq, Evaluation *result) {
+    if (eq->system->mapped) {
+        return mapped_blocks_motion(eq, result);
     }
     bool regular = true;
-    const Complex *H = q->system->coupling;
+    const Complex *H = eq->system->coupling;
     double *L = result->factors.L;
     for (int k = 0; k < result->factors.block_count; k++) {
         int start = result->factors.blocks[k].start, size = result->factors.blocks[k].size;
-        switch (q->system->definite ? size : 0) {
-        case 1: regular = small_block_motion(q, result, 1, start, H, L) && regular; break;
-        case 2: regular = small_block_motion(q, result, 2, start, H, L) && regular; break;
-        case 3: regular = small_block_motion(q, result, 3, start, H, L) && regular; break;
-        case 4: regular = small_block_motion(q, result, 4, start, H, L) && regular; break;
-        default: regular = block_motion(q, result, size, start, H, L) && regular;
+        switch (eq->system->definite ? size : 0) {
+        case 1: regular = small_block_motion(eq, result, 1, start, H, L) && regular; break;
+        case 2: regular = small_block_motion(eq, result, 2, start, H, L) && regular; break;
+        case 3: regular = small_block_motion(eq, result, 3, start, H, L) && regular; break;
+        case 4: regular = small_block_motion(eq, result, 4, start, H, L) && regular; break;
+        default: regular = block_motion(eq, result, size, start, H, L) && regular;
         }
         H += size * size;
         L += size * size;
@@ -425,44 +425,44 @@ static void find_shift(const System *system, const Kinematics *at, double *shift
 
 /* Compute M, add the quadratic velocity terms to the loads of the directions, and pull loads and
  * rows back to the coordinates. */
-static void pull_blocks(const Equations *q, Evaluation *result) {
-    const System *system = q->system;
+static void pull_blocks(const Equations *eq, Evaluation *result) {
+    const System *system = eq->system;
     const double *own = own_inertia(system, &result->at);
     if (system->stretch_count > 0) {
         find_shift(system, &result->at, result->shift);
     }
     zeros(system->n * system->n, result->mass);
     for (int k = 0; k < system->block_count; k++) {
-        add_block_terms(system, &system->maps[k], own, q->r, result);
+        add_block_terms(system, &system->maps[k], own, eq->r, result);
     }
 }
 
 /* Compute directions, loads and rows. */
-SIZED void direction_terms(int wide, const Equations *q, const Reference *near,
+SIZED void direction_terms(int wide, const Equations *eq, const Reference *near,
                            Evaluation *result) {
-    directions_of(wide, q->system, near, &result->at);
-    find_loads(wide, q, result);
-    rows_padded(wide, q, &result->at, result->rows, result->lam);
+    directions_of(wide, eq->system, near, &result->at);
+    find_loads(wide, eq, result);
+    rows_padded(wide, eq, &result->at, result->rows, result->lam);
 }
 
 /* Compute loads, rows and mass matrix of the directions, and pull them back to the coordinates.
  * The lengths for guides on two beams with 5 or 6 nodes are compiled separately. */
-RARE void mapped_terms(const Equations *q, const Reference *near, Evaluation *result) {
-    const System *system = q->system;
+RARE void mapped_terms(const Equations *eq, const Reference *near, Evaluation *result) {
+    const System *system = eq->system;
     const int even = system->even, wide = system->wide;
     double *Z = result->factors.Z;
     map_motion(system, &result->at);
     switch (wide) {
-    case 12: direction_terms(12, q, near, result); break;
-    case 14: direction_terms(14, q, near, result); break;
-    default: direction_terms(wide, q, near, result);
+    case 12: direction_terms(12, eq, near, result); break;
+    case 14: direction_terms(14, eq, near, result); break;
+    default: direction_terms(wide, eq, near, result);
     }
     for (int j = 0; j < even; j += LANES) {
         set_lanes(result->a + j, all_lanes(0.0));
     }
-    zeros(q->r * even, Z);
-    pull_blocks(q, result);
-    for (int k = 0; system->stretch_count > 0 && k < q->r; k++) {
+    zeros(eq->r * even, Z);
+    pull_blocks(eq, result);
+    for (int k = 0; system->stretch_count > 0 && k < eq->r; k++) {
         result->lam[k] += even_dot(wide, result->rows + k * wide, result->shift);
     }
 }
@@ -500,78 +500,79 @@ PRBM double rub_limit(const Equations *equations, int i, const Complex *e) {
 }
 
 /* The force of a held stop. */
-PRBM double stop_force(const Equations *q, const double *lam, int stop) {
-    return lam[q->first_hold + held_at(q, stop)];
+PRBM double stop_force(const Equations *eq, const double *lam, int stop) {
+    return lam[eq->first_hold + held_at(eq, stop)];
 }
 
 /* The friction force of a sticking contact. */
-PRBM double stick_force(const Equations *q, const double *lam, int contact) {
-    return lam[q->first_stick + place_in(q->sticking, contact)];
+PRBM double stick_force(const Equations *eq, const double *lam, int contact) {
+    return lam[eq->first_stick + place_in(eq->sticking, contact)];
 }
 
 /* The largest friction force of a contact, by Coulomb's law. */
-PRBM double friction_limit(const Equations *q, const Complex *e, const Evaluation *found,
+PRBM double friction_limit(const Equations *eq, const Complex *e, const Evaluation *found,
                            int contact) {
-    if (!is_stop(q->system, contact)) {
-        return rub_limit(q, contact - q->system->s, e);
+    if (!is_stop(eq->system, contact)) {
+        return rub_limit(eq, contact - eq->system->s, e);
     }
-    double force = is_held(&q->contacts, contact) ? stop_force(q, found->lam, contact)
+    double force = is_held(&eq->contacts, contact) ? stop_force(eq, found->lam, contact)
                                                   : greater(found->pressure[contact], 0.0);
-    return q->stop_friction[contact] * force;
+    return eq->stop_friction[contact] * force;
 }
 
 /* The friction force of a slipping contact along its direction. */
-PRBM double slip_force(const Equations *q, const Complex *e, const Evaluation *found,
+PRBM double slip_force(const Equations *eq, const Complex *e, const Evaluation *found,
                        int contact) {
-    return -slip_sign(q->contacts.modes[contact]) * friction_limit(q, e, found, contact);
+    return -slip_sign(eq->contacts.modes[contact]) * friction_limit(eq, e, found, contact);
 }
 
 /* Add the forces of pressed compliant stops. */
-RARE void add_pressure(const Equations *q, Evaluation *result) {
-    Rows gaps = gap_rows(q->system);
+RARE void add_pressure(const Equations *eq, Evaluation *result) {
+    Rows gaps = gap_rows(eq->system);
     double t = result->at.time;
-    for (int k = 0; k < q->pressed_count; k++) {
-        int i = q->pressed[k];
+    for (int k = 0; k < eq->pressed_count; k++) {
+        int i = eq->pressed[k];
         const double *extra = result->at.extra;
         row_jacobian(&gaps, i, result->at.e, result->row);
-        double d = -gap(q, i, t, result->at.e, extra);
-        double rate = -dot(q->system->n, result->row, result->at.speed) -
-                      wall_motion(&q->inputs.walls[i], t).v - give_of(q, i, extra, EXTRA_GIVE_RATE);
-        double force = contact_force(&q->laws[i], &q->contacts.touching[i], d, rate);
+        double d = -gap(eq, i, t, result->at.e, extra);
+        double rate = -dot(eq->system->n, result->row, result->at.speed) -
+                      wall_motion(&eq->inputs.walls[i], t).v -
+                      give_of(eq, i, extra, EXTRA_GIVE_RATE);
+        double force = contact_force(&eq->laws[i], &eq->contacts.touching[i], d, rate);
         result->pressure[i] = force;
-        result->contact_loss[i] = (force - elastic_force(&q->laws[i], d)) * rate;
-        add_scaled(q->system->n, force, result->row, result->a);
+        result->contact_loss[i] = (force - elastic_force(&eq->laws[i], d)) * rate;
+        add_scaled(eq->system->n, force, result->row, result->a);
     }
 }
 
 /* Add pressed stops and their friction, slipping friction points, and the accelerations of the
  * walls of held stops. */
-RARE void add_contacts_and_walls(const Equations *q, Evaluation *result) {
-    add_pressure(q, result);
-    for (int k = q->slipping_stops; k < q->slipping_count; k++) {
-        double force = slip_force(q, result->at.e, result, q->slipping[k]);
-        tangential_row(q->system, q->slipping[k], result->at.e, result->row);
-        add_scaled(q->system->n, force, result->row, result->a);
+RARE void add_contacts_and_walls(const Equations *eq, Evaluation *result) {
+    add_pressure(eq, result);
+    for (int k = eq->slipping_stops; k < eq->slipping_count; k++) {
+        double force = slip_force(eq, result->at.e, result, eq->slipping[k]);
+        tangential_row(eq->system, eq->slipping[k], result->at.e, result->row);
+        add_scaled(eq->system->n, force, result->row, result->a);
     }
-    for (int k = 0; q->walls_move && k < q->held_count; k++) {
-        const Wall *wall = &q->inputs.walls[q->held[k]];
-        result->lam[q->first_hold + k] -= wall_motion(wall, result->at.time).a;
+    for (int k = 0; eq->walls_move && k < eq->held_count; k++) {
+        const Wall *wall = &eq->inputs.walls[eq->held[k]];
+        result->lam[eq->first_hold + k] -= wall_motion(wall, result->at.time).a;
     }
 }
 
 /* Set the columns of slipping stops.  Coulomb's law adds a force along the wall to the normal
  * force, so that the column of such a stop differs from its row. */
-RARE void set_columns(const Equations *q, Evaluation *result) {
-    const System *system = q->system;
+RARE void set_columns(const Equations *eq, Evaluation *result) {
+    const System *system = eq->system;
     int n = system->n, even = system->even;
     Rows walls = slide_rows(system);
     result->factors.Z_columns = result->columns;
-    copy(q->r * even, result->factors.Z, result->columns);
-    for (int k = 0; k < q->slipping_stops; k++) {
-        int i = q->slipping[k], h = q->first_hold + held_at(q, i);
-        double share = -q->stop_friction[i] * slip_sign(q->contacts.modes[i]);
+    copy(eq->r * even, result->factors.Z, result->columns);
+    for (int k = 0; k < eq->slipping_stops; k++) {
+        int i = eq->slipping[k], h = eq->first_hold + held_at(eq, i);
+        double share = -eq->stop_friction[i] * slip_sign(eq->contacts.modes[i]);
         double *column = result->columns + h * even;
-        row_jacobian(&q->active, h, result->at.e, column);
+        row_jacobian(&eq->active, h, result->at.e, column);
         row_jacobian(&walls, i, result->at.e, result->row);
         add_scaled(n, share, result->row, column);
         forward_all(&result->factors, column);
@@ -581,16 +582,16 @@ RARE void set_columns(const Equations *q, Evaluation *result) {
 /* --- accelerations ---------------------------------------------------------------------------- */
 
 /* Compute the factors from the rows in Z, and replace a by L^-1 a. */
-SIZED bool factor_motion(int even, const Equations *q, Evaluation *result) {
-    result->factors.r = q->r;
-    result->factors.block_count = q->system->mass_block_count;
-    if (!blocks_motion(q, result)) {
+SIZED bool factor_motion(int even, const Equations *eq, Evaluation *result) {
+    result->factors.r = eq->r;
+    result->factors.block_count = eq->system->mass_block_count;
+    if (!blocks_motion(eq, result)) {
         return false;
     }
     result->factors.Z_columns = result->factors.Z;
-    result->factors.least = q->system->least_mobility;
-    if (q->slipping_stops > 0) {
-        set_columns(q, result);
+    result->factors.least = eq->system->least_mobility;
+    if (eq->slipping_stops > 0) {
+        set_columns(eq, result);
     }
     return schur_dispatch(even, &result->factors);
 }
@@ -603,25 +604,25 @@ RARE void add_coriolis(const System *system, Evaluation *result) {
 }
 
 /* Solve for a and lam at the time, angles and rates of the evaluation. */
-SHARED bool motion_of_length(int even, const Equations *q, const Reference *near,
+SHARED bool motion_of_length(int even, const Equations *eq, const Reference *near,
                             Evaluation *result) {
-    if (q->system->mapped) {
-        mapped_terms(q, near, result);
+    if (eq->system->mapped) {
+        mapped_terms(eq, near, result);
     } else {
-        directions_of(even, q->system, near, &result->at);
-        find_loads(even, q, result);
-        rows_dispatch(even, q, &result->at, result->rows, result->lam);
+        directions_of(even, eq->system, near, &result->at);
+        find_loads(even, eq, result);
+        rows_dispatch(even, eq, &result->at, result->rows, result->lam);
     }
-    add_springs(even, q, result);
-    if (q->contacts_or_walls) {
-        add_contacts_and_walls(q, result);
+    add_springs(even, eq, result);
+    if (eq->contacts_or_walls) {
+        add_contacts_and_walls(eq, result);
     }
-    if (!factor_motion(even, q, result)) {
+    if (!factor_motion(even, eq, result)) {
         return false;
     }
     finish_dispatch(even, &result->factors, result->a, result->lam);
-    if (q->system->stretch_count > 0 && !q->system->mapped) {
-        add_coriolis(q->system, result);
+    if (eq->system->stretch_count > 0 && !eq->system->mapped) {
+        add_coriolis(eq->system, result);
     }
     return true;
 }

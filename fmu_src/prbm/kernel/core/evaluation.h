@@ -22,20 +22,20 @@ PRBM double rub_limit(const Equations *equations, int i, const Complex *e);
 SHARED void directions_of(int even, const System *system, const Reference *near, Kinematics *at);
 SHARED void arms_at(int even, const System *system, const Reference *near, Kinematics *at);
 /* Compute the derivatives of the active rows by the directions, and their convective terms. */
-PRBM void rows_and_convection(const Equations *q, const Kinematics *at, double *rows,
+PRBM void rows_and_convection(const Equations *eq, const Kinematics *at, double *rows,
                               double *convective);
-SHARED void rows_dispatch(int even, const Equations *q, const Kinematics *at, double *rows,
+SHARED void rows_dispatch(int even, const Equations *eq, const Kinematics *at, double *rows,
                            double *convective);
-SHARED bool motion_of_length(int even, const Equations *q, const Reference *near,
+SHARED bool motion_of_length(int even, const Equations *eq, const Reference *near,
                              Evaluation *result);
 PRBM Kinematics place_kinematics(const System *system, Memory *memory);
 PRBM void zero_placed(const Memory *memory, size_t begin);
 PRBM void find_directions(const System *system, const Reference *near, Kinematics *at);
-PRBM double stop_force(const Equations *q, const double *lam, int stop);
-PRBM double stick_force(const Equations *q, const double *lam, int contact);
-PRBM double friction_limit(const Equations *q, const Complex *e, const Evaluation *found,
+PRBM double stop_force(const Equations *eq, const double *lam, int stop);
+PRBM double stick_force(const Equations *eq, const double *lam, int contact);
+PRBM double friction_limit(const Equations *eq, const Complex *e, const Evaluation *found,
                            int contact);
-PRBM double slip_force(const Equations *q, const Complex *e, const Evaluation *found,
+PRBM double slip_force(const Equations *eq, const Complex *e, const Evaluation *found,
                        int contact);
 
 #endif

@@ -1,11 +1,11 @@
 /* Gaps of the stops, their rates and their accelerations: as in mechanics/dynamics.py. */
 #include "core/gaps.h"
 
-PRBM double give_of(const Equations *q, int i, const double *extra, Extra which) {
+PRBM double give_of(const Equations *eq, int i, const double *extra, Extra which) {
     if (extra == NULL) {
         return 0.0;
     }
-    const Stop *stop = &q->system->mechanism->stops[i];
+    const Stop *stop = &eq->system->mechanism->stops[i];
     return stop->compliant ? extra[stop->extra + (int)which] : 0.0;
 }
 
@@ -25,10 +25,10 @@ PRBM double gap_rate(const Equations *equations, int i, double t, const Complex 
 
 PRBM double gap_acceleration(const Equations *equations, int i, double t, const Complex *e,
                              const double *v, const Evaluation *found) {
-    const Equations *q = equations;
-    Rows rows = gap_rows(q->system);
+    const Equations *eq = equations;
+    Rows rows = gap_rows(eq->system);
     double result = row_rate(&rows, i, e, found->a) - row_convective(&rows, i, e, v) +
-                    wall_motion(&q->inputs.walls[i], t).a;
-    bool pressed = is_pressed(&q->contacts.touching[i]);
-    return pressed ? result + q->inputs.mobilities[i] * found->pressure[i] : result;
+                    wall_motion(&eq->inputs.walls[i], t).a;
+    bool pressed = is_pressed(&eq->contacts.touching[i]);
+    return pressed ? result + eq->inputs.mobilities[i] * found->pressure[i] : result;
 }

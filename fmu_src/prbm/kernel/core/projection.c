@@ -8,44 +8,44 @@
 #include "core/vectors.h"
 
 /* The constant part of an active constraint at time t. */
-static double offset(const Equations *q, int k, double t) {
-    if (q->walls_move && k >= q->first_hold && k < q->first_stick) {
-        int i = q->held[k - q->first_hold];
-        const Touching *touching = &q->contacts.touching[i];
+static double offset(const Equations *eq, int k, double t) {
+    if (eq->walls_move && k >= eq->first_hold && k < eq->first_stick) {
+        int i = eq->held[k - eq->first_hold];
+        const Touching *touching = &eq->contacts.touching[i];
         double depth = touching->phase == PHASE_SETTLED ? touching->depth : 0.0;
-        return q->system->gaps_c[i] + wall_motion(&q->inputs.walls[i], t).x + depth;
+        return eq->system->gaps_c[i] + wall_motion(&eq->inputs.walls[i], t).x + depth;
     }
-    return q->c[k];
+    return eq->c[k];
 }
 
 /* The part of the rate of an active constraint that is prescribed at time t. */
-PRBM double prescribed(const Equations *q, int k, double t) {
-    bool moves = q->walls_move && k >= q->first_hold && k < q->first_stick;
-    return moves ? wall_motion(&q->inputs.walls[q->held[k - q->first_hold]], t).v : 0.0;
+PRBM double prescribed(const Equations *eq, int k, double t) {
+    bool moves = eq->walls_move && k >= eq->first_hold && k < eq->first_stick;
+    return moves ? wall_motion(&eq->inputs.walls[eq->held[k - eq->first_hold]], t).v : 0.0;
 }
 
 PRBM bool project_with_impulses(const Equations *equations, double t, double *y, double *impulses,
                                 Scratch *scratch, Problem *problem) {
-    const Equations *q = equations;
-    size_t mark = scratch->used, n = (size_t)q->system->n, r = (size_t)q->r;
+    const Equations *eq = equations;
+    size_t mark = scratch->used, n = (size_t)eq->system->n, r = (size_t)eq->r;
     double *c = take(scratch, r), *rates = take(scratch, r), *rows = take(scratch, r * n);
     double *M = take(scratch, n * n);
-    Complex *e = take_complex(scratch, q->system->d, 1);
-    for (int k = 0; k < q->r; k++) {
-        c[k] = offset(q, k, t);
-        rates[k] = prescribed(q, k, t);
+    Complex *e = take_complex(scratch, eq->system->d, 1);
+    for (int k = 0; k < eq->r; k++) {
+        c[k] = offset(eq, k, t);
+        rates[k] = prescribed(eq, k, t);
         if (impulses) {
-            bool held = k >= q->first_hold && k < q->first_stick;
-            impulses[k] = held ? q->inputs.mobilities[q->held[k - q->first_hold]] : 0.0;
+            bool held = k >= eq->first_hold && k < eq->first_stick;
+            impulses[k] = held ? eq->inputs.mobilities[eq->held[k - eq->first_hold]] : 0.0;
         }
     }
-    Rows positions = q->active;
-    positions.count = q->first_stick;
-    bool ok = project_positions(q->system, &positions, y, c, e, scratch, problem);
+    Rows positions = eq->active;
+    positions.count = eq->first_stick;
+    bool ok = project_positions(eq->system, &positions, y, c, e, scratch, problem);
     if (ok) {
-        jacobian(&q->active, e, rows);
-        mass_matrix(q->system, e, M, scratch);
-        ok = project_velocities((int)n, q->r, M, rows, rates, y + n, impulses, q->system->length,
+        jacobian(&eq->active, e, rows);
+        mass_matrix(eq->system, e, M, scratch);
+        ok = project_velocities((int)n, eq->r, M, rows, rates, y + n, impulses, eq->system->length,
                                 scratch, problem);
     }
     scratch->used = mark;
@@ -71,8 +71,8 @@ PRBM void correction_place(Correction *correction, const System *system, Memory 
 }
 
 /* The value of an active row on the ground without its constant, if no arm stretches. */
-SIZED double active_sum(int even, const Equations *q, const Kinematics *at, int k) {
-    Parts B = parts_from(q->B_conjugate, k * even), e = at->e_parts;
+SIZED double active_sum(int even, const Equations *eq, const Kinematics *at, int k) {
+    Parts B = parts_from(eq->B_conjugate, k * even), e = at->e_parts;
     Lanes sum[SUMS] = {NO_LANES};
     UNROLLED_BY_LANES
     for (int j = 0; j < even; j += LANES) {
@@ -84,102 +84,104 @@ SIZED double active_sum(int even, const Equations *q, const Kinematics *at, int 
 }
 
 /* The value of an active row without its constant. */
-SIZED double active_value(int even, const Equations *q, const Kinematics *at, int k) {
-    if (q->system->stretch_count > 0 || q->on[k] != FIXED) {
-        return row_value(&q->active, k, at->e);
+SIZED double active_value(int even, const Equations *eq, const Kinematics *at, int k) {
+    if (eq->system->stretch_count > 0 || eq->on[k] != FIXED) {
+        return row_value(&eq->active, k, at->e);
     }
-    return q->system->mapped ? active_sum(q->system->wide, q, at, k) : active_sum(even, q, at, k);
+    return eq->system->mapped ? active_sum(eq->system->wide, eq, at, k)
+                              : active_sum(even, eq, at, k);
 }
 
 /* Compute the residuals of the positions, and return the largest magnitude. */
-SIZED double position_residuals(int even, const Equations *q, const Kinematics *at, double t,
+SIZED double position_residuals(int even, const Equations *eq, const Kinematics *at, double t,
                                 double *residual) {
     double worst = 0.0;
-    for (int k = 0; k < q->r; k++) {
-        residual[k] = k < q->first_stick ? -(active_value(even, q, at, k) + offset(q, k, t)) : 0.0;
+    for (int k = 0; k < eq->r; k++) {
+        bool placed = k < eq->first_stick;
+        residual[k] = placed ? -(active_value(even, eq, at, k) + offset(eq, k, t)) : 0.0;
         worst = fabs(residual[k]) <= worst ? worst : fabs(residual[k]); /* a NaN stays */
     }
     return worst;
 }
 
 /* Compute the rows by the coordinates, if they are not the directions. */
-RARE void mapped_rows(const Equations *q, Correction *c) {
-    const System *system = q->system;
-    rows_and_convection(q, &c->at, c->by_direction, c->convective);
-    zeros(q->r * system->even, c->rows);
-    pull_directions(system, q->r, c->by_direction, c->rows);
+RARE void mapped_rows(const Equations *eq, Correction *c) {
+    const System *system = eq->system;
+    rows_and_convection(eq, &c->at, c->by_direction, c->convective);
+    zeros(eq->r * system->even, c->rows);
+    pull_directions(system, eq->r, c->by_direction, c->rows);
 }
 
-SIZED void velocity_residuals(int even, const Equations *q, double t, Correction *c) {
-    if (q->system->mapped) {
-        mapped_rows(q, c);
+SIZED void velocity_residuals(int even, const Equations *eq, double t, Correction *c) {
+    if (eq->system->mapped) {
+        mapped_rows(eq, c);
     } else {
-        rows_dispatch(even, q, &c->at, c->rows, c->convective);
+        rows_dispatch(even, eq, &c->at, c->rows, c->convective);
     }
-    for (int k = 0; k < q->r; k++) {
+    for (int k = 0; k < eq->r; k++) {
         double rate = even_dot(even, c->rows + k * even, c->at.speed);
-        c->residual[k] = -(rate + prescribed(q, k, t));
+        c->residual[k] = -(rate + prescribed(eq, k, t));
     }
 }
 
 /* Add to y the smallest change, in the metric of the mass matrix, that removes the residuals. */
-SIZED void correct(int even, const Equations *q, const Factors *factors, Correction *c,
+SIZED void correct(int even, const Equations *eq, const Factors *factors, Correction *c,
                    double *y) {
     UNROLLED_BY_LANES
     for (int j = 0; j < even; j += LANES) {
         set_lanes(c->change + j, all_lanes(0.0));
     }
     finish_dispatch(even, factors, c->change, c->residual);
-    for (int i = 0; i < q->system->n; i++) {
+    for (int i = 0; i < eq->system->n; i++) {
         y[i] += c->change[i];
     }
 }
 
 /* Correct y once by the factors of its evaluation; return false if a residual remains. */
-SIZED bool corrected_of_length(int even, const Equations *q, const Evaluation *evaluation,
+SIZED bool corrected_of_length(int even, const Equations *eq, const Evaluation *evaluation,
                                const Reference *near, double t, double *y, Correction *c) {
-    int n = q->system->n;
-    position_residuals(even, q, &evaluation->at, t, c->residual);
-    correct(even, q, &evaluation->factors, c, y);
+    int n = eq->system->n;
+    position_residuals(even, eq, &evaluation->at, t, c->residual);
+    correct(even, eq, &evaluation->factors, c, y);
     pad_of(even, n, y, c->at.angle);
-    arms_at(even, q->system, near, &c->at);
-    double worst = position_residuals(even, q, &c->at, t, c->residual);
-    if (!(worst <= CONSTRAINT_RTOL * q->system->length)) {
+    arms_at(even, eq->system, near, &c->at);
+    double worst = position_residuals(even, eq, &c->at, t, c->residual);
+    if (!(worst <= CONSTRAINT_RTOL * eq->system->length)) {
         return false;
     }
     pad_second(even, n, y, c->at.speed);
-    velocity_residuals(even, q, t, c);
-    correct(even, q, &evaluation->factors, c, y + n);
+    velocity_residuals(even, eq, t, c);
+    correct(even, eq, &evaluation->factors, c, y + n);
     return true;
 }
 
-static bool corrected(const Equations *q, const Evaluation *evaluation, const Reference *near,
+static bool corrected(const Equations *eq, const Evaluation *evaluation, const Reference *near,
                       double t, double *y, Correction *c) {
-    int even = q->system->even;
+    int even = eq->system->even;
     switch (even) {
-    case 4: return corrected_of_length(4, q, evaluation, near, t, y, c);
-    case 8: return corrected_of_length(8, q, evaluation, near, t, y, c);
-    default: return corrected_of_length(even, q, evaluation, near, t, y, c);
+    case 4: return corrected_of_length(4, eq, evaluation, near, t, y, c);
+    case 8: return corrected_of_length(8, eq, evaluation, near, t, y, c);
+    default: return corrected_of_length(even, eq, evaluation, near, t, y, c);
     }
 }
 
 PRBM bool project_near(const Equations *equations, const Evaluation *evaluation,
                        const Reference *near, double t, double *y, Correction *correction,
                        Scratch *scratch, Problem *problem) {
-    const Equations *q = equations;
-    int n = q->system->n;
+    const Equations *eq = equations;
+    int n = eq->system->n;
     size_t mark = scratch->used;
     double *kept = take(scratch, (size_t)n);
     copy(n, y, kept);
     scratch->used = mark;
-    if (q->slipping_stops == 0 && corrected(q, evaluation, near, t, y, correction)) {
+    if (eq->slipping_stops == 0 && corrected(eq, evaluation, near, t, y, correction)) {
         return true;
     }
     copy(n, kept, y); /* Undo the correction. */
-    if (!project(q, t, y, scratch, problem)) {
+    if (!project(eq, t, y, scratch, problem)) {
         return false;
     }
     pad(n, y, correction->at.angle);
-    find_directions(q->system, near, &correction->at);
+    find_directions(eq->system, near, &correction->at);
     return true;
 }

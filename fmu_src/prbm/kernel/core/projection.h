@@ -25,6 +25,6 @@ PRBM bool project_with_impulses(const Equations *equations, double t, double *y,
 PRBM bool project_near(const Equations *equations, const Evaluation *evaluation,
                        const Reference *near, double t, double *y, Correction *correction,
                        Scratch *scratch, Problem *problem);
-PRBM double prescribed(const Equations *q, int k, double t);
+PRBM double prescribed(const Equations *eq, int k, double t);
 
 #endif

@@ -86,9 +86,9 @@ static void stage_state(int n, int row, double h, const double *k, const double 
     }
 }
 
-static void add_to_range(const Equations *q, const Evaluation *evaluation, ForceRange *range) {
-    const double *force = evaluation->lam + q->first_hold;
-    for (int k = 0; k < q->held_count; k++) {
+static void add_to_range(const Equations *eq, const Evaluation *evaluation, ForceRange *range) {
+    const double *force = evaluation->lam + eq->first_hold;
+    for (int k = 0; k < eq->held_count; k++) {
         range->least[k] = lesser(force[k], range->least[k]);
         range->largest[k] = greater(force[k], range->largest[k]);
     }

@@ -9,19 +9,19 @@
 /* --- loads ------------------------------------------------------------------------------------ */
 
 /* Compute gravity, inertia and mass-proportional damping of all mass points. */
-static void point_loads_at(const Equations *q, const Complex *e, const double *v, const double *a,
+static void point_loads_at(const Equations *eq, const Complex *e, const double *v, const double *a,
                            Complex *loads, Scratch *scratch) {
-    const System *system = q->system;
+    const System *system = eq->system;
     size_t mark = scratch->used;
     int d = system->d;
-    Complex field = minus(system->gravity, q->inputs.base);
+    Complex field = minus(system->gravity, eq->inputs.base);
     Complex *bend = take_complex(scratch, d, 1), *w = take_complex(scratch, d, 1);
     arm_accelerations(system, e, v, a, bend, scratch);
-    if (q->mass_damping != 0.0) {
+    if (eq->mass_damping != 0.0) {
         turning(system, v, w);
         for (int j = 0; j < d; j++) {
             Complex rate = product(e[j], w[j]);
-            bend[j] = plus(bend[j], scaled(q->mass_damping, complex_of(-rate.im, rate.re)));
+            bend[j] = plus(bend[j], scaled(eq->mass_damping, complex_of(-rate.im, rate.re)));
         }
     }
     for (int i = 0; i < system->p; i++) {
@@ -36,16 +36,16 @@ static void pull_body(Complex *on, int body, Complex force) {
 }
 
 /* The friction force of a contact along its direction. */
-static double rubbing_force(const Equations *q, const Complex *e, const Evaluation *found,
+static double rubbing_force(const Equations *eq, const Complex *e, const Evaluation *found,
                             int contact) {
-    return q->contacts.modes[contact] == CONTACT_STICK ? stick_force(q, found->lam, contact)
-                                                       : slip_force(q, e, found, contact);
+    return eq->contacts.modes[contact] == CONTACT_STICK ? stick_force(eq, found->lam, contact)
+                                                       : slip_force(eq, e, found, contact);
 }
 
 /* Let a closed stop push and rub its bodies. */
-static void pull_stop(const Equations *q, const Complex *e, int i, double force, double along,
+static void pull_stop(const Equations *eq, const Complex *e, int i, double force, double along,
                       Complex *on) {
-    const System *system = q->system;
+    const System *system = eq->system;
     const Stop *stop = &system->mechanism->stops[i];
     Complex u = unit(stop->direction);
     u = system->on[i] == FIXED ? u : product(u, e[system->on[i]]);
@@ -54,22 +54,22 @@ static void pull_stop(const Equations *q, const Complex *e, int i, double force,
     pull_body(on, stop->on, scaled(-1.0, pull));
 }
 
-PRBM void add_contact_pulls(const Equations *q, const Complex *e, const Evaluation *found,
+PRBM void add_contact_pulls(const Equations *eq, const Complex *e, const Evaluation *found,
                             Complex *on) {
-    const System *system = q->system;
+    const System *system = eq->system;
     const Mechanism *m = system->mechanism;
     const double *lam = found->lam;
-    for (int k = 0; k < q->held_count; k++) {
-        int i = q->held[k];
-        pull_stop(q, e, i, stop_force(q, lam, i), rubbing_force(q, e, found, i), on);
+    for (int k = 0; k < eq->held_count; k++) {
+        int i = eq->held[k];
+        pull_stop(eq, e, i, stop_force(eq, lam, i), rubbing_force(eq, e, found, i), on);
     }
-    for (int k = 0; k < q->pressed_count; k++) {
-        int i = q->pressed[k];
-        pull_stop(q, e, i, found->pressure[i], rubbing_force(q, e, found, i), on);
+    for (int k = 0; k < eq->pressed_count; k++) {
+        int i = eq->pressed[k];
+        pull_stop(eq, e, i, found->pressure[i], rubbing_force(eq, e, found, i), on);
     }
     for (int i = 0; i < system->f; i++) {
         const Friction *friction = &m->frictions[i];
-        double size = rubbing_force(q, e, found, system->s + i);
+        double size = rubbing_force(eq, e, found, system->s + i);
         Complex pull = scaled(size, unit(friction->direction));
         pull_body(on, friction->body, pull);
         pull_body(on, GROUND, scaled(-1.0, pull));
@@ -124,27 +124,27 @@ PRBM void transmit(const System *system, const double *lam, SectionState *at) {
     }
 }
 
-PRBM SectionState section_state(const Equations *q, const Complex *e, const double *angle,
+PRBM SectionState section_state(const Equations *eq, const Complex *e, const double *angle,
                                 const double *v, const Evaluation *found, Scratch *scratch) {
-    const System *system = q->system;
+    const System *system = eq->system;
     const Mechanism *m = system->mechanism;
     double *strained = take(scratch, (size_t)system->n);
     SectionState at = {e, angle, strained, take_complex(scratch, system->p, 1),
                        take_complex(scratch, system->b + 1, 1),
                        take_complex(scratch, m->flexure_count, 1)};
     for (int j = 0; j < system->n; j++) {
-        strained[j] = angle[j] - system->q0[j] + q->beta * v[j];
+        strained[j] = angle[j] - system->q0[j] + eq->beta * v[j];
     }
-    point_loads_at(q, e, v, found->a, at.loads, scratch);
+    point_loads_at(eq, e, v, found->a, at.loads, scratch);
     at.on[GROUND] = complex_of(0.0, 0.0);
     for (int body = 1; body <= system->b; body++) {
         at.on[body] = at.loads[system->body_masses[body - 1]];
     }
     for (int i = 0; i < m->force_count; i++) {
-        const double *given = q->inputs.forces + LOADS * i;
+        const double *given = eq->inputs.forces + LOADS * i;
         pull_body(at.on, m->forces[i].body, complex_of(given[0], given[1]));
     }
-    add_contact_pulls(q, e, found, at.on);
+    add_contact_pulls(eq, e, found, at.on);
     transmit(system, found->lam, &at);
     return at;
 }
@@ -379,12 +379,12 @@ PRBM Stress *take_stresses(Scratch *scratch, int count) {
     return (Stress *)take_matrix(scratch, count, sizeof(Stress) / sizeof(double));
 }
 
-PRBM void stresses(const Equations *q, const Complex *e, const double *angle, const double *v,
+PRBM void stresses(const Equations *eq, const Complex *e, const double *angle, const double *v,
                    const Evaluation *evaluation, Stress *found, Scratch *scratch) {
-    const System *system = q->system;
+    const System *system = eq->system;
     const Mechanism *m = system->mechanism;
     size_t mark = scratch->used;
-    SectionState at = section_state(q, e, angle, v, evaluation, scratch);
+    SectionState at = section_state(eq, e, angle, v, evaluation, scratch);
     for (int i = 0, k = 0; i < m->flexure_count; i++) {
         if (has_stress(m, i)) {
             const FreeBody *body = &system->free_bodies[i];

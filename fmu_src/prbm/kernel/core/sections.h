@@ -28,13 +28,13 @@ typedef struct {
 } SectionState;
 
 /* Add the forces of closed stops and of friction points on the bodies to on (b + 1,). */
-PRBM void add_contact_pulls(const Equations *q, const Complex *e, const Evaluation *found,
+PRBM void add_contact_pulls(const Equations *eq, const Complex *e, const Evaluation *found,
                             Complex *on);
 /* Compute the forces on the far ends of all flexures, and add the forces of flexures and joints on
  * the bodies.  lam: the multipliers, or their changes. */
 PRBM void transmit(const System *system, const double *lam, SectionState *at);
 /* Compute the state at which sections are loaded, in working memory. */
-PRBM SectionState section_state(const Equations *q, const Complex *e, const double *angle,
+PRBM SectionState section_state(const Equations *eq, const Complex *e, const double *angle,
                                 const double *v, const Evaluation *found, Scratch *scratch);
 /* Compute the stress of the left and of the right face in the sections of a flexure, (m,), (m,). */
 PRBM void face_stresses(const System *system, const FreeBody *body, const SectionState *at,
@@ -57,7 +57,7 @@ PRBM double stress_at(const FreeBody *body, const double *left, const double *ri
 /* Take working memory for the stress of several flexures. */
 PRBM Stress *take_stresses(Scratch *scratch, int count);
 /* Compute the stress of all flexures whose stress is an output. */
-PRBM void stresses(const Equations *q, const Complex *e, const double *angle, const double *v,
+PRBM void stresses(const Equations *eq, const Complex *e, const double *angle, const double *v,
                    const Evaluation *evaluation, Stress *found, Scratch *scratch);
 
 #endif

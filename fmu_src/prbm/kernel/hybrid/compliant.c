@@ -247,18 +247,18 @@ static bool stop_motion(Simulation *sim, int stop, Problem *problem) {
 /* Whether other constraints, such as its own friction, hold a hit point at rest. */
 static bool is_stuck(Simulation *sim, int stop, bool *result, Problem *problem) {
     size_t mark = sim->scratch.used;
-    const Equations *q = &sim->equations;
-    int n = q->system->n;
+    const Equations *eq = &sim->equations;
+    int n = eq->system->n;
     *result = false;
-    if (q->r == q->system->r) {
+    if (eq->r == eq->system->r) {
         return true; /* There are no constraints but the loops. */
     }
-    double *G = take(&sim->scratch, (size_t)n), *held = take_matrix(&sim->scratch, q->r, n);
+    double *G = take(&sim->scratch, (size_t)n), *held = take_matrix(&sim->scratch, eq->r, n);
     ContactProblem *at = contact_problem_at(sim, sim->state.front);
-    Rows gaps = gap_rows(q->system);
+    Rows gaps = gap_rows(eq->system);
     row_jacobian(&gaps, stop, at->e, G);
-    jacobian(&q->active, at->e, held);
-    bool moves = true, ok = independent(at, q->r, held, G, &moves, &sim->scratch, problem);
+    jacobian(&eq->active, at->e, held);
+    bool moves = true, ok = independent(at, eq->r, held, G, &moves, &sim->scratch, problem);
     *result = !moves;
     sim->scratch.used = mark;
     return ok;

@@ -206,7 +206,7 @@ static bool is_mobile(Simulation *sim, int contact, const ContactMode *modes, bo
                       Problem *problem) {
     size_t mark = sim->scratch.used, bytes = (size_t)contact_count(sim) * sizeof *modes;
     const System *system = system_of(sim);
-    const Equations *q = &sim->trial.equations;
+    const Equations *eq = &sim->trial.equations;
     double *row = take(&sim->scratch, (size_t)system->n);
     ContactMode others[CONTACTS_MAX];
     ContactProblem *at = contact_problem_at(sim, sim->state.front);
@@ -216,9 +216,9 @@ static bool is_mobile(Simulation *sim, int contact, const ContactMode *modes, bo
     }
     try_contacts(sim, others);
     tangential_row(system, contact, at->e, row);
-    double *held = take_matrix(&sim->scratch, q->r, system->n);
-    jacobian(&q->active, at->e, held);
-    bool ok = independent(at, q->r, held, row, result, &sim->scratch, problem);
+    double *held = take_matrix(&sim->scratch, eq->r, system->n);
+    jacobian(&eq->active, at->e, held);
+    bool ok = independent(at, eq->r, held, row, result, &sim->scratch, problem);
     sim->scratch.used = mark;
     return ok;
 }

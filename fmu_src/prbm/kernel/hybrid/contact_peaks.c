@@ -94,14 +94,14 @@ PRBM void peaks_until(Simulation *sim, int stop, double time, double *depth, dou
 static Dent dent_now(Simulation *sim, int stop, double gap_now, double rate,
                      const Evaluation *at) {
     size_t mark = sim->scratch.used;
-    const Equations *q = &sim->equations;
-    const ComplianceLaw *law = &q->laws[stop];
-    const Touching *touching = &q->contacts.touching[stop];
+    const Equations *eq = &sim->equations;
+    const ComplianceLaw *law = &eq->laws[stop];
+    const Touching *touching = &eq->contacts.touching[stop];
     const double *front = sim->state.front;
     double t = sim->state.front_time;
     Dent dent = {1.0, t, -gap_now, rate, at->pressure[stop], 0.0};
     if (touching->phase != PHASE_FREE) {
-        double bend = -gap_acceleration(q, stop, t, directions_at(sim, front),
+        double bend = -gap_acceleration(eq, stop, t, directions_at(sim, front),
                                         front + system_of(sim)->n, at);
         dent.force_rate = contact_stiffness(law, dent.depth) * rate *
                               damping_ratio(law, touching, rate) +

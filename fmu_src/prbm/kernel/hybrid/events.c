@@ -74,9 +74,9 @@ static bool find_events(Simulation *sim, EventKind kind, Event *first, Problem *
 }
 
 /* The first kind of events that the present contacts allow: an open stop has impacts only. */
-static EventKind first_kind(const Equations *q) {
-    bool closed = q->held_count > 0 || q->sticking_count > 0 || q->slipping_count > 0;
-    return closed ? EVENT_NONE + 1 : q->pressed_count > 0 ? EVENT_SWITCH : EVENT_IMPACT;
+static EventKind first_kind(const Equations *eq) {
+    bool closed = eq->held_count > 0 || eq->sticking_count > 0 || eq->slipping_count > 0;
+    return closed ? EVENT_NONE + 1 : eq->pressed_count > 0 ? EVENT_SWITCH : EVENT_IMPACT;
 }
 
 PRBM bool first_event(Simulation *sim, Event *first, Problem *problem) {

@@ -93,13 +93,13 @@ PRBM bool pressed_near(Simulation *sim) {
 }
 
 PRBM bool release_near(Simulation *sim) {
-    const Equations *q = &sim->equations;
+    const Equations *eq = &sim->equations;
     const ForceRange *forces = &sim->stepping.forces;
-    if (q->sticking_count > 0) {
+    if (eq->sticking_count > 0) {
         return true;
     }
-    for (int k = 0; k < q->held_count; k++) {
-        if (q->contacts.touching[q->held[k]].phase == PHASE_SETTLED ||
+    for (int k = 0; k < eq->held_count; k++) {
+        if (eq->contacts.touching[eq->held[k]].phase == PHASE_SETTLED ||
             forces->least[k] <= RELEASE_WATCH_FACTOR * forces->largest[k]) {
             return true;
         }
@@ -185,17 +185,17 @@ PRBM bool impact_near(Simulation *sim) {
 
 /* Whether a contact may end within the step. */
 PRBM bool separation_near(Simulation *sim) {
-    const Equations *q = &sim->equations;
+    const Equations *eq = &sim->equations;
     const Complex *e = sim->stepping.reference.e;
     double start = sim->state.arc.start, *arms = sim->stepping.reach;
     const double *extra = extra_states(sim, sim->state.arc.y);
-    if (q->pressed_count == 0 || q->walls_give) {
-        return q->pressed_count > 0;
+    if (eq->pressed_count == 0 || eq->walls_give) {
+        return eq->pressed_count > 0;
     }
     bound_arms(sim, arms);
-    for (int k = 0; k < q->pressed_count; k++) {
-        int s = q->pressed[k];
-        if (!(-gap(q, s, start, e, extra) > gap_reach(sim, s, e, arms))) {
+    for (int k = 0; k < eq->pressed_count; k++) {
+        int s = eq->pressed[k];
+        if (!(-gap(eq, s, start, e, extra) > gap_reach(sim, s, e, arms))) {
             return true;
         }
     }

@@ -48,20 +48,20 @@ PRBM bool settle_moved(Simulation *sim, Problem *problem) {
  * the given time; NULL: without limit. */
 PRBM bool follow_walls(Simulation *sim, const double *lam, double time, Problem *problem) {
     size_t mark = sim->scratch.used;
-    const Equations *q = &sim->equations;
-    int ny = state_size(sim), n = system_of(sim)->n, h = q->first_hold;
+    const Equations *eq = &sim->equations;
+    int ny = state_size(sim), n = system_of(sim)->n, h = eq->first_hold;
     double gaps[STOPS_MAX], rates[STOPS_MAX], *y = sim->state.front, t = sim->state.front_time;
-    double *P = take(&sim->scratch, (size_t)q->r), *after = take(&sim->scratch, (size_t)ny);
+    double *P = take(&sim->scratch, (size_t)eq->r), *after = take(&sim->scratch, (size_t)ny);
     copy(ny, y, after);
     gaps_and_rates(sim, gaps, rates);
-    bool ok = project_with_impulses(q, t, after, P, &sim->scratch, problem), follows = ok;
-    for (int k = 0; follows && k < q->held_count; k++) {
+    bool ok = project_with_impulses(eq, t, after, P, &sim->scratch, problem), follows = ok;
+    for (int k = 0; follows && k < eq->held_count; k++) {
         double pull = lam ? greater(lam[h + k], 0.0) * time : HUGE_VAL;
-        follows = fabs(rates[q->held[k]]) <= jump_allowed(sim, q->held[k]) && P[h + k] >= -pull;
+        follows = fabs(rates[eq->held[k]]) <= jump_allowed(sim, eq->held[k]) && P[h + k] >= -pull;
     }
-    for (int k = 0; follows && k < q->held_count; k++) {
-        after[2 * n] -= P[h + k] * rates[q->held[k]] / 2;
-        after[2 * n + 1] += push_wall(sim, q->held[k], P[h + k]);
+    for (int k = 0; follows && k < eq->held_count; k++) {
+        after[2 * n] -= P[h + k] * rates[eq->held[k]] / 2;
+        after[2 * n + 1] += push_wall(sim, eq->held[k], P[h + k]);
     }
     copy(follows ? ny : 0, after, y);
     sim->scratch.used = mark;

@@ -135,25 +135,25 @@ static void output_places(Simulation *sim) {
 /* near: whether the reference is near the present state. */
 static bool output_motion(Simulation *sim, bool near, Problem *problem) {
     const Slots *slots = &sim->configuration.mechanism->slots;
-    const Equations *q = &sim->equations;
+    const Equations *eq = &sim->equations;
     Present *present = &sim->present;
     double *out = present->outputs, *v = present->y + system_of(sim)->n;
-    if (!evaluate_equations(q, sim->state.time, present->y, v, extra_states(sim, present->y),
+    if (!evaluate_equations(eq, sim->state.time, present->y, v, extra_states(sim, present->y),
                             near ? &present->reference : NULL, &present->evaluation, problem)) {
         return false;
     }
     for (int i = 0; i < system_of(sim)->s; i++) {
         out[slots->stops + PER_STOP * i + STOP_FORCE] = 0.0;
     }
-    for (int k = 0; k < q->held_count; k++) {
-        double force = present->evaluation.lam[q->first_hold + k];
-        out[slots->stops + PER_STOP * q->held[k] + STOP_FORCE] = force;
+    for (int k = 0; k < eq->held_count; k++) {
+        double force = present->evaluation.lam[eq->first_hold + k];
+        out[slots->stops + PER_STOP * eq->held[k] + STOP_FORCE] = force;
     }
-    for (int k = 0; k < q->pressed_count; k++) {
-        int i = q->pressed[k];
+    for (int k = 0; k < eq->pressed_count; k++) {
+        int i = eq->pressed[k];
         out[slots->stops + PER_STOP * i + STOP_FORCE] = present->evaluation.pressure[i];
     }
-    out[slots->energies + ENERGY_KINETIC] = kinetic_energy_of(q, &present->evaluation);
+    out[slots->energies + ENERGY_KINETIC] = kinetic_energy_of(eq, &present->evaluation);
     return true;
 }
 
