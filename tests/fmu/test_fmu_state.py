@@ -81,7 +81,7 @@ def test_a_state_of_another_fmu_or_interface_is_rejected(fmus, data):
         instance.fmu.freeFMUState(state)
 
 
-@pytest.mark.parametrize("lost", ["clock", "snapshot", "snapshot front", "snapshot course"])
+@pytest.mark.parametrize("lost", ["clock", "snapshot", "snapshot front", "snapshot history"])
 def test_an_incomplete_state_is_rejected_as_a_whole(fmus, lost):
     """None of its values are restored, and a complete state can be restored afterwards."""
     with Instance(fmus["PRBDM"]).initialize() as instance:

@@ -107,7 +107,7 @@ class Simulation:
         self.prepared = self.configuration
         self.changed = False
         self.received = _impulses(self.mechanism, self.given)
-        self.course, at_start = walls.start(self.configuration, self.given, self.time)
+        self.history, at_start = walls.start(self.configuration, self.given, self.time)
         inputs = Inputs.of(mechanism, self.given, at_start)
         self.front = released(self.configuration, inputs, self.time)
         self.peaks = PeakRecord.at(self.front)
@@ -245,8 +245,8 @@ class Simulation:
     def _advance(self, time: float) -> None:
         """Continue the motion to a later time."""
         present = compliant.present_walls(replace(self.front, time=self.time), self.state)
-        self.course, moved = walls.join(
-            self.configuration, self.prepared, self.given, self.course, present, self.time, time
+        self.history, moved = walls.join(
+            self.configuration, self.prepared, self.given, self.history, present, self.time, time
         )
         if self.changed or moved != self.inputs.walls:
             self._restart(moved)
@@ -495,7 +495,7 @@ class Simulation:
             "frequency": self.frequency,
             "time": self.time,
             "front": snapshot.plain_front(self.front),
-            "course": asdict(self.course),
+            "history": asdict(self.history),
             "window": asdict(self.window),
             "controller": asdict(self.controller),
             "fastest": snapshot.plain_fastest(self.fastest),

@@ -22,7 +22,7 @@ from .peaks import Peak, PeakRecord, Sample
 from .runge_kutta import TSITOURAS_PAPAKOSTAS
 from .stability import FastestMode
 from .stepping import StepSizeController
-from .walls import Course
+from .walls import StepHistory
 
 T = TypeVar("T")
 Plain = dict[str, Any]
@@ -92,9 +92,9 @@ def touch_of(plain: Mapping[str, Any] | None) -> Touch | None:
     return _made(Touch, {**plain, **arrays})
 
 
-def course_of(plain: Mapping[str, Any]) -> Course:
+def history_of(plain: Mapping[str, Any]) -> StepHistory:
     """Return the past communication steps, on which the walls depend, from plain values."""
-    return Course(plain["point"], plain["longest"], tuple(plain["driven"]))
+    return StepHistory(plain["point"], plain["longest"], tuple(plain["driven"]))
 
 
 def plain_arc(arc: Arc | None) -> Plain | None:
@@ -290,7 +290,7 @@ def restored(saved: Mapping[str, Any], configuration: Configuration) -> dict[str
         "changed": saved["changed"],
         "time": saved["time"],
         "front": front_of(saved["front"], acting),
-        "course": course_of(saved["course"]),
+        "history": history_of(saved["history"]),
         "window": _made(EventWindow, saved["window"]),
         "controller": _made(StepSizeController, saved["controller"]),
         "fastest": fastest_of(saved["fastest"]),

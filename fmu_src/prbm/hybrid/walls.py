@@ -30,7 +30,7 @@ from .front import Front
 
 
 @dataclass(frozen=True)
-class Course:
+class StepHistory:
     """The past communication steps, as far as the walls depend on them.
 
     Parameters
@@ -50,13 +50,13 @@ class Course:
 
 def start(
     configuration: Configuration, given: Mapping[str, float], time: float
-) -> tuple[Course, tuple[Wall, ...]]:
+) -> tuple[StepHistory, tuple[Wall, ...]]:
     """Return the walls at a start time [s]: each has position and velocity of its reference."""
     walls = tuple(
         _given_reference(configuration, given, i, time)
         for i in range(len(configuration.mechanism.stops))
     )
-    return Course(time, 0.0, tuple(wall.rate != 0.0 for wall in walls)), walls
+    return StepHistory(time, 0.0, tuple(wall.rate != 0.0 for wall in walls)), walls
 
 
 def _given_reference(
@@ -72,11 +72,11 @@ def join(
     acting: Configuration,
     configuration: Configuration,
     given: Mapping[str, float],
-    course: Course,
+    history: StepHistory,
     walls: tuple[Wall, ...],
     now: float,
     time: float,
-) -> tuple[Course, tuple[Wall, ...]]:
+) -> tuple[StepHistory, tuple[Wall, ...]]:
     """Return the walls from a communication point on.
 
     A wall whose reference has not changed moves on as before.  Before the first step, the velocity
@@ -89,18 +89,18 @@ def join(
         Configurations with the parameter values up to now, and from now on.
     given : mapping
         Values of all inputs.
-    course : Course
+    history : StepHistory
         Past communication steps.
     walls : (s,) tuple of Wall
         Motions of the walls up to now.
     now, time : float
         This communication point and the next [s].
     """
-    last, following = now - course.point, time - now
-    recent = max(last or following, course.longest - WALL_FADING_FACTOR * last)
+    last, following = now - history.point, time - now
+    recent = max(last or following, history.longest - WALL_FADING_FACTOR * last)
     longest = min(recent, WALL_LONGEST_RTOL * configuration.scales.time)
     span, round_off = 2.0 * longest, WALL_PATH_RTOL * configuration.system.length
-    joined, driven = list(walls), list(course.driven)
+    joined, driven = list(walls), list(history.driven)
     for i, wall in enumerate(walls):
         line = _given_reference(configuration, given, i, now)
         off = line.position - wall.reference(now)
@@ -113,7 +113,7 @@ def join(
         if not same or configuration.stop_value(i, "offset") != acting.stop_value(i, "offset"):
             velocity = float(wall.motion(now)[1]) if last else line.rate
             joined[i] = wall.joining(line, velocity, span)
-    return Course(now, longest, tuple(driven)), tuple(joined)
+    return StepHistory(now, longest, tuple(driven)), tuple(joined)
 
 
 def keeping_gaps(old: System, new: System, y: Real, walls: tuple[Wall, ...]) -> tuple[Wall, ...]:

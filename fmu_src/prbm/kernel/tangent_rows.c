@@ -17,7 +17,7 @@ PRBM Arm arm_at(const Tangent *t, int j) {
 
 /* Compute term j of row i: f B_j E_j for j < d, f z for j = d, with f = conj(E) of the body that
  * carries the wall, or f = 1 on the ground.  Return false if the term is zero. */
-static bool seen_part(const Tangent *t, const Rows *rows, int i, int j, Arm *seen) {
+static bool relative_term(const Tangent *t, const Rows *rows, int i, int j, Arm *seen) {
     int d = rows->system->d, on = seen_from(rows, i);
     Complex size = {0.0, 0.0};
     if (j < d) {
@@ -51,7 +51,7 @@ static double value_change(const Tangent *t, const Rows *rows, int i) {
     double sum = 0.0;
     Arm part;
     for (int j = 0; j <= rows->system->d; j++) {
-        sum -= seen_part(t, rows, i, j, &part) ? product(part.E, part.dphi).im : 0.0;
+        sum -= relative_term(t, rows, i, j, &part) ? product(part.E, part.dphi).im : 0.0;
     }
     return sum;
 }
@@ -60,7 +60,7 @@ PRBM double rate_change(const Tangent *t, const Rows *rows, int i) {
     double sum = 0.0;
     Arm part;
     for (int j = 0; j <= rows->system->d; j++) {
-        sum -= seen_part(t, rows, i, j, &part) ? swing_change(&part).im : 0.0;
+        sum -= relative_term(t, rows, i, j, &part) ? swing_change(&part).im : 0.0;
     }
     return sum;
 }
@@ -69,7 +69,7 @@ PRBM double second_change(const Tangent *t, const Rows *rows, int i) {
     double sum = 0.0;
     Arm part;
     for (int j = 0; j <= rows->system->d; j++) {
-        sum += seen_part(t, rows, i, j, &part) ? bend_change(&part).re : 0.0;
+        sum += relative_term(t, rows, i, j, &part) ? bend_change(&part).re : 0.0;
     }
     return sum;
 }
@@ -78,7 +78,7 @@ PRBM void add_pull(const Tangent *t, const Rows *rows, int i, double force) {
     int d = rows->system->d, on = seen_from(rows, i);
     Arm part;
     for (int j = 0; j <= d; j++) {
-        if (seen_part(t, rows, i, j, &part)) {
+        if (relative_term(t, rows, i, j, &part)) {
             Complex change = scaled(force, product(part.E, part.dphi));
             if (j < d) {
                 t->pull[j] = minus(t->pull[j], change);

@@ -169,11 +169,11 @@ def newton(W: Real, u: Real, restitution: Real, speed: float = 0.0) -> Real:
     P = impulses(W, b, none, np.zeros(len(b)), tolerance)
     if P is None:
         raise SimulationError(CLOSING_IN)
-    shared = _shared(W, b, np.flatnonzero(np.abs(W @ P + b) <= tolerance))
+    shared = _least_norm_impulses(W, b, np.flatnonzero(np.abs(W @ P + b) <= tolerance))
     return shared if violation(W, b, shared, none) <= tolerance else P
 
 
-def _shared(W: Real, b: Real, members: NDArray[np.int_]) -> Real:
+def _least_norm_impulses(W: Real, b: Real, members: NDArray[np.int_]) -> Real:
     """Return the impulses with the least sum of squares with which the members open at -eps u.
 
     Members that would have to pull are removed and receive no impulse.

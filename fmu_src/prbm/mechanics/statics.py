@@ -158,9 +158,11 @@ def equilibrium(
         return Equilibrium(system.q0, np.zeros(len(system.loops)), 0.0, w)
     if displacement is not None:
         if held_by_loops(system):  # The matrix of the balance would be singular.
-            raise EquilibriumError(f"{_given(system, displacement)}: {immobile(system)}")
+            raise EquilibriumError(f"{_release_text(system, displacement)}: {immobile(system)}")
         if displacement != 0.0 and turns_about_point(system):
-            raise EquilibriumError(f"{_given(system, displacement)}: {_about(system)}")
+            raise EquilibriumError(
+                f"{_release_text(system, displacement)}: {_turning_message(system)}"
+            )
     n, r = system.n, len(system.loops)
     unit = system.length if system.mechanism.release.turns else 1.0  # The row is turn times size.
 
@@ -302,7 +304,7 @@ def _unreachable(system: System, displacement: float | None, loaded: bool, done:
             "load; reduce gravity or the masses, or stiffen the flexures"
         )
     where = (
-        f"{_given(system, displacement)} cannot be reached: no equilibrium was found beyond "
+        f"{_release_text(system, displacement)} cannot be reached: no equilibrium was found beyond "
         f"{done * displacement + 0.0:.4g} {_unit(system)}"
     )
     if not system.gravity:  # The shape does not depend on the size of the stiffness.
@@ -326,7 +328,7 @@ def _unit(system: System) -> str:
     return "rad" if system.mechanism.release.turns else "m"
 
 
-def _given(system: System, amount: float) -> str:
+def _release_text(system: System, amount: float) -> str:
     """Return the start of the release with a value, the beginning of a message."""
     name = "angle" if system.mechanism.release.turns else "displacement"
     return f"release.{name} = {amount:g} {_unit(system)}"
@@ -360,7 +362,7 @@ def turns_about_point(system: System) -> bool:
     return abs(float(row @ response)) < RELEASE_LEVER_RTOL * system.length * turn
 
 
-def _about(system: System) -> str:
+def _turning_message(system: System) -> str:
     """Return why a displacement of the released point is rejected, and a remedy."""
     release = system.mechanism.release
     point = "centre of mass" if release.point is None else "released point"

@@ -201,8 +201,8 @@ PRBM void set_block_maps(System *system, Scratch *scratch) {
 
 /* Compute the directions out of the coordinates x of a beam.  A last direction without a pair is
  * stored alone, because the next number belongs to the next block. */
-SIZED void map_beam(int nodes, bool body, const double *change, const double *ALONE x,
-                    double *ALONE out) {
+SIZED void map_beam(int nodes, bool body, const double *change, const double *RESTRICT x,
+                    double *RESTRICT out) {
     const int size = nodes + body, even = even_length(size), paired = size - size % PAIR;
     const int computed = body ? paired : even;
     Lanes sum[BEAM_DIRECTIONS_MAX + 1];
@@ -241,7 +241,7 @@ SIZED void map_beam_motion(int nodes, bool body, const BlockMap *map, Kinematics
     map_beam(nodes, body, map->change, speed, at->turn + map->start);
 }
 
-RARE void map_block(const BlockMap *map, const double *x, double *out) {
+NOINLINE void map_block(const BlockMap *map, const double *x, double *out) {
     for (int i = 0; i < map->size; i += LANES) {
         Lanes sum = NO_LANES;
         for (int c = 0; c < map->count; c++) {
@@ -276,7 +276,7 @@ PRBM void map_motion(const System *system, Kinematics *at) {
     }
 }
 
-RARE void pull_block(const BlockMap *map, const double *x, double *out) {
+NOINLINE void pull_block(const BlockMap *map, const double *x, double *out) {
     const int paired = map->size - map->size % PAIR;
     x += map->start;
     for (int c = 0; c < map->count; c++) {
@@ -291,7 +291,8 @@ RARE void pull_block(const BlockMap *map, const double *x, double *out) {
 }
 
 /* Compute the derivatives by the coordinates out of those by the directions at the nodes. */
-SIZED void pull_nodes(int nodes, const BlockMap *map, const double *ALONE x, Lanes *ALONE sum) {
+SIZED void pull_nodes(int nodes, const BlockMap *map, const double *RESTRICT x,
+                      Lanes *RESTRICT sum) {
     UNROLLED
     for (int c = 0; c < BEAM_COORDINATES; c += LANES) {
         sum[c / LANES] = x[0] * lanes_at(map->rows + c);
@@ -307,8 +308,8 @@ SIZED void pull_nodes(int nodes, const BlockMap *map, const double *ALONE x, Lan
 }
 
 /* Add the derivatives by the directions of a beam, pulled back to the coordinates, to out. */
-SIZED void pull_beam(int nodes, bool body, const BlockMap *map, const double *ALONE x,
-                     double *ALONE out) {
+SIZED void pull_beam(int nodes, bool body, const BlockMap *map, const double *RESTRICT x,
+                     double *RESTRICT out) {
     Lanes sum[BEAM_COORDINATES / LANES];
     double entries[BEAM_COORDINATES];
     pull_nodes(nodes, map, x + map->start, sum);
@@ -353,8 +354,8 @@ PRBM void pull_directions(const System *system, int r, const double *x, double *
 /* Compute the mass matrix M (size, even) of the directions of a block below its diagonal, and
  * add the quadratic velocity terms to the loads x.  The rows of the nodes of a beam are not
  * multiplied by H, which its products contain. */
-SIZED void couple_block(int size, int nodes, Parts H, Parts e, const double *ALONE squares,
-                        double *ALONE M, double *ALONE x) {
+SIZED void couple_block(int size, int nodes, Parts H, Parts e, const double *RESTRICT squares,
+                        double *RESTRICT M, double *RESTRICT x) {
     const int even = even_length(size);
     UNROLLED
     for (int i = 1; i < size; i++) {
@@ -385,8 +386,8 @@ SIZED void couple_block(int size, int nodes, Parts H, Parts e, const double *ALO
 
 /* Add the mass matrix of a beam, M below its diagonal, to that of the coordinates.  The row of the
  * body is pulled back as a vector, because the direction of the body is a coordinate. */
-SIZED void pull_beam_mass(int nodes, bool body, const BlockMap *map, const double *ALONE M,
-                          double *ALONE mass) {
+SIZED void pull_beam_mass(int nodes, bool body, const BlockMap *map, const double *RESTRICT M,
+                          double *RESTRICT mass) {
     static const double TIMES[BEAM_COORDINATES] = {1.0, 1.0, 1.0, 2.0};
     const int even = even_length(nodes + body);
     const double *product = map->products;
@@ -483,8 +484,8 @@ static void pull_any_mass(const BlockMap *map, const double *M, double *turned, 
 
 /* Add the terms of a block that is not a beam; own (d,) and shift (wide,) are those of all
  * blocks. */
-RARE void add_any_terms(const System *system, const BlockMap *map, const double *own, int r,
-                        Evaluation *result) {
+NOINLINE void add_any_terms(const System *system, const BlockMap *map, const double *own, int r,
+                            Evaluation *result) {
     const Kinematics *at = &result->at;
     const int start = map->start;
     double *M = result->block, *x = result->load + start;

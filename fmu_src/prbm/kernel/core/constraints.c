@@ -206,8 +206,8 @@ PRBM bool factor_saddle(int n, int r, double length, const ScaledFactors *factor
     double *lu = factors->lu;
     bool regular = scales(n, r, lu, length, factors->scale);
     for (int i = 0; regular && i < size; i++) {
-        const double own = factors->scale[i], *ALONE scale = factors->scale;
-        double *ALONE row = lu + i * size;
+        const double own = factors->scale[i], *RESTRICT scale = factors->scale;
+        double *RESTRICT row = lu + i * size;
         for (int j = 0; j < size; j++) {
             row[j] *= own * scale[j];
         }

@@ -75,7 +75,7 @@ static bool closing_in(Problem *problem) {
 /* Solve W P = -b for the impulses P of the stops whose indices are in members (size); all other
  * impulses are zero.  A stop with a negative impulse would pull: its impulse is set to zero, and it
  * is removed from members.  *pulling: whether a stop is removed. */
-static bool share_impulses(int k, int *size, int *members, const double *W, const double *b,
+static bool least_norm_impulses(int k, int *size, int *members, const double *W, const double *b,
                            double *P, bool *pulling, Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
     int count = *size, pushing = 0;
@@ -117,7 +117,7 @@ static bool share_evenly(int k, const double *W, const double *b, double toleran
     zeros(k, shared);
     bool pulling = true, solved = true;
     while (solved && pulling && size > 0) {
-        solved = share_impulses(k, &size, members, W, b, shared, &pulling, scratch, problem);
+        solved = least_norm_impulses(k, &size, members, W, b, shared, &pulling, scratch, problem);
     }
     if (solved && violation(k, 0, W, b, shared, NULL) <= tolerance) {
         copy(k, shared, P);

@@ -88,7 +88,7 @@ PRBM void set_reference(Reference *reference, const System *system, const double
 }
 
 /* Set the arms of links that stretch, and the diagonal of M, which is proportional to |E|^2. */
-RARE void stretch_links(const System *system, Kinematics *at) {
+NOINLINE void stretch_links(const System *system, Kinematics *at) {
     stretch(system, at->theta, at->e);
     pad_parts(system->wide, at->e, at->e_parts);
     copy(system->d, system->own, at->own);
@@ -117,7 +117,7 @@ SHARED void directions_of(int even, const System *system, const Reference *near,
 }
 
 /* Compute the directions and the arms, if the coordinates are not the directions. */
-RARE void mapped_directions(const System *system, const Reference *near, Kinematics *at) {
+NOINLINE void mapped_directions(const System *system, const Reference *near, Kinematics *at) {
     map_motion(system, at);
     directions_of(system->wide, system, near, at);
 }
@@ -136,7 +136,7 @@ PRBM void find_directions(const System *system, const Reference *near, Kinematic
 }
 
 /* Replace the squares of the rates by Re(w^2), with the complex rates w = theta' - i s' of arms. */
-RARE void stretch_squares(const System *system, double *squares) {
+NOINLINE void stretch_squares(const System *system, double *squares) {
     for (int k = 0; k < system->stretch_count; k++) {
         int j = system->stretches[k];
         squares[arm_of(system, j)] -= squares[j];
@@ -198,8 +198,8 @@ SIZED void add_springs(int even, const Equations *eq, Evaluation *result) {
 }
 
 /* Compute the rows -Im(b e) and, in lam, their convective terms Re(b e) v^2.  B is conj(b). */
-SIZED void convect(int count, int even, Parts B, Parts e, const double *ALONE squares,
-                   double *ALONE rows, double *ALONE lam) {
+SIZED void convect(int count, int even, Parts B, Parts e, const double *RESTRICT squares,
+                   double *RESTRICT rows, double *RESTRICT lam) {
     Lanes sum[SMALL][SUMS] = {{NO_LANES}};
     UNROLLED_BY_LANES
     for (int j = 0; j < even; j += LANES) {
@@ -218,8 +218,8 @@ SIZED void convect(int count, int even, Parts B, Parts e, const double *ALONE sq
 }
 
 /* Compute the rows measured relative to a body, and their convective terms without Im(w^2). */
-RARE void carried_rows(const Equations *eq, const Kinematics *at, double *rows,
-                       double *convective) {
+NOINLINE void carried_rows(const Equations *eq, const Kinematics *at, double *rows,
+                           double *convective) {
     const System *system = eq->system;
     for (int c = 0; c < eq->carried_count; c++) {
         int k = eq->carried[c];
@@ -258,7 +258,7 @@ PRBM void rows_and_convection(const Equations *eq, const Kinematics *at, double 
 
 SHARED void rows_dispatch(int even, const Equations *eq, const Kinematics *at, double *rows,
                            double *convective) {
-    if (KNOWN(even)) {
+    if (IS_CONSTANT(even)) {
         rows_padded(even, eq, at, rows, convective);
     } else {
         rows_and_convection(eq, at, rows, convective);
@@ -268,8 +268,8 @@ SHARED void rows_dispatch(int even, const Equations *eq, const Kinematics *at, d
 /* --- inertia ---------------------------------------------------------------------------------- */
 
 /* Subtract the damping c M v of a block from its loads x. */
-SIZED void damp_mass(int size, double c, const double *ALONE M, const double *ALONE v,
-                     double *ALONE x) {
+SIZED void damp_mass(int size, double c, const double *RESTRICT M, const double *RESTRICT v,
+                     double *RESTRICT x) {
     for (int i = 0; i < size; i++) {
         x[i] -= c * M[i * size + i] * v[i];
         for (int j = 0; j < i; j++) {
@@ -281,8 +281,8 @@ SIZED void damp_mass(int size, double c, const double *ALONE M, const double *AL
 
 /* Compute one block of M, and add its quadratic velocity terms Im(diag(e)^H H diag(e)) v^2 to the
  * loads x.  M is symmetric, the matrix of these terms antisymmetric. */
-SIZED void block_inertia(int size, const Complex *ALONE H, const double *ALONE own, Parts e,
-                         const double *ALONE squares, double *ALONE M, double *ALONE x) {
+SIZED void block_inertia(int size, const Complex *RESTRICT H, const double *RESTRICT own, Parts e,
+                         const double *RESTRICT squares, double *RESTRICT M, double *RESTRICT x) {
     UNROLLED
     for (int i = 0; i < size; i++) {
         const int columns = size <= SMALL ? size : i;
@@ -317,7 +317,7 @@ SIZED void block_mass(const Equations *eq, Evaluation *result, int size, int sta
 SIZED bool factor_any_block(const Equations *eq, Evaluation *result, int size, int apart, int start,
                             const double *M, double *L) {
     double *inverse = result->factors.inverse + start;
-    if (KNOWN(size) && size <= UNROLLED_MAX ? !factor_known(size, apart, M, L, inverse)
+    if (IS_CONSTANT(size) && size <= UNROLLED_MAX ? !factor_known(size, apart, M, L, inverse)
                                             : !factor_any(size, apart, M, L, inverse)) {
         return false;
     }
@@ -328,7 +328,8 @@ SIZED bool factor_any_block(const Equations *eq, Evaluation *result, int size, i
     return true;
 }
 
-RARE bool factor_block(const Equations *eq, Evaluation *result, int size, int start, double *L) {
+NOINLINE bool factor_block(const Equations *eq, Evaluation *result, int size, int start,
+                           double *L) {
     return factor_any_block(eq, result, size, 0, start, result->block, L);
 }
 
@@ -370,7 +371,7 @@ SIZED bool mapped_block_motion(const Equations *eq, Evaluation *result, int size
 
 /* Factor the blocks of the mass matrix in result->mass.  Those of guides on two beams of the
  * orders 3 and 5 are compiled separately. */
-RARE bool mapped_blocks_motion(const Equations *eq, Evaluation *result) {
+NOINLINE bool mapped_blocks_motion(const Equations *eq, Evaluation *result) {
     bool regular = true;
     const double *M = result->mass;
     double *L = result->factors.L;
@@ -447,7 +448,7 @@ SIZED void direction_terms(int wide, const Equations *eq, const Reference *near,
 
 /* Compute loads, rows and mass matrix of the directions, and pull them back to the coordinates.
  * The lengths for guides on two beams with 5 or 6 nodes are compiled separately. */
-RARE void mapped_terms(const Equations *eq, const Reference *near, Evaluation *result) {
+NOINLINE void mapped_terms(const Equations *eq, const Reference *near, Evaluation *result) {
     const System *system = eq->system;
     const int even = system->even, wide = system->wide;
     double *Z = result->factors.Z;
@@ -527,7 +528,7 @@ PRBM double slip_force(const Equations *eq, const Complex *e, const Evaluation *
 }
 
 /* Add the forces of pressed compliant stops. */
-RARE void add_pressure(const Equations *eq, Evaluation *result) {
+NOINLINE void add_pressure(const Equations *eq, Evaluation *result) {
     Rows gaps = gap_rows(eq->system);
     double t = result->at.time;
     for (int k = 0; k < eq->pressed_count; k++) {
@@ -547,7 +548,7 @@ RARE void add_pressure(const Equations *eq, Evaluation *result) {
 
 /* Add pressed stops and their friction, slipping friction points, and the accelerations of the
  * walls of held stops. */
-RARE void add_contacts_and_walls(const Equations *eq, Evaluation *result) {
+NOINLINE void add_contacts_and_walls(const Equations *eq, Evaluation *result) {
     add_pressure(eq, result);
     for (int k = eq->slipping_stops; k < eq->slipping_count; k++) {
         double force = slip_force(eq, result->at.e, result, eq->slipping[k]);
@@ -562,7 +563,7 @@ RARE void add_contacts_and_walls(const Equations *eq, Evaluation *result) {
 
 /* Set the columns of slipping stops.  Coulomb's law adds a force along the wall to the normal
  * force, so that the column of such a stop differs from its row. */
-RARE void set_columns(const Equations *eq, Evaluation *result) {
+NOINLINE void set_columns(const Equations *eq, Evaluation *result) {
     const System *system = eq->system;
     int n = system->n, even = system->even;
     Rows walls = slide_rows(system);
@@ -596,7 +597,7 @@ SIZED bool factor_motion(int even, const Equations *eq, Evaluation *result) {
     return schur_dispatch(even, &result->factors);
 }
 
-RARE void add_coriolis(const System *system, Evaluation *result) {
+NOINLINE void add_coriolis(const System *system, Evaluation *result) {
     for (int k = 0; k < system->stretch_count; k++) {
         int j = system->stretches[k];
         result->a[arm_of(system, j)] += coriolis(system, result->at.turn, j);

@@ -11,8 +11,8 @@ static inline int first_column(int apart, int row) {
 /* Factor M = L D L^T from its lower triangle, with ones on the diagonal of L; inverse is 1/D.
  * Return false if M is not positive definite: a pivot may not be round-off of its diagonal
  * element. */
-SHARED bool factor_any(int size, int apart, const double *ALONE M, double *ALONE L,
-                       double *ALONE inverse) {
+SHARED bool factor_any(int size, int apart, const double *RESTRICT M, double *RESTRICT L,
+                       double *RESTRICT inverse) {
     for (int i = 0; i < size; i++) {
         const int first = first_column(apart, i);
         double pivot = M[i * size + i];
@@ -39,8 +39,8 @@ SHARED bool factor_any(int size, int apart, const double *ALONE M, double *ALONE
 }
 
 /* The same for numbers that the compiler knows, with a size up to UNROLLED_MAX. */
-SHARED bool factor_known(int size, int apart, const double *ALONE M, double *ALONE L,
-                         double *ALONE inverse) {
+SHARED bool factor_known(int size, int apart, const double *RESTRICT M, double *RESTRICT L,
+                         double *RESTRICT inverse) {
     UNROLLED
     for (int i = 0; i < size; i++) {
         const int first = first_column(apart, i);
@@ -72,7 +72,7 @@ SHARED bool factor_known(int size, int apart, const double *ALONE M, double *ALO
     return true;
 }
 
-RARE bool factor(int size, const double *M, double *L, double *inverse) {
+NOINLINE bool factor(int size, const double *M, double *L, double *inverse) {
     return factor_any(size, 0, M, L, inverse);
 }
 
@@ -85,7 +85,8 @@ RARE bool factor(int size, const double *M, double *L, double *inverse) {
  * diagonal, with w_0 = D_0, and w_k L_ik below it.  Return false if M is not positive definite, or
  * if a product may underflow or overflow; factor may then succeed.  The caller knows that no pivot
  * is round-off, or tests it. */
-SHARED bool small_factor(int size, const double *ALONE M, double *ALONE L, double *ALONE inverse) {
+SHARED bool small_factor(int size, const double *RESTRICT M, double *RESTRICT L,
+                         double *RESTRICT inverse) {
     double w[SMALL][SMALL], multiple = 1.0;
     bool safe;
     UNROLLED
@@ -145,7 +146,7 @@ SHARED void put_block(int size, int start, const double *from, double *to) {
 }
 
 /* block_forward: b := L^-1 b; block_backward: b := L^-T b, within a block. */
-SHARED void block_forward(int size, int apart, const double *ALONE L, double *ALONE b) {
+SHARED void block_forward(int size, int apart, const double *RESTRICT L, double *RESTRICT b) {
     UNROLLED
     for (int i = 1; i < size; i++) {
         double sum = b[i];
@@ -159,7 +160,7 @@ SHARED void block_forward(int size, int apart, const double *ALONE L, double *AL
     }
 }
 
-SIZED void block_backward(int size, int apart, const double *ALONE L, double *ALONE b) {
+SIZED void block_backward(int size, int apart, const double *RESTRICT L, double *RESTRICT b) {
     UNROLLED
     for (int k = 1; k < size; k++) {
         int i = size - 1 - k;
@@ -174,7 +175,7 @@ SIZED void block_backward(int size, int apart, const double *ALONE L, double *AL
     }
 }
 
-SIZED void block_solve(int size, int apart, const double *ALONE L, double *ALONE b,
+SIZED void block_solve(int size, int apart, const double *RESTRICT L, double *RESTRICT b,
                        Substitution way) {
     if (way == FORWARD) {
         block_forward(size, apart, L, b);
@@ -185,7 +186,7 @@ SIZED void block_solve(int size, int apart, const double *ALONE L, double *ALONE
 
 /* Apply block_solve to the entries of x that belong to a block: size entries from the index start,
  * with a size up to SMALL. */
-SHARED void solve_small(int size, int start, const double *ALONE L, double *ALONE x,
+SHARED void solve_small(int size, int start, const double *RESTRICT L, double *RESTRICT x,
                         Substitution way) {
     double b[SMALL];
     UNROLLED
@@ -337,7 +338,7 @@ PRBM bool factor_schur(Factors *factors) {
 
 /* Compute and factor S, by code for this padded length if the compiler knows it. */
 SHARED bool schur_dispatch(int even, Factors *factors) {
-    return KNOWN(even) ? schur_padded(even, factors) : factor_schur(factors);
+    return IS_CONSTANT(even) ? schur_padded(even, factors) : factor_schur(factors);
 }
 
 /* Solve S lam = b with the factors of a symmetric S.  On entry lam contains b. */
@@ -352,8 +353,9 @@ SIZED void multipliers_of_size(int r, const double *S, double *lam) {
 }
 
 /* Subtract Z D^-1 x from lam, the right side of the constraint rows. */
-SIZED void reduce_right_side(int count, int even, const double *ALONE Z, const double *ALONE x,
-                           const double *ALONE inverse, double *ALONE lam) {
+SIZED void reduce_right_side(int count, int even, const double *RESTRICT Z,
+                             const double *RESTRICT x, const double *RESTRICT inverse,
+                             double *RESTRICT lam) {
     Lanes sum[SMALL][SUMS] = {{NO_LANES}};
     UNROLLED_BY_LANES
     for (int j = 0; j < even; j += LANES) {
@@ -371,10 +373,10 @@ SIZED void reduce_right_side(int count, int even, const double *ALONE Z, const d
 
 /* Solve for the multipliers lam, and set x := D^-1 (x + Z_columns^T lam).  On entry x contains
  * L^-1 f, and lam the right side of the constraint rows. */
-SIZED void constrain_of_size(int r, int even, const Factors *factors, double *ALONE x,
-                             double *ALONE lam) {
-    const double *ALONE Z = factors->Z, *ALONE columns = factors->Z_columns;
-    const double *ALONE inverse = factors->inverse;
+SIZED void constrain_of_size(int r, int even, const Factors *factors, double *RESTRICT x,
+                             double *RESTRICT lam) {
+    const double *RESTRICT Z = factors->Z, *RESTRICT columns = factors->Z_columns;
+    const double *RESTRICT inverse = factors->inverse;
     const int together = r <= SMALL ? r : 1;
     for (int k = 0; k < r; k += together) {
         reduce_right_side(together, even, Z + k * even, x, inverse, lam + k);
@@ -415,7 +417,7 @@ static void finish(const Factors *factors, double *x, double *lam) {
 
 /* Finish the solution, by code for this padded length if the compiler knows it. */
 SHARED void finish_dispatch(int even, const Factors *factors, double *x, double *lam) {
-    if (KNOWN(even)) {
+    if (IS_CONSTANT(even)) {
         finish_padded(even, factors, x, lam);
     } else {
         finish(factors, x, lam);

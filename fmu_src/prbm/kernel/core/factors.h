@@ -27,14 +27,15 @@ PRBM bool factor_schur(Factors *factors);
  * and the multipliers. */
 PRBM void solve_again(const Factors *factors, double *x, double *lam);
 /* Functions that are compiled for each small size of a block or of the system. */
-SHARED bool factor_known(int size, int apart, const double *ALONE M, double *ALONE L,
-                         double *ALONE inverse);
-SHARED bool factor_any(int size, int apart, const double *ALONE M, double *ALONE L,
-                       double *ALONE inverse);
-SHARED bool small_factor(int size, const double *ALONE M, double *ALONE L, double *ALONE inverse);
+SHARED bool factor_known(int size, int apart, const double *RESTRICT M, double *RESTRICT L,
+                         double *RESTRICT inverse);
+SHARED bool factor_any(int size, int apart, const double *RESTRICT M, double *RESTRICT L,
+                       double *RESTRICT inverse);
+SHARED bool small_factor(int size, const double *RESTRICT M, double *RESTRICT L,
+                         double *RESTRICT inverse);
 SHARED void put_block(int size, int start, const double *from, double *to);
-SHARED void block_forward(int size, int apart, const double *ALONE L, double *ALONE b);
-SHARED void solve_small(int size, int start, const double *ALONE L, double *ALONE x,
+SHARED void block_forward(int size, int apart, const double *RESTRICT L, double *RESTRICT b);
+SHARED void solve_small(int size, int start, const double *RESTRICT L, double *RESTRICT x,
                         Substitution way);
 SHARED bool schur_dispatch(int even, Factors *factors);
 SHARED void finish_dispatch(int even, const Factors *factors, double *x, double *lam);

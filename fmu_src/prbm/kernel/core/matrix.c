@@ -43,7 +43,7 @@ PRBM void copy(int n, const double *from, double *to) {
 }
 
 /* y += a x */
-PRBM void add_scaled(int n, double a, const double *ALONE x, double *ALONE y) {
+PRBM void add_scaled(int n, double a, const double *RESTRICT x, double *RESTRICT y) {
     if (a != 0.0) {
         for (int i = 0; i < n; i++) {
             y[i] += a * x[i];

@@ -18,11 +18,11 @@
 #endif
 #endif
 
-/* ALONE (restrict in C99) marks a pointer that is the only one to its array in a function. */
+/* RESTRICT (restrict in C99) marks a pointer that is the only one to its array in a function. */
 #if defined(_MSC_VER)
-#define ALONE __restrict
+#define RESTRICT __restrict
 #else
-#define ALONE restrict
+#define RESTRICT restrict
 #endif
 
 /* SIZED functions are compiled once for each small size, so that their loops unroll. */
@@ -36,11 +36,11 @@
 #ifndef SHARED
 #define SHARED SIZED
 #endif
-/* RARE functions, which few mechanisms need, are not inlined. */
+/* NOINLINE functions, which few mechanisms need, are not inlined. */
 #if defined(__GNUC__)
-#define RARE static __attribute__((noinline))
+#define NOINLINE static __attribute__((noinline))
 #else
-#define RARE static
+#define NOINLINE static
 #endif
 #if defined(__GNUC__) && !defined(__clang__) /* Clang unrolls without a pragma. */
 #define UNROLLED _Pragma("GCC unroll 10")
@@ -58,9 +58,9 @@
 #endif
 /* Whether a length is a compile-time constant.  Functions for other lengths are compiled once. */
 #if defined(__GNUC__)
-#define KNOWN(length) __builtin_constant_p(length)
+#define IS_CONSTANT(length) __builtin_constant_p(length)
 #else
-#define KNOWN(length) false
+#define IS_CONSTANT(length) false
 #endif
 /* The largest size that is compiled separately, and the largest that is unrolled if it is known. */
 enum { SMALL = 4, UNROLLED_MAX = 7 };

@@ -105,7 +105,7 @@ SIZED double position_residuals(int even, const Equations *eq, const Kinematics 
 }
 
 /* Compute the rows by the coordinates, if they are not the directions. */
-RARE void mapped_rows(const Equations *eq, Correction *c) {
+NOINLINE void mapped_rows(const Equations *eq, Correction *c) {
     const System *system = eq->system;
     rows_and_convection(eq, &c->at, c->by_direction, c->convective);
     zeros(eq->r * system->even, c->rows);

@@ -63,7 +63,7 @@ static void output_stops(const Simulation *sim, double *out) {
     }
 }
 
-RARE void output_compliant(Simulation *sim, double *out, double *latched) {
+NOINLINE void output_compliant(Simulation *sim, double *out, double *latched) {
     for (int i = 0; i < system_of(sim)->s; i++) {
         if (!sim->configuration.mechanism->stops[i].compliant) {
             continue;
