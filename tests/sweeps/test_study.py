@@ -10,9 +10,11 @@ from concurrent.futures.process import BrokenProcessPool
 import numpy as np
 import pytest
 
+from point_mass import point_mass
 from prbm.base import processes as base_processes
 from prbm.base.errors import ParameterError
 from prbm.files.settings import UserMistake
+from prbm.mechanics.stress import with_stress
 from prbm.plots.study import curves, maps
 from prbm.runs.run import simulate
 from prbm.sweeps import study as module
@@ -131,6 +133,49 @@ def test_rows_are_those_of_single_simulations(mechanisms):
         "stop.position": "m", "settling": "s", "impacts": "", "max(abs(shuttle.vx))": "m/s",
         "shuttle.x": "m",
     }  # fmt: skip
+
+
+def test_peaks_of_short_contacts_do_not_depend_on_the_samples():
+    """The last impact is the weakest one; fine samples of the force resolve each contact."""
+    mass = with_stress(point_mass())
+    fine = simulate(mass, stop_time=0.1, step=2e-6)
+    names = ["peak_force", "peak_stress", "impact_speed", "stop.peak_force"]
+    found = study(
+        mass, {"stop.friction": [0.0, 1e-9]}, names, stop_time=0.1, step=0.02, workers=1
+    )  # fmt: skip
+    largest = max(fine[f"{leaf}.stress"].max() for leaf in "ab")
+    assert found.outputs["peak_force"][0] == pytest.approx(fine["stop.force"].max(), rel=5e-3)
+    assert found.outputs["peak_stress"][0] == pytest.approx(largest, rel=1e-2)
+    speeds = [impact.latched.approach_speed for impact in fine.impacts]
+    assert found.outputs["impact_speed"][0] == pytest.approx(max(speeds), rel=1e-5)
+    assert found.outputs["stop.peak_force"][0] < 0.9 * found.outputs["peak_force"][0]
+    result = simulate(mass, stop_time=0.1, step=0.02)
+    assert result.quantity("peak_force") == found.outputs["peak_force"][0]
+
+
+@pytest.mark.parametrize(
+    ("output", "words"),
+    [
+        ("max(stop.force)", r"use peak_force, .* or max\(stop\.peak_force\)"),
+        ("min(stop.force)", "use peak_force"),
+        ("max(abs(a.stress_end))", "use peak_stress"),
+        ("max(a.stress)", "use peak_stress"),
+    ],
+)
+def test_an_extreme_that_samples_can_miss_is_rejected_with_the_name_of_the_peak(output, words):
+    with pytest.raises(ParameterError, match=words):
+        study(with_stress(point_mass()), {"stop.friction": [0.0, 0.1]}, [output], stop_time=0.01)
+
+
+@pytest.mark.parametrize(
+    ("output", "words"),
+    [("peak_force", 'needs a stop with law = "compliant"'), ("peak_stress", "stress = true")],
+)
+def test_a_peak_that_a_mechanism_does_not_compute_is_rejected_with_the_remedy(
+    mechanisms, output, words
+):
+    with pytest.raises(ParameterError, match=words):
+        study(mechanisms["PRBDM"], {"stop.position": [0.0, 1e-3]}, [output], stop_time=0.01)
 
 
 @pytest.mark.slow

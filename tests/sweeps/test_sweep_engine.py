@@ -18,12 +18,14 @@ def _empty_folder(tmp_path, monkeypatch):
 
 
 def test_named_quantities_of_fmus_are_those_of_the_engine(native, mechanisms):
-    names = [*QUANTITIES, "max(abs(shuttle.vx))"]
+    known = simulate(mechanisms["PRBDM"], stop_time=1e-3).columns.dtype.names
+    quantities = {name: x for name, x in QUANTITIES.items() if not x.lacking(known)}
+    names = [*quantities, "max(abs(shuttle.vx))"]
     table = pd.DataFrame({"stop.position": [0.0, 2e-3]})
     found = sweep(native["PRBDM", 2], table, outputs=names, stop_time=0.3, step=1e-3)
     for row, position in enumerate(table["stop.position"]):
         result = simulate(mechanisms["PRBDM"], {"stop.position": position}, stop_time=0.3)
-        for name, quantity in QUANTITIES.items():
+        for name, quantity in quantities.items():
             assert found[name][row] == pytest.approx(quantity.compute(result.columns), rel=1e-6)
         largest = np.abs(result["shuttle.vx"]).max()
         assert found["max(abs(shuttle.vx))"][row] == pytest.approx(largest, rel=1e-6)

@@ -214,8 +214,9 @@ def study_arguments(parser: ArgumentParser) -> None:
     )  # fmt: skip
     add(
         "--of", nargs="+", metavar="OUTPUT",
-        help="outputs: settling, impacts, impact_speed, peak_speed, energy_lost; a variable, for "
-        "its final value; max(x), min(x), mean(x), first(x > 0), since(x > 0), also of abs(x)",
+        help="outputs: settling, impacts, impact_speed, peak_speed, peak_force, peak_stress, "
+        "energy_lost; a variable, for its final value; max(x), min(x), mean(x), first(x > 0), "
+        "since(x > 0), also of abs(x)",
     )  # fmt: skip
     optimum = parser.add_mutually_exclusive_group()
     optimum.add_argument("--minimise", metavar="OUTPUT", help="output whose minimum is searched")

@@ -514,8 +514,8 @@ def _of_compliant_stop(rigid: Iterator[Variable], stop: str, nominal: Scales) ->
             changed = replace(changed, minimum=-math.inf)  # Round-off at the end of a contact.
         yield replace(changed, variability="continuous") if name == "impulse_sum" else changed
     yield _output(
-        f"{stop}.peak_force", "N", "Largest force since the first touch of the last impact",
-        nominal, minimum=0.0,
+        f"{stop}.peak_force", "N", "Largest force since the first touch of the last impact, not "
+        "of earlier impacts", nominal, minimum=0.0,
     )  # fmt: skip
     yield _output(
         f"{stop}.indentation", "m", "Largest indentation since the first touch of the last impact",

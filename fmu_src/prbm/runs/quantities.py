@@ -1,16 +1,19 @@
-"""Named quantities of a motion: settling time, impacts, speeds, lost energy.
+"""Named quantities of a motion: settling time, impacts, speeds, forces, stress, lost energy.
 
-They are computed from the outputs at the communication points alone, so that results of the engine
-and of FMUs give the same numbers.
+They are computed from the outputs at the communication points, so that results of the engine and of
+FMUs give the same numbers.  The engine also records every impact; the largest speed and force of an
+impact are then those of all impacts, also of several between two communication points.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import nan
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ..hybrid.records import Impact
 
 SETTLED_ENERGY_RTOL = 1e-4
 """A motion has settled if its kinetic energy stays below this share of its largest value."""
@@ -35,12 +38,23 @@ class Quantity:
         Variables with these names or with these ends of names are needed.
     compute : callable
         Returns the number from the columns by name, with ``time``.
+    latched : str
+        Latched output whose value after a recorded impact the number is not below; or empty.
+    remedy : str
+        How a mechanism gets the needed variables if it lacks them; or empty.
     """
 
     unit: str
     description: str
     suffixes: tuple[str, ...]
     compute: Callable[[Table], float]
+    latched: str = ""
+    remedy: str = ""
+
+    def value(self, columns: Table, impacts: Sequence[Impact] = ()) -> float:
+        """Return the number from the columns and from the recorded impacts, if there are any."""
+        own = impacts if self.latched else ()
+        return max([self.compute(columns), *(getattr(x.latched, self.latched) for x in own)])
 
     def variables(self, names: Iterable[str]) -> list[str]:
         """Return the variables among names that are needed.
@@ -124,7 +138,21 @@ def impact_speed(columns: Table) -> float:
 
     Of several impacts between two communication points only the last one counts.
     """
-    return max((float(columns[n].max()) for n in _named(columns, ".approach_speed")), default=0.0)
+    return _largest(columns, ".approach_speed")
+
+
+def peak_force(columns: Table) -> float:
+    """Return the largest contact force of all impacts at compliant stops [N], 0 without impacts.
+
+    The latched ``STOP.peak_force`` is that of the last impact.  Of several impacts between two
+    communication points only the last one counts.
+    """
+    return _largest(columns, ".peak_force")
+
+
+def peak_stress(columns: Table) -> float:
+    """Return the largest magnitude of the stress of all flexures [Pa], that of the integration."""
+    return _largest(columns, ".peak_stress")
 
 
 def peak_speed(columns: Table) -> float:
@@ -151,11 +179,35 @@ def _named(columns: Table, suffix: str) -> list[str]:
     return [name for name in _names(columns) if name.endswith(suffix)]
 
 
+def _largest(columns: Table, suffix: str) -> float:
+    """Return the largest value of all variables with an end of their names, 0 without one."""
+    return max((float(columns[name].max()) for name in _named(columns, suffix)), default=0.0)
+
+
 QUANTITIES: dict[str, Quantity] = {
     "settling": Quantity("s", "settling time", (KINETIC, FREQUENCY), settling),
     "impacts": Quantity("", "number of impacts", (".impact_count",), impacts),
     "impact_speed": Quantity(
-        "m/s", "largest closing speed of an impact", (".approach_speed",), impact_speed
+        "m/s",
+        "largest closing speed of an impact",
+        (".approach_speed",),
+        impact_speed,
+        "approach_speed",
+    ),
+    "peak_force": Quantity(
+        "N",
+        "largest contact force of all impacts",
+        (".peak_force",),
+        peak_force,
+        "peak_force",
+        'it needs a stop with law = "compliant", because a rigid impact has no largest force',
+    ),
+    "peak_stress": Quantity(
+        "Pa",
+        "largest stress of all flexures",
+        (".peak_stress",),
+        peak_stress,
+        remedy="it needs a flexure type with stress = true",
     ),
     "peak_speed": Quantity("m/s", "largest speed of a body", (".vx", ".vy", ".omega"), peak_speed),
     "energy_lost": Quantity("J", "dissipated energy", ("energy.dissipated",), energy_lost),

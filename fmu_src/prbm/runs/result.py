@@ -78,8 +78,9 @@ class Result:
             raise ResultError(f"unknown quantity {name!r}; {proposal(name, QUANTITIES)}")
         lacking = QUANTITIES[name].lacking(names(self.columns))
         if lacking:
-            raise ResultError(f"{name}: the result has no column {lacking}; record it")
-        return QUANTITIES[name].compute(self.columns)
+            remedy = QUANTITIES[name].remedy or "record it"
+            raise ResultError(f"{name}: the result has no column {lacking}; {remedy}")
+        return QUANTITIES[name].value(self.columns, self.impacts)
 
     def to_pandas(self) -> "pd.DataFrame":
         """Return the columns as a pandas DataFrame over the time.

@@ -4,7 +4,7 @@ The module imports NumPy only, and so starts quickly.
 """
 
 import re
-from collections.abc import Callable, Container, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import nan
 from typing import Any
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..hybrid.records import Impact
 from ..runs.quantities import QUANTITIES
 
 Real = NDArray[np.float64]
@@ -20,6 +21,11 @@ OK, ENDED, FAILED, CRASHED, TIMEOUT = "ok", "ended", "failed", "crashed", "timeo
 GOOD = OK, ENDED
 
 QUANTITY = "quantity"  # Reduction of a named quantity.
+PULSES = {
+    ".force": "peak_force", ".stress": "peak_stress", ".stress_start": "peak_stress",
+    ".stress_end": "peak_stress",
+}  # fmt: skip
+"""Ends of the names of outputs with pulses shorter than a step, and the quantity that sees them."""
 
 
 class SpecificationError(ValueError):
@@ -64,6 +70,28 @@ class Output:
     def lacking(self, names: Iterable[str]) -> str:
         """Return a variable that a named quantity needs and that is not among names, or ``""``."""
         return QUANTITIES[self.variable].lacking(names) if self.reduction == QUANTITY else ""
+
+    def check_extreme(self, names: Container[str]) -> None:
+        """Reject an extreme of samples that can miss a short pulse, if its peak is known.
+
+        Raises
+        ------
+        SpecificationError
+            If the output is the maximum or minimum of the force of a compliant stop, or of a stress
+            whose peak is a variable among names.
+
+        Examples
+        --------
+        >>> Output("max(s.force)", "s.force", "max").check_extreme(["s.force"])
+        """
+        part, dot, last = self.variable.rpartition(".")
+        peak = PULSES.get(dot + last, "")
+        if self.reduction not in ("max", "min") or not peak or f"{part}.{peak}" not in names:
+            return
+        raise SpecificationError(
+            f"{self.column}: {self.variable} is a pulse that may pass between two samples; use "
+            f"{peak}, the largest of the whole motion, or max({part}.{peak})"
+        )
 
 
 RELATIONS: dict[str, Callable[[Real, float], NDArray[np.bool_]]] = {
@@ -119,7 +147,9 @@ def _absolute(output: Output, known: Container[str]) -> Output:
     return output if call is None else replace(output, variable=call[1].strip(), absolute=True)
 
 
-def evaluate(output: Output, columns: Mapping[str, NDArray[Any]]) -> float:
+def evaluate(
+    output: Output, columns: Mapping[str, NDArray[Any]], impacts: Sequence[Impact] = ()
+) -> float:
     """Return the value of an output.
 
     Parameters
@@ -128,6 +158,8 @@ def evaluate(output: Output, columns: Mapping[str, NDArray[Any]]) -> float:
         The output.
     columns : mapping
         ``time`` and the variables of the output; only the last value is needed for ``final``.
+    impacts : sequence of Impact
+        All impacts, if the engine has recorded them; named quantities then see each of them.
 
     Examples
     --------
@@ -136,7 +168,7 @@ def evaluate(output: Output, columns: Mapping[str, NDArray[Any]]) -> float:
     3.0
     """
     if output.reduction == QUANTITY:
-        return QUANTITIES[output.variable].compute(columns)
+        return QUANTITIES[output.variable].value(columns, impacts)
     x = np.asarray(columns[output.variable], np.float64)
     return reduce(output, columns["time"], np.abs(x) if output.absolute else x)
 

@@ -89,7 +89,8 @@ class Setup:
             )  # fmt: skip
         except PrbmError as error:
             return Outcome(FAILED, str(error), perf_counter() - begin)
-        found = tuple(evaluate(output, _by_name(result.columns)) for output in self.outputs)
+        columns = _by_name(result.columns)
+        found = tuple(evaluate(output, columns, result.impacts) for output in self.outputs)
         return Outcome(OK, "", perf_counter() - begin, found)
 
 
@@ -341,12 +342,15 @@ def _outputs(texts: Sequence[str], known: Mapping[str, str]) -> tuple[Output, ..
     for text in texts:
         try:
             output = parse(text, known)
+            output.check_extreme(known)
         except SpecificationError as error:
             raise ParameterError(f"output {error}") from None
         lacking = output.lacking(known)
         if lacking:
+            remedy = QUANTITIES[output.variable].remedy
             raise ParameterError(
                 f"output {text}: the mechanism has no {lacking}, from which it is computed"
+                + (f"; {remedy}" if remedy else "")
             )
         if output.reduction != QUANTITY and output.variable not in known:
             hint = proposal(output.variable, dict.fromkeys([*known, *QUANTITIES]))

@@ -324,6 +324,8 @@ def _outputs(outputs: Outputs | None, variables: Mapping[str, Any]) -> tuple[Out
     pairs = outputs.items() if isinstance(outputs, Mapping) else ((text, text) for text in outputs)
     try:
         kept = tuple(parse_output(text, variables, column) for column, text in pairs)
+        for output in kept:
+            output.check_extreme(variables)
     except SpecificationError as error:
         raise ParameterError(f"output {error}") from None
     if not kept:

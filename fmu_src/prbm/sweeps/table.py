@@ -16,6 +16,7 @@ from scipy.stats import qmc
 
 from ..base.errors import ParameterError
 from ..base.names import proposal
+from ..runs.quantities import QUANTITIES
 from .outputs import Output
 
 Table = pd.DataFrame | str | Path
@@ -263,9 +264,10 @@ def check_outputs(outputs: Iterable[Output], variables: Mapping[str, Any]) -> No
     for output in outputs:
         lacking = output.lacking(variables)
         if lacking:
+            remedy = QUANTITIES[output.variable].remedy
             raise ParameterError(
                 f"output {output.column}: the FMU has no variable {lacking}, from which "
-                f"{output.variable} is computed"
+                f"{output.variable} is computed" + (f"; {remedy}" if remedy else "")
             )
         for name in output.variables(variables):
             _check_output(output.column, name, variables)
