@@ -164,6 +164,8 @@ class System:
         Use event mode of the FMUs that have it (default: False).
     watched : sequence of str
         Further variables to read into ``values`` after each step, ``name.variable``.
+    functions : mapping
+        Functions of the value of a source, by connected input; others take the value itself.
 
     Attributes
     ----------
@@ -185,6 +187,7 @@ class System:
         scheme: str = GAUSS_SEIDEL,
         events: bool = False,
         watched: Sequence[str] = (),
+        functions: Mapping[str, Callable[[Value], Value]] | None = None,
     ) -> None:
         if scheme not in (GAUSS_SEIDEL, JACOBI):
             raise CouplingError(f"scheme = {scheme!r} must be {GAUSS_SEIDEL!r} or {JACOBI!r}")
@@ -192,6 +195,7 @@ class System:
             if "." in name or not name:
                 raise CouplingError(f"instance name {name!r}: must be non-empty and without dots")
         self.scheme, self.connections = scheme, dict(connections)
+        self.functions = dict(functions or {})
         self.time = 0.0
         self.values: dict[str, Value] = {}
         self.folder = tempfile.TemporaryDirectory(prefix="prbm_system_", dir=plain_folder())
@@ -311,6 +315,9 @@ class System:
         The instance enters event mode if a discrete input has changed.
         """
         given = {to: self.values[source] for to, source in self.wires[instance.name].items()}
+        for to, value in given.items():
+            if function := self.functions.get(f"{instance.name}.{to}"):
+                given[to] = function(value)
         changed = {to: x for to, x in given.items() if x != instance.connected.get(to)}
         if any(instance.at_events(to) for to in changed):
             instance.enter_events()
@@ -428,6 +435,7 @@ def simulate(
     source: Source | None = None,
     tolerance: float | None = None,
     progress: Progress | None = None,
+    functions: Mapping[str, Callable[[Value], Value]] | None = None,
 ) -> Columns:
     """Simulate a system of FMUs.
 
@@ -447,6 +455,8 @@ def simulate(
         Tolerance of the integration in the FMUs; None: that of each FMU.
     progress : callable or None
         Called with the completed fraction, from 0 to 1.
+    functions
+        As for :class:`System`.
 
     Returns
     -------
@@ -464,7 +474,7 @@ def simulate(
     times = communication_points(stop_time, step)
     names = list(dict.fromkeys([*record, *connections.values()]))
     rows = []
-    with System(fmus, connections, scheme, events, names) as system:
+    with System(fmus, connections, scheme, events, names, functions) as system:
         given = {} if source is None else source(0.0)
         system.start({**(values or {}), **given}, 0.0, stop_time, tolerance)
         rows.append(system.row(names))

@@ -1,21 +1,23 @@
 """System structure packages (SSP 1.0): FMUs, their connections and start values in one file.
 
-Co-simulation masters read such packages.  :func:`simulate` runs one with FMPy's master.
+Co-simulation masters read such packages.  :func:`simulate` runs one with :mod:`.cosimulation`.
 """
 
 import io
+import tempfile
 import zipfile
-from collections.abc import Iterable, Mapping
-from itertools import pairwise
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from ..base.progress import Progress
 from ..runs.result import Columns
-from ..runs.run import communication_points
+from . import cosimulation
 from .components import CouplingError, Value, check_wire, described, start_value
+from .structure import SLASH, Flat, Package
 
 SSD = "http://ssp-standard.org/SSP1/SystemStructureDescription"
 SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
@@ -162,79 +164,72 @@ def _number(kind: str, value: Value) -> str:
     return str(int(value)) if kind == "Integer" else repr(float(value))
 
 
-def simulate(path: str | Path, stop_time: float, step: float) -> Columns:
-    """Simulate a package with FMPy's master, from the start values in the package.
+def simulate(
+    path: str | Path,
+    stop_time: float | None = None,
+    step: float | None = None,
+    progress: Progress | None = None,
+) -> Columns:
+    """Simulate a package, from the start values in the package.
 
     Parameters
     ----------
     path : str or Path
-        A package of FMUs of FMI 2.0; FMPy's master does not support FMI 3.0.
-    stop_time, step : float
-        Duration, a multiple of the step, and communication step [s].
+        A package of SSP 1.0 with FMUs for co-simulation, of FMI 2.0 or 3.0.
+    stop_time : float or None
+        Duration [s]; None: that of the package.
+    step : float or None
+        Communication step [s]; None: a thousandth of the duration.
+    progress : callable or None
+        Called with the completed fraction, from 0 to 1.
 
     Returns
     -------
     structured array
-        ``time`` and the connected variables, ``name.variable``, one row at the end of each step.
-        The value of an input is the one that acts in the next step.
+        ``time``, the outputs of the system by name, and the outputs of all components,
+        ``system.component.variable``, one row per communication point.
 
     Notes
     -----
-    The coupling scheme is Jacobi's.  In the first step all connected inputs are zero.
+    The coupling scheme is Jacobi's, without event mode.
 
     Raises
     ------
     CouplingError
-        If the package cannot be read or FMPy cannot simulate it.
+        If the package cannot be read, contains something that is not supported, has no stop time,
+        or an FMU fails.
     ParameterError
         If ``stop_time`` or ``step`` is not positive and finite.
     """
-    from fmpy.ssp.simulation import simulate_ssp  # type: ignore[import-untyped]
-    from fmpy.ssp.ssd import ParameterSet, find_components, read_ssd  # type: ignore[import-untyped]
+    with tempfile.TemporaryDirectory(prefix="prbm_ssp_") as folder:
+        package = Package(path, folder)
+        flat = package.flat
+        stop = flat.stop_time if stop_time is None else stop_time
+        if stop is None:
+            raise CouplingError(f"{path}: the package has no stop time; give one")
+        sources = [source for source, _ in (*flat.wires.values(), *flat.outputs.values())]
+        columns = cosimulation.simulate(
+            {name: package.copies[file] for name, file in flat.fmus.items()},
+            {to: source for to, (source, _) in flat.wires.items()},
+            stop,
+            stop / 1000 if step is None else step,
+            flat.values,
+            list(dict.fromkeys([*sources, *flat.recorded])),
+            cosimulation.JACOBI,
+            progress=progress,
+            functions={to: signal for to, (_, signal) in flat.wires.items() if signal.steps},
+        )
+    return _named(columns, flat)
 
-    times = communication_points(stop_time, step)
-    if times[-1] - times[-2] < (1 - 1e-6) * step:  # shorter than a step by more than rounding
-        raise CouplingError(
-            f"stop_time = {stop_time:g} s: FMPy needs a multiple of step = {step:g} s"
-        )
-    try:
-        description = read_ssd(str(path))
-    except Exception as error:
-        _fail(path, error)
-    components = find_components(description.system)
-    _check_names(component.name for component in components)
-    every = ParameterSet(name="start values")
-    for component in components:
-        for binding in component.parameterBindings:
-            for parameters in binding.parameterValues:
-                for parameter in parameters.parameters:
-                    parameter.name = f"{component.name}.{parameter.name}"
-                    if parameter.type == "Boolean":  # FMPy reads any text as true, "false" too.
-                        parameter.value = parameter.value in ("true", "1")
-                    every.parameters.append(parameter)
-    # The end is half a step early: FMPy sums its steps, and rounding could add another step.
-    end = times[-2] + step / 2
-    try:
-        result: Columns = simulate_ssp(
-            str(path), stop_time=end, step_size=step, parameter_set=every
-        )
-    except Exception as error:
-        _fail(path, error)
-    # FMPy records the time at the start of a step; return the time at its end.
-    result["time"] = np.minimum(result["time"] + step, stop_time)
+
+def _named(columns: Columns, flat: Flat) -> Columns:
+    """Return a result with the names of the package, and the outputs of the system first."""
+    found = {"time": columns["time"]}
+    for name, (source, signal) in flat.outputs.items():
+        found[name] = np.array([signal(x) for x in columns[source].tolist()])
+    for name in (columns.dtype.names or ())[1:]:
+        found[name.replace(SLASH, ".", name.partition(".")[0].count(SLASH))] = columns[name]
+    result = np.empty(len(columns), [(name, x.dtype) for name, x in found.items()])
+    for name, x in found.items():
+        result[name] = x
     return result
-
-
-def _check_names(names: Iterable[str]) -> None:
-    """Reject names of which one begins with another: FMPy would mix up their start values."""
-    for one, other in pairwise(sorted(names)):
-        if other.startswith(one):
-            raise CouplingError(
-                f"instances {one} and {other}: FMPy would apply start values of {other} to {one}; "
-                "rename one so that no name begins with another"
-            )
-
-
-def _fail(path: str | Path, error: Exception) -> NoReturn:
-    """Raise the error of FMPy as a :class:`CouplingError`."""
-    raise CouplingError(f"{path}: FMPy cannot simulate it ({error})") from None
