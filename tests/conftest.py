@@ -74,9 +74,12 @@ def fmus(mechanisms: dict[str, Mechanism]) -> dict[str, Path]:
 
 
 @pytest.fixture
-def plain_temporary_folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def plain_temporary_folder(
+    monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[None]:
     """Let other programs unpack Python FMUs to a folder that pythonfmu can read."""
     shared_folder()  # The files of the test run stay in its own folder.
+    tmp_path_factory.getbasetemp()  # Those of pytest too.
     folder = tempfile.mkdtemp(dir=plain_folder())
     monkeypatch.setattr(tempfile, "tempdir", folder)
     monkeypatch.setenv("TMPDIR", folder)

@@ -9,6 +9,7 @@ import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -17,20 +18,14 @@ from ..base.progress import Progress
 from ..runs.result import Columns
 from . import cosimulation
 from .components import CouplingError, Value, check_wire, described, start_value
-from .structure import SLASH, Flat, Package
+from .nodes import Flat
+from .structure import SLASH, Package
 
 SSD = "http://ssp-standard.org/SSP1/SystemStructureDescription"
 SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
 SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
 DESCRIPTION = "SystemStructure.ssd"
-EPOCH = (
-    1980,
-    1,
-    1,
-    0,
-    0,
-    0,
-)  # Date of all files: equal systems give equal bytes.
+EPOCH = (1980, 1, 1, 0, 0, 0)  # Date of all files: equal systems give equal bytes.
 KINDS = {"Real": "Real", "Float64": "Real", "Integer": "Integer", "Int32": "Integer",
          "Boolean": "Boolean"}  # fmt: skip
 """Types of SSP by the types of FMI 2.0 and 3.0."""
@@ -127,16 +122,18 @@ def _component(
 ) -> None:
     """Add an instance with its connectors and start values to the description."""
     component = _add(
-        elements, SSD, "Component", name=name, source=f"resources/{name}.fmu",
+        elements, SSD, "Component", name=name, source=quote(f"resources/{name}.fmu"),
         type="application/x-fmu-sharedlibrary", implementation="CoSimulation",
     )  # fmt: skip
-    ends = [*((to, "input") for to in connections), *((x, "output") for x in connections.values())]
-    mine = [end for end in dict.fromkeys(ends) if end[0].partition(".")[0] == name]
-    connectors = _add(component, SSD, "Connectors") if mine else component
-    for full, kind in mine:
-        variable = _found({name: variables}, full)[1]
-        connector = _add(connectors, SSD, "Connector", name=variable, kind=kind)
-        _add(connector, SSC, _kind(full, variables[variable]))
+    wired = {*connections, *connections.values()}
+    ends = [
+        x for x in variables.values()
+        if x.causality in ("input", "output") and (x.type in KINDS or f"{name}.{x.name}" in wired)
+    ]  # fmt: skip
+    connectors = _add(component, SSD, "Connectors") if ends else component
+    for x in ends:
+        connector = _add(connectors, SSD, "Connector", name=x.name, kind=x.causality)
+        _add(connector, SSC, _kind(f"{name}.{x.name}", x))
     own = {x.partition(".")[2]: value for x, value in values.items() if x.startswith(f"{name}.")}
     if not own:
         return
