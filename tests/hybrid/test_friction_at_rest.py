@@ -21,6 +21,7 @@ END = 0.02  # s
 UNSUITABLE = (
     "is penetrated by", "cannot be reached", "no static equilibrium",
     "links of a loop form a straight line",  # A stop across the only motion of a guide.
+    "could not be closed near this shape",  # The same at a dead centre, not closed fully.
 )  # fmt: skip
 
 
@@ -99,10 +100,11 @@ def closing_in(model: Mechanism) -> bool:
 
 ALIKE = (4010, 4222, 4735, 6598, 6962, 7016)  # Points that can stick only together.
 LIFTED = (3760, 4619, 6090)  # Points without a normal force beside others that stick.
-BOTH_AT_LIMIT, DEAD_CENTRE = 7282, 6854
-HARD = (*ALIKE[2:], *LIFTED, BOTH_AT_LIMIT, DEAD_CENTRE)
+HELD = (5855, 7024, 9552)  # Points at their limits that others hold: their speed is round-off.
+BOTH_AT_LIMIT, DEAD_CENTRES = 7282, (1937, 6854)
+HARD = (*ALIKE[2:], *LIFTED, *HELD[1:], BOTH_AT_LIMIT, *DEAD_CENTRES)
 SEEDS = [
-    *range(14), *ALIKE[:2],
+    *range(14), *ALIKE[:2], HELD[0],
     *(pytest.param(seed, marks=pytest.mark.slow) for seed in (*range(14, 450), *HARD)),
 ]  # fmt: skip
 

@@ -313,18 +313,20 @@ def _corrected_time(view: StepView, guard: Guard, stop: int, t: float, earliest:
 def reversal_time(view: StepView, guard: Guard, contact: int) -> float | None:
     """Return when the sliding velocity of a contact falls through zero.
 
-    When slip begins, the velocity is round-off of either sign.  The contact then reverses only if
-    its velocity at the end of the step is negative in the direction of slip.
+    When slip begins, and while contacts that stick hold this one, the velocity is round-off of
+    either sign.  Then it counts only if it exceeds what an acceleration of round-off adds within
+    the step.
     """
     equations, (times, e, v, _) = view.equations, view.samples
     rows, i = equations.slip_rows(contact)
     speeds = equations.contacts.modes[contact].slip * rows.rates(e, v)[:, i]
     begins = bool(speeds[0] <= view.scales.zero_speed)
+    noise = view.scales.zero_acceleration * view.arc.h if begins else 0.0
     for j in range(int(begins), GUARD_INTERVALS):
-        if speeds[j] > 0.0 >= speeds[j + 1]:
+        if speeds[j] > noise and speeds[j + 1] <= 0.0:
             z = view.along(guard, contact)
             return fall_time(z, times[j], times[j + 1], view.event_time)
-    return float(times[1]) if begins and speeds[-1] < 0.0 else None
+    return float(times[1]) if begins and speeds[-1] < -noise else None
 
 
 def switching_time(view: StepView, guard: Guard, stop: int) -> float | None:

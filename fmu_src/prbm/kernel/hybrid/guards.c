@@ -503,8 +503,9 @@ PRBM bool closing_time(Simulation *sim, const Guard *guard, int stop, Fall *fall
 
 /* --- friction and releases -------------------------------------------------------------------- */
 
-/* Find the time at which a sliding velocity changes its sign.  When sliding begins, the velocity is
- * round-off of either sign; only its sign at the end of the step is then used. */
+/* Find the time at which a sliding velocity changes its sign.  When sliding begins, and while
+ * contacts that stick hold this one, the velocity is round-off of either sign.  Then it counts only
+ * if it exceeds what an acceleration of round-off adds within the step. */
 PRBM bool reversal_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
                         Problem *problem) {
     Search search = {sim, guard, contact, false, problem};
@@ -515,13 +516,14 @@ PRBM bool reversal_time(Simulation *sim, const Guard *guard, int contact, Fall *
         z[k] = guard->value(&sim->equations, &at, contact);
     }
     bool begins = z[0] <= zero_speed(&sim->configuration);
+    double noise = begins ? zero_acceleration(&sim->configuration) * sim->state.arc.h : 0.0;
     for (int k = begins; !fall->found && k < GUARD_INTERVALS; k++) {
-        if (z[k] > 0.0 && z[k + 1] <= 0.0) {
+        if (z[k] > noise && z[k + 1] <= 0.0) {
             fall->found = true;
             fall->time = locate(&on_arc, sample_time(sim, k), sample_time(sim, k + 1));
         }
     }
-    if (!fall->found && begins && z[GUARD_INTERVALS] < 0.0) {
+    if (!fall->found && begins && z[GUARD_INTERVALS] < -noise) {
         fall->found = true;
         fall->time = sample_time(sim, 1);
     }
