@@ -18,17 +18,19 @@ class Integrator(Fmi2Slave):
     """value' = gain * rate with the rate at the beginning of each step.
 
     value(0) = start + feedthrough * rate.  The first ``skipped`` steps do not change the value, and
-    no step does if ``off`` is true.
+    no step does if ``off`` is true.  It fails at the time ``end``.
     """
 
     def __init__(self, **kwargs):
         super().__init__(**kwargs)
         self.gain, self.value, self.rate = 1.0, 0.0, 0.0
         self.start, self.feedthrough, self.skipped, self.off = 0.0, 0.0, 0, False
+        self.end = 1e9
         for kind, name, causality, variability in (
             (Real, "gain", "parameter", "fixed"),
             (Real, "start", "parameter", "fixed"),
             (Real, "feedthrough", "parameter", "fixed"),
+            (Real, "end", "parameter", "fixed"),
             (Integer, "skipped", "parameter", "fixed"),
             (Boolean, "off", "parameter", "fixed"),
             (Real, "rate", "input", "continuous"),
@@ -43,6 +45,8 @@ class Integrator(Fmi2Slave):
         self.value = self.start + self.feedthrough * self.rate
 
     def do_step(self, current_time, step_size):
+        if current_time >= self.end:
+            return False
         if self.skipped > 0 or self.off:
             self.skipped -= 1
         else:

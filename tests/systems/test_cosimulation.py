@@ -321,3 +321,47 @@ def test_errors_contain_the_message_of_the_fmu():
 def test_a_step_of_zero_is_rejected():
     with pytest.raises(ParameterError, match=re.escape("step = 0 s must be positive and finite")):
         simulate({"a": integrator()}, {}, 1.0, 0.0)
+
+
+def test_rows_before_a_failure_are_kept():
+    fmus = {"a": integrator(), "b": integrator()}
+    with pytest.raises(CouplingError, match="b: ") as caught:
+        simulate(fmus, CIRCLE, 1.0, H, START | {"b.end": 10 * H}, scheme=JACOBI)
+    found, (_, a, _) = caught.value.columns, circle(JACOBI)
+    np.testing.assert_array_equal(found["time"], H * np.arange(11))
+    np.testing.assert_array_equal(found["a.value"], a[:11])
+
+
+@pytest.fixture
+def uneven(tmp_path):
+    """Return the path of an integrator that needs steps of one length."""
+    path = tmp_path / "uneven.fmu"
+    wanted = 'canHandleVariableCommunicationStepSize="true"'
+    with zipfile.ZipFile(integrator()) as source, zipfile.ZipFile(path, "w") as copy:
+        for name in source.namelist():
+            content = source.read(name)
+            if name == "modelDescription.xml":
+                assert wanted.encode() in content
+                content = content.replace(wanted.encode(), wanted.replace("true", "false").encode())
+            copy.writestr(name, content)
+    return path
+
+
+def test_steps_have_one_length_if_an_fmu_needs_that(uneven):
+    fmus = {"guide": guide(3), "one": uneven}
+    assert len(simulate(fmus, {}, 0.3, 0.1, record=["one.value"])) == 4
+    with pytest.raises(CouplingError, match=r"one needs .* multiple of step = 0.2 s"):
+        simulate(fmus, {}, 0.3, 0.2)
+    with pytest.raises(CouplingError, match=r"one needs .* use events=False"):
+        simulate(fmus, {}, 0.3, 0.1, events=True)
+
+
+def test_the_end_of_a_simulation_in_event_mode_is_not_ignored(monkeypatch):
+    """No partner at hand ends it there, so that the answer of the guide is exchanged."""
+    with System({"guide": guide(3)}, {}, events=True) as system:
+        system.start()
+        own = system.instances["guide"]
+        own.enter_events()
+        monkeypatch.setattr(own.fmu, "updateDiscreteStates", lambda: (False, True, False))
+        with pytest.raises(CouplingError, match=r"guide terminated the simulation at 0 s"):
+            own.update()

@@ -21,6 +21,7 @@ from fmpy.fmi3 import FMU3Model, FMU3Slave  # type: ignore[import-untyped]
 
 from ..base.archives import check_unpacked_size
 from ..base.errors import PrbmError
+from ..runs.result import Columns
 
 Value = float | int | bool
 INPUTS = (
@@ -42,7 +43,15 @@ DESCRIBED = {CO_SIMULATION: "coSimulation", MODEL_EXCHANGE: "modelExchange"}
 
 
 class CouplingError(PrbmError, ValueError):
-    """The FMUs cannot be coupled in the requested way, or one of them fails."""
+    """The FMUs cannot be coupled in the requested way, or one of them fails.
+
+    Attributes
+    ----------
+    columns : structured array or None
+        The rows that a simulation has computed before an FMU failed or ended it.
+    """
+
+    columns: Columns | None = None
 
 
 class Component:

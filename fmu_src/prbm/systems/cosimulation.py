@@ -35,6 +35,7 @@ from ..runs.run import Source, communication_points
 from .components import CO_SIMULATION, Component, CouplingError, Value, check_wire, start_value
 
 GAUSS_SEIDEL, JACOBI = "gauss-seidel", "jacobi"
+STEP_RTOL = 1e-12  # Round-off of communication points, as a fraction of the last one.
 UPDATES_MAX = 100  # event iterations at one time before the system is rejected as an endless loop
 
 
@@ -63,6 +64,7 @@ class Instance(Component):
     ) -> None:
         super().__init__(name, fmu, folder, CO_SIMULATION)
         self.events = events and self.version > 2 and bool(self.interface.hasEventMode)
+        self.varies = bool(self.interface.canHandleVariableCommunicationStepSize)
         self.restorable = bool(self.interface.canGetAndSetFMUstate)
         self.updating = False  # in event mode
         self.stepping = False  # in step mode of an instance with events: discrete inputs are locked
@@ -102,9 +104,12 @@ class Instance(Component):
             return False
         event, terminated, early, reached = result
         self.time = reached if early else end
+        self._check_not_terminated(terminated)
+        return bool(event)
+
+    def _check_not_terminated(self, terminated: bool) -> None:
         if terminated:
             raise CouplingError(f"{self.name} terminated the simulation at {self.time:g} s")
-        return bool(event)
 
     def enter_events(self) -> None:
         """Enter event mode, if the instance uses it."""
@@ -114,7 +119,11 @@ class Instance(Component):
 
     def update(self) -> bool:
         """Update the discrete states once; return whether another update is needed."""
-        return self.updating and bool(self.call("updateDiscreteStates")[0])
+        if not self.updating:
+            return False
+        more, terminated, *_ = self.call("updateDiscreteStates")
+        self._check_not_terminated(terminated)
+        return bool(more)
 
     def leave_events(self) -> None:
         """Return to step mode."""
@@ -467,7 +476,8 @@ def simulate(
     Raises
     ------
     CouplingError
-        If a name or a connection is invalid, or an FMU fails.
+        If a name or a connection is invalid, an FMU needs steps of one length, or an FMU fails or
+        ends the simulation; ``columns`` of the error are the rows before.
     ParameterError
         If ``stop_time`` or ``step`` is not positive and finite.
     """
@@ -475,14 +485,38 @@ def simulate(
     names = list(dict.fromkeys([*record, *connections.values()]))
     rows = []
     with System(fmus, connections, scheme, events, names, functions) as system:
+        _check_even(system, times)
         given = {} if source is None else source(0.0)
         system.start({**(values or {}), **given}, 0.0, stop_time, tolerance)
         rows.append(system.row(names))
-        for k, end in enumerate(times[1:], 1):
-            if source is not None:
-                system.give(source(system.time))
-            for _ in system.steps(end):
-                rows.append(system.row(names))
-            if progress is not None:
-                progress(k / (len(times) - 1))
+        try:
+            for k, end in enumerate(times[1:], 1):
+                if source is not None:
+                    system.give(source(system.time))
+                for _ in system.steps(end):
+                    rows.append(system.row(names))
+                if progress is not None:
+                    progress(k / (len(times) - 1))
+        except CouplingError as error:
+            error.columns = structured(rows)
+            raise
     return structured(rows)
+
+
+def _check_even(system: System, times: Sequence[float]) -> None:
+    """Check that all steps have one length, if one of the FMUs needs that."""
+    needs = [x.name for x in system.instances.values() if not x.varies]
+    if not needs:
+        return
+    name = needs[0]
+    if any(x.events for x in system.instances.values()):
+        raise CouplingError(
+            f"{name} needs communication steps of one length, and events end steps early: use "
+            "events=False"
+        )
+    first, last = times[1] - times[0], times[-1] - times[-2]
+    if abs(last - first) > STEP_RTOL * times[-1]:
+        raise CouplingError(
+            f"{name} needs communication steps of one length: stop_time = {times[-1]:g} s must be "
+            f"a multiple of step = {first:g} s"
+        )

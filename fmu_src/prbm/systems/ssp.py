@@ -194,7 +194,7 @@ def simulate(
     ------
     CouplingError
         If the package cannot be read, contains something that is not supported, has no stop time,
-        or an FMU fails.
+        or an FMU fails or ends the simulation; ``columns`` of the error are the rows before.
     ParameterError
         If ``stop_time`` or ``step`` is not positive and finite.
     """
@@ -205,17 +205,22 @@ def simulate(
         if stop is None:
             raise CouplingError(f"{path}: the package has no stop time; give one")
         sources = [source for source, _ in (*flat.wires.values(), *flat.outputs.values())]
-        columns = cosimulation.simulate(
-            {name: package.copies[file] for name, file in flat.fmus.items()},
-            {to: source for to, (source, _) in flat.wires.items()},
-            stop,
-            stop / 1000 if step is None else step,
-            flat.values,
-            list(dict.fromkeys([*sources, *flat.recorded])),
-            cosimulation.JACOBI,
-            progress=progress,
-            functions={to: signal for to, (_, signal) in flat.wires.items() if signal.steps},
-        )
+        try:
+            columns = cosimulation.simulate(
+                {name: package.copies[file] for name, file in flat.fmus.items()},
+                {to: source for to, (source, _) in flat.wires.items()},
+                stop,
+                stop / 1000 if step is None else step,
+                flat.values,
+                list(dict.fromkeys([*sources, *flat.recorded])),
+                cosimulation.JACOBI,
+                progress=progress,
+                functions={to: signal for to, (_, signal) in flat.wires.items() if signal.steps},
+            )
+        except CouplingError as error:
+            if error.columns is not None:
+                error.columns = _named(error.columns, flat)
+            raise
     return _named(columns, flat)
 
 
