@@ -88,6 +88,7 @@ def parser() -> argparse.ArgumentParser:
     _animate(commands)
     _explore(commands)
     _modelica(commands)
+    _ssp(commands)
     _validate(commands)
     _completion(commands)
     return p
@@ -457,6 +458,27 @@ def _modelica(commands: Commands) -> None:
     add("--out", type=Path, metavar="FILE.mo", help="file to write (default: MECHANISMWrapper.mo)")
     set_argument(parser, "start value of a parameter or input")
     parameters_argument(parser)
+
+
+def _ssp(commands: Commands) -> None:
+    parser = add_command(
+        commands, "ssp", "packages:run_package",
+        "simulate the coupled FMUs of a package (SSP 1.0)",
+        examples("prbm ssp system.ssp", "prbm ssp system.ssp --stop-time 1s --out results"),
+        details="The start values are those of the package. What the package contains and is not "
+        "supported ends the command with a message.",
+    )  # fmt: skip
+    add = parser.add_argument
+    add("package", type=Path, metavar="FILE.ssp", help="the package")
+    add(
+        "--stop-time", metavar="T",
+        help="duration of the simulation [s] (default: that of the package)",
+    )  # fmt: skip
+    add(
+        "--step", metavar="T",
+        help="communication step [s] (default: a thousandth of the duration)",
+    )  # fmt: skip
+    out_argument(parser)
 
 
 def _validate(commands: Commands) -> None:
