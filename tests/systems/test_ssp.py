@@ -12,7 +12,7 @@ from lxml import etree
 
 from coupled import guide, integrator
 from prbm.systems import cosimulation, ssp
-from prbm.systems.components import CouplingError
+from prbm.systems.components import CouplingError, described
 from prbm.systems.container import container
 from prbm.systems.cosimulation import JACOBI
 
@@ -213,6 +213,50 @@ def test_an_unreadable_fmu_is_rejected(name, tmp_path):
 def test_a_package_connects_only_outputs_to_inputs(tmp_path):
     with pytest.raises(CouplingError, match=r"carrier\.flexure\.length is not an output"):
         ssp.package(tmp_path / "x.ssp", fmus(), {"sum.rate": "carrier.flexure.length"})
+
+
+def moved(folder, platform):
+    """Return a copy of an integrator whose only binary is that of a platform."""
+    path = folder / f"{platform}.fmu"
+    with zipfile.ZipFile(integrator()) as source, zipfile.ZipFile(path, "w") as copy:
+        copy.writestr("modelDescription.xml", source.read("modelDescription.xml"))
+        copy.writestr(f"binaries/{platform}/Integrator.dll", b"")
+    return path
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_container_has_the_platforms_of_all_its_fmus(fmi, tmp_path):
+    path, system = tmp_path / "x.fmu", {"guide": guide(2), "sum": integrator()}
+    container(path, system, {}, 1e-3, fmi=fmi)
+    with zipfile.ZipFile(path) as archive:
+        found = {x.split("/")[1] for x in archive.namelist() if x.startswith("binaries/") and x[9:]}
+    assert found == {"linux64" if fmi == 2 else "x86_64-linux"}
+    with pytest.raises(CouplingError, match=r"win: .* binaries for win64, none of which"):
+        container(path, system | {"win": moved(tmp_path, "win64")}, {}, 1e-3, fmi=fmi)
+
+
+def test_a_container_refuses_what_its_library_does_not_support(tmp_path, monkeypatch):
+    path, system = tmp_path / "x.fmu", {"guide": guide(2), "sum": integrator()}
+    with pytest.raises(
+        CouplingError, match=r"stop\.contact of type Boolean cannot .* use the master"
+    ):
+        container(path, system, {"sum.rate": "guide.stop.contact"}, 1e-3)
+    assert not path.exists()
+
+    def with_type(name, fmu, kind):
+        found = described(name, fmu)
+        next(v for v in found.modelVariables if v.name == "value").type = kind
+        return found
+
+    for kind, words in (
+        ("Clock", "does not support clocks, such as value"),
+        ("String", "type String"),
+    ):
+        monkeypatch.setattr(
+            "prbm.systems.container.described", lambda *x, kind=kind: with_type(*x, kind)
+        )
+        with pytest.raises(CouplingError, match=words):
+            container(path, {"sum": integrator()}, {}, 1e-3, shown=["sum.value"])
 
 
 def test_a_container_rejects_local_variables(tmp_path):

@@ -2,6 +2,7 @@
 
 import shutil
 import tempfile
+import zipfile
 from collections.abc import Mapping, Sequence
 from copy import copy
 from pathlib import Path
@@ -18,11 +19,18 @@ from fmpy.model_description import (  # type: ignore[import-untyped]
     Unknown,
 )
 
+from ..base.atomic import write
 from .components import CouplingError, Value, check_wire, described, start_value
 
 # Types of FMI 3.0 by their names in FMI 2.0.
 NAMES3 = {"Real": "Float64", "Integer": "Int32"}
 KINDS = ("parameter", "input", "output")
+SUPPORTED = ("Float64", "Int32", "Boolean")  # types of FMI 3.0 that FMPy's library passes on
+PLATFORMS = {
+    "linux64": ("x86_64-linux",), "win64": ("x86_64-windows",),
+    "darwin64": ("x86_64-darwin", "aarch64-darwin"),
+}  # fmt: skip
+"""Platforms in FMI 3.0 by their names in FMI 2.0."""
 
 
 def container(
@@ -61,17 +69,20 @@ def container(
     Notes
     -----
     The coupling scheme is Jacobi's.  The container has no event mode and cannot save its state.  It
-    runs on the platforms that both FMPy's library and the inner FMUs support.
+    has the binaries of the platforms that FMPy's library and all inner FMUs support.
 
     Raises
     ------
     CouplingError
-        If an FMU cannot be read, a name is unknown, or a variable has the wrong causality.
+        If an FMU cannot be read or has clocks, a name is unknown, a variable has the wrong
+        causality or a type that a container does not support, a connection has two types, or the
+        FMUs have no platform in common.
     """
     values = dict(values or {})
     with tempfile.TemporaryDirectory(prefix="prbm_container_") as temporary:
         folder = Path(temporary)
         inside = {name: _inside(name, fmu, folder) for name, fmu in fmus.items()}
+        common = _common_platforms(fmus)
         own = {full: values.get(full) for full in dict.fromkeys([*values, *shown])}
         mapped = {_shown(full, value, inside, fmi): full for full, value in own.items()}
         time = ModelVariable(
@@ -101,14 +112,45 @@ def container(
         )
         (folder / "unzipped").mkdir()
         create_container_fmu(system, folder / "unzipped", folder / "container.fmu")
-        shutil.copyfile(folder / "container.fmu", path)
+        _remove_binaries(folder / "unzipped" / "binaries", common)
+        archive = shutil.make_archive(str(folder / "common"), "zip", folder / "unzipped")
+        write(path, Path(archive).read_bytes())
 
 
 def _inside(name: str, fmu: str | Path, folder: Path) -> Any:
     """Copy an FMU to NAME.fmu, since the container names its folder after the file."""
     description, own = described(name, fmu), folder / f"{name}.fmu"
+    for variable in description.modelVariables:
+        if variable.type == "Clock":
+            raise CouplingError(
+                f"{name}: a container does not support clocks, such as {variable.name}; build the "
+                "FMU without clocks"
+            )
     shutil.copyfile(fmu, own)
     return config.Component(name, own, description)
+
+
+def _common_platforms(fmus: Mapping[str, str | Path]) -> set[str]:
+    """Return the platforms of FMPy's library that all FMUs have, by their names in FMI 3.0."""
+    common = {x for names in PLATFORMS.values() for x in names}
+    for name, fmu in fmus.items():
+        with zipfile.ZipFile(fmu) as archive:
+            parts = [x.split("/") for x in archive.namelist()]
+        own = {x[1] for x in parts if x[0] == "binaries" and len(x) > 2 and x[2]}
+        common &= {x for platform in own for x in PLATFORMS.get(platform, (platform,))}
+        if not common:
+            raise CouplingError(
+                f"{name}: {fmu} has binaries for {', '.join(sorted(own)) or 'no platform'}, none "
+                "of which FMPy's library and the FMUs before have too; use FMUs for one platform"
+            )
+    return common
+
+
+def _remove_binaries(folder: Path, platforms: set[str]) -> None:
+    """Remove the binaries of other platforms."""
+    for found in folder.iterdir():
+        if not platforms.intersection(PLATFORMS.get(found.name, (found.name,))):
+            shutil.rmtree(found)
 
 
 def _found(inside: Mapping[str, Any], full: str) -> tuple[Any, Any]:
@@ -133,6 +175,7 @@ def _shown(full: str, value: Value | None, inside: Mapping[str, Any], fmi: int) 
     _, variable = _found(inside, full)
     if variable.causality not in KINDS:
         raise CouplingError(f"{full}: must be a parameter, an input or an output")
+    _check_type(full, variable)
     start = variable.start if value is None else start_value(full, value, variable)
     output = variable.causality == "output"
     return ModelVariable(
@@ -147,6 +190,14 @@ def _shown(full: str, value: Value | None, inside: Mapping[str, Any], fmi: int) 
     )
 
 
+def _check_type(full: str, variable: Any) -> None:
+    if _type(variable.type, 3) not in SUPPORTED or variable.dimensions:
+        kind = "array" if variable.dimensions else variable.type
+        raise CouplingError(
+            f"{full}: a container does not support its type {kind}; leave the variable out"
+        )
+
+
 def _text(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
@@ -155,6 +206,14 @@ def _wire(inside: Mapping[str, Any], to: str, source: str) -> Any:
     """Return a connection, with FMI 3.0 names of the types: FMPy's library requires them."""
     (giver, output), (taker, given) = _found(inside, source), _found(inside, to)
     check_wire(to, given, source)
+    _check_type(source, output)
+    _check_type(to, given)
+    kinds = [_type(x.type, 3) for x in (output, given)]
+    if kinds[0] != kinds[1]:
+        raise CouplingError(
+            f"{source} of type {output.type} cannot be connected to {to} of type {given.type} in a "
+            "container; use the master or a package"
+        )
     renamed = [copy(v) for v in (output, given)]
     for variable in renamed:
         variable.type = _type(variable.type, 3)
