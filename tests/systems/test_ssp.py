@@ -136,7 +136,12 @@ def test_container_moves_as_in_our_master(outer, inner, ours, tmp_path):
     path = tmp_path / "walls.fmu"
     shown = ["follower.shuttle.x", "follower.stop.impact_count"]
     container(path, fmus(inner), WIRES, STEP, VALUES, shown, outer, STOP)
-    assert read_model_description(path, validate=True).fmiVersion == f"{outer}.0"
+    description = read_model_description(path, validate=True)
+    assert description.fmiVersion == f"{outer}.0"
+    assert [x.variable.name for x in description.initialUnknowns] == shown
+    variables = {x.name: x for x in description.modelVariables}
+    assert variables["follower.shuttle.x"].unit == "m"
+    assert {x.name for x in description.unitDefinitions} >= {"m"}
     found = simulate_fmu(path, stop_time=STOP, output_interval=STEP)
     assert set(found.dtype.names) == {"time", *shown}
     np.testing.assert_allclose(

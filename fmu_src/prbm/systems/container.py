@@ -31,6 +31,7 @@ PLATFORMS = {
     "darwin64": ("x86_64-darwin", "aarch64-darwin"),
 }  # fmt: skip
 """Platforms in FMI 3.0 by their names in FMI 2.0."""
+BASE_UNIT = ("kg", "m", "s", "A", "K", "mol", "cd", "rad", "factor", "offset")
 
 
 def container(
@@ -92,6 +93,7 @@ def container(
             causality="independent",
             variability="continuous",
         )
+        outputs = [v for v in mapped if v.causality == "output"]
         system = config.Configuration(
             parallelDoStep=False,
             modelDescription=ModelDescription(
@@ -104,7 +106,9 @@ def container(
                 defaultExperiment=DefaultExperiment(
                     startTime="0", stopTime=repr(stop_time), stepSize=repr(step)
                 ),
-                outputs=[Unknown(variable=v) for v in mapped if v.causality == "output"],
+                outputs=[Unknown(variable=v) for v in outputs],
+                initialUnknowns=[Unknown(variable=v) for v in outputs],
+                unitDefinitions=_units(mapped, inside),
             ),
             components=list(inside.values()),
             connections=[_wire(inside, *pair) for pair in connections.items()],
@@ -178,6 +182,7 @@ def _shown(full: str, value: Value | None, inside: Mapping[str, Any], fmi: int) 
     _check_type(full, variable)
     start = variable.start if value is None else start_value(full, value, variable)
     output = variable.causality == "output"
+    given = {name: _attribute(variable, name) for name in ("unit", "min", "max", "nominal")}
     return ModelVariable(
         name=full,
         valueReference=0,
@@ -187,7 +192,41 @@ def _shown(full: str, value: Value | None, inside: Mapping[str, Any], fmi: int) 
         variability=variable.variability,
         initial="calculated" if output else None,
         start=None if output else _text(start),
+        **given,
     )
+
+
+def _attribute(variable: Any, name: str) -> Any:
+    """Return an attribute of a variable, or that of its type."""
+    own = getattr(variable, name)
+    return getattr(variable.declaredType, name, None) if own is None else own
+
+
+def _definition(unit: Any) -> list[Any] | None:
+    base = unit.baseUnit
+    return None if base is None else [getattr(base, name) for name in BASE_UNIT]
+
+
+def _units(mapped: Mapping[Any, str], inside: Mapping[str, Any]) -> list[Any]:
+    """Return the definitions of the units of the container's variables.
+
+    Raises
+    ------
+    CouplingError
+        If two FMUs define one unit differently.
+    """
+    found: dict[str, tuple[Any, str]] = {}
+    for variable, full in mapped.items():
+        description = _found(inside, full)[0].modelDescription
+        for unit in description.unitDefinitions:
+            if unit.name == variable.unit:
+                first, other = found.setdefault(unit.name, (unit, full))
+                if _definition(first) != _definition(unit):
+                    raise CouplingError(
+                        f"{full}: its unit {unit.name} is not that of {other}; leave one of them "
+                        "out"
+                    )
+    return [unit for unit, _ in found.values()]
 
 
 def _check_type(full: str, variable: Any) -> None:
