@@ -46,7 +46,7 @@ def test_a_package_is_simulated_with_its_own_duration(package, tmp_path, capsys)
 
 
 def line(printed, name):
-    (words,) = (x.split() for x in printed.splitlines() if x.startswith(f"{name} "))
+    (words,) = (x.split() for x in printed.splitlines() if x.split()[0] == name)
     return words[1:]
 
 

@@ -6,11 +6,11 @@ import time
 from ..base.atomic import FileError
 from ..base.errors import SimulationError
 from ..base.progress import reporter
-from ..files.settings import quantity
+from ..files.settings import optional_quantity
 from ..runs.result import Columns, names
 from ..systems import ssp
 from ..systems.components import CouplingError
-from .output import Output
+from .output import Output, aligned
 
 HEAD = ("output", "start", "least", "largest", "end")
 
@@ -29,10 +29,8 @@ def run_package(options: argparse.Namespace) -> None:
     """
     if not options.package.is_file():
         raise FileError(f"{options.package}: there is no such file")
-    stop_time, step = (
-        None if text is None else quantity(text, "s", option)
-        for text, option in ((options.stop_time, "--stop-time"), (options.step, "--step"))
-    )
+    stop_time = optional_quantity(options.stop_time, "s", "--stop-time")
+    step = optional_quantity(options.step, "s", "--step")
     output = Output(options.out)
     begin, ended = time.perf_counter(), None
     try:
@@ -43,8 +41,7 @@ def run_package(options: argparse.Namespace) -> None:
         columns, ended = error.columns, error
     seconds = time.perf_counter() - begin
     print(f"simulated  {columns['time'][-1]:g} s, {len(columns)} rows, in {seconds:.2f} s")
-    for line in _ranges(columns):
-        print(line)
+    print(_ranges(columns))
     rows = (list(row) for row in columns.tolist())
     output.table(f"{options.package.stem}.csv", names(columns), rows)
     output.write()
@@ -52,13 +49,11 @@ def run_package(options: argparse.Namespace) -> None:
         raise SimulationError(str(ended)) from None
 
 
-def _ranges(columns: Columns) -> list[str]:
-    """Return the lines of a table of the outputs."""
-    found = [name for name in names(columns) if name != "time"]
-    rows = [HEAD] + [
-        (name, *(f"{float(f):.6g}" for f in (x[0], x.min(), x.max(), x[-1])))
-        for name in found
-        for x in [columns[name]]
+def _ranges(columns: Columns) -> str:
+    """Return the table of the outputs as text."""
+    found = {name: columns[name] for name in names(columns) if name != "time"}
+    rows = [
+        [name, *(f"{float(value):.6g}" for value in (x[0], x.min(), x.max(), x[-1]))]
+        for name, x in found.items()
     ]
-    width = max(len(row[0]) for row in rows)
-    return [row[0].ljust(width) + "".join(x.rjust(14) for x in row[1:]) for row in rows]
+    return aligned(HEAD, rows)

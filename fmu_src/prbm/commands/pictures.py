@@ -12,7 +12,7 @@ from ..base.names import unknown
 from ..base.progress import reporter
 from ..base.unit_text import length_unit
 from ..files.mechanism_file import load, read_mechanism, shipped
-from ..files.settings import UserMistake, quantity, settings
+from ..files.settings import UserMistake, optional_quantity, settings
 from ..interface.variables import extent
 from ..mechanics.assembly import assemble
 from ..mechanics.stress import with_stress
@@ -70,7 +70,10 @@ def run_animation(options: argparse.Namespace) -> None:
     path = Path(options.files[-1])
     check_encoder(path)
     check_file(path)
-    start, stop = _seconds(options.start, "--from"), _seconds(options.stop, "--to")
+    start, stop = (
+        optional_quantity(options.start, "s", "--from"),
+        optional_quantity(options.stop, "s", "--to"),
+    )
     recorder = StressRecorder() if options.stress else None
     moved = motion(_result(options, recorder))
     fps = FPS if options.fps is None else options.fps
@@ -81,10 +84,6 @@ def run_animation(options: argparse.Namespace) -> None:
     except OSError as error:
         raise AnimationError(f"{path}: cannot be written ({error.strerror})") from None
     print(write_film(scene, path, reporter()))
-
-
-def _seconds(text: str | None, option: str) -> float | None:
-    return None if text is None else quantity(text, "s", option)
 
 
 def _result(options: argparse.Namespace, recorder: StressRecorder | None) -> Result:

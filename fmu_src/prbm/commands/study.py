@@ -11,7 +11,15 @@ from ..base.names import unknown
 from ..base.progress import reporter
 from ..base.unit_text import prefixed_unit
 from ..files.mechanism_file import load
-from ..files.settings import UserMistake, has_unit, pairs, quantity, settings, units_of
+from ..files.settings import (
+    UserMistake,
+    has_unit,
+    optional_quantity,
+    pairs,
+    quantity,
+    settings,
+    units_of,
+)
 from ..mechanics.arrays import Real
 from ..mechanism.description import Mechanism
 from ..runs.inputs import placeholders
@@ -37,12 +45,12 @@ def run_study(options: argparse.Namespace) -> None:
     varied = _varied(
         {**units_of(mechanism), **dict.fromkeys(placeholders(inputs), "")}, options.vary
     )
-    tolerance = _optional(options.tolerance, "", "--tolerance")
+    tolerance = optional_quantity(options.tolerance, "", "--tolerance")
     found = study(
         mechanism, varied, options.of or [], minimise=options.minimise, maximise=options.maximise,
         values=values, inputs=inputs,
-        stop_time=_optional(options.stop_time, "s", "--stop-time"),
-        step=_optional(options.step, "s", "--step"), tolerance=tolerance,
+        stop_time=optional_quantity(options.stop_time, "s", "--stop-time"),
+        step=optional_quantity(options.step, "s", "--step"), tolerance=tolerance,
         workers=options.workers, engine=options.engine, progress=reporter(),
     )  # fmt: skip
     columns = dict(zip(found.varied, found.points.T, strict=True)) | dict(found.outputs)
@@ -60,10 +68,6 @@ def run_study(options: argparse.Namespace) -> None:
     output.table(f"{mechanism.name}-study.csv", [*head, "error"], list(rows))
     output.figure(f"{mechanism.name}-study.png", lambda: _figure(mechanism, found))
     output.write()
-
-
-def _optional(text: str | None, unit: str, option: str) -> float | None:
-    return None if text is None else quantity(text, unit, option)
 
 
 def _varied(units: Mapping[str, str], texts: Sequence[str]) -> dict[str, Real]:

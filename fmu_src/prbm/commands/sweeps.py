@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..base.progress import reporter
-from ..files.settings import assigned, quantity
+from ..files.settings import assigned, optional_quantity
 from ..sweeps.sweep import read_fmu, summary, sweep
 from .duration import given_inputs
 
@@ -15,18 +15,14 @@ def run_sweep(options: argparse.Namespace) -> None:
     found = sweep(
         options.fmu, options.table, options.out, outputs=options.output,
         values=_values(options.fmu, options.set), inputs=given_inputs(options),
-        stop_time=_optional(options.stop_time, "s", "--stop-time"),
-        step=_optional(options.step, "s", "--step"),
-        tolerance=_optional(options.tolerance, "", "--tolerance"),
+        stop_time=optional_quantity(options.stop_time, "s", "--stop-time"),
+        step=optional_quantity(options.step, "s", "--step"),
+        tolerance=optional_quantity(options.tolerance, "", "--tolerance"),
         scheduler=options.scheduler, workers=options.workers, retries=options.retries,
-        timeout=_optional(options.timeout, "s", "--timeout"),
+        timeout=optional_quantity(options.timeout, "s", "--timeout"),
         overwrite=options.overwrite, retry_failed=options.retry_failed, progress=reporter(),
     )  # fmt: skip
     print(summary(found, options.out))
-
-
-def _optional(text: str | None, unit: str, option: str) -> float | None:
-    return None if text is None else quantity(text, unit, option)
 
 
 def _values(fmu: str, texts: Sequence[str]) -> dict[str, float]:

@@ -56,6 +56,11 @@ def quantity(text: str, unit: str, option: str) -> float:
     return value
 
 
+def optional_quantity(text: str | None, unit: str, option: str) -> float | None:
+    """Read a number as :func:`quantity` does; None for an option that is not given."""
+    return None if text is None else quantity(text, unit, option)
+
+
 def quantities(texts: Sequence[str], unit: str, option: str) -> list[float]:
     """Read quantities; a unit alone at the end applies to all numbers before it.
 

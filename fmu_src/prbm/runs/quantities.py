@@ -7,7 +7,7 @@ impact are then those of all impacts, also of several between two communication 
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, nan
+from math import nan
 from typing import Any
 
 import numpy as np
@@ -54,9 +54,8 @@ class Quantity:
     def value(self, columns: Table, impacts: Sequence[Impact] = ()) -> float:
         """Return the number from the columns and from the recorded impacts, if there are any."""
         own = impacts if self.latched else ()
-        return max(
-            self.compute(columns), *(float(getattr(x.latched, self.latched)) for x in own), -inf
-        )
+        latched: list[float] = [getattr(x.latched, self.latched) for x in own]
+        return max([self.compute(columns), *latched])
 
     def variables(self, names: Iterable[str]) -> list[str]:
         """Return the variables among names that are needed.

@@ -193,6 +193,12 @@ class Component:
         return kinds
 
 
+def attribute(variable: Any, name: str) -> Any:
+    """Return an attribute of a variable, or that of its declared type."""
+    own = getattr(variable, name)
+    return getattr(variable.declaredType, name, None) if own is None else own
+
+
 def described(name: str, fmu: str | Path) -> Any:
     """Return FMPy's model description of an FMU; the name of the instance is for messages.
 

@@ -20,7 +20,8 @@ from fmpy.model_description import (  # type: ignore[import-untyped]
 )
 
 from ..base.atomic import write
-from .components import CouplingError, Value, check_wire, described, start_value
+from .components import CouplingError, Value, attribute, check_wire, described, start_value
+from .signals import BASE_UNITS
 
 # Types of FMI 3.0 by their names in FMI 2.0.
 NAMES3 = {"Real": "Float64", "Integer": "Int32"}
@@ -31,7 +32,6 @@ PLATFORMS = {
     "darwin64": ("x86_64-darwin", "aarch64-darwin"),
 }  # fmt: skip
 """Platforms in FMI 3.0 by their names in FMI 2.0."""
-BASE_UNIT = ("kg", "m", "s", "A", "K", "mol", "cd", "rad", "factor", "offset")
 
 
 def container(
@@ -182,7 +182,7 @@ def _shown(full: str, value: Value | None, inside: Mapping[str, Any], fmi: int) 
     _check_type(full, variable)
     start = variable.start if value is None else start_value(full, value, variable)
     output = variable.causality == "output"
-    given = {name: _attribute(variable, name) for name in ("unit", "min", "max", "nominal")}
+    given = {name: attribute(variable, name) for name in ("unit", "min", "max", "nominal")}
     return ModelVariable(
         name=full,
         valueReference=0,
@@ -196,15 +196,13 @@ def _shown(full: str, value: Value | None, inside: Mapping[str, Any], fmi: int) 
     )
 
 
-def _attribute(variable: Any, name: str) -> Any:
-    """Return an attribute of a variable, or that of its type."""
-    own = getattr(variable, name)
-    return getattr(variable.declaredType, name, None) if own is None else own
-
-
 def _definition(unit: Any) -> list[Any] | None:
     base = unit.baseUnit
-    return None if base is None else [getattr(base, name) for name in BASE_UNIT]
+    return (
+        None
+        if base is None
+        else [getattr(base, name) for name in (*BASE_UNITS, "factor", "offset")]
+    )
 
 
 def _units(mapped: Mapping[Any, str], inside: Mapping[str, Any]) -> list[Any]:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Any
 
-from .components import Value
+from .components import Value, attribute
 from .signals import INTEGER, REAL, Linear, Signal, Table, Unit
 
 
@@ -63,7 +63,7 @@ class Node:
 
     def unit(self, variable: Any) -> Unit | None:
         """Return the unit of a variable of a component."""
-        name = variable.unit or getattr(variable.declaredType, "unit", None)
+        name = attribute(variable, "unit")
         return self.units.get(name, Unit(name)) if name else None
 
 
