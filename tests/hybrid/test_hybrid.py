@@ -348,7 +348,6 @@ def test_a_release_out_of_reach_from_the_start_has_a_hint_at_units(modulus, hint
     values = {"flexure.youngs_modulus": modulus, "gravity.x": 0.0, "gravity.y": -9.81}
     with pytest.raises(EquilibriumError, match="cannot be reached") as caught:
         engine(mechanism("GuideBeam"), values | {"release.displacement": -0.2})
-    assert ("beyond 0 m" in str(caught.value)) is hint
     assert ("check the units of youngs_modulus and thickness" in str(caught.value)) is hint
 
 

@@ -629,6 +629,7 @@ def random_saddle(rng, n, r):
     factor_saddle=constraints.factor_saddle,
     solve_saddle=constraints.solve_saddle,
     solve=constraints.solve,
+    determinant_sign=constraints.determinant_sign,
 )
 def test_saddle_point_systems_and_their_solutions_are_the_same():
     rng = np.random.default_rng(0)
@@ -655,8 +656,12 @@ def test_saddle_point_systems_and_their_solutions_are_the_same():
             known = constraints.factor_saddle(expected, n, 1.0)
             assert_same(constraints.solve_saddle(known, right), solution, rel)
             x = right.copy()
-            kernel().solve(n, r, kkt, x, 1.0)
+            kernel().solve(n, r, kkt.copy(), x, 1.0)
             assert_same(x, ours, 0.0)
+            sign = constraints.determinant_sign(expected, n, 1.0)
+            assert (
+                kernel().determinant_sign(n, r, kkt, 1.0) == sign == np.linalg.slogdet(expected)[0]
+            )
 
 
 @twin(cholesky=constraints.cholesky)
@@ -1069,6 +1074,18 @@ def test_equilibria_are_the_same(name, displacement):
         assert_same(q, expected.q, scale=1.0)  # rad; undeformed shapes have angles of rounding.
         assert_same(lam, expected.lam, scale=size)
         assert_same(found.force, expected.force, scale=size)
+
+
+@pytest.mark.parametrize("across", [0.05, -0.05, 5e-4, 0.0])
+def test_equilibria_beyond_buckling_are_the_same(across):
+    frame = read_mechanism(ROOT / "tests" / "cases" / "buckle.toml")
+    values = frame.values({"gravity.x": across})
+    system = assembly.assemble(frame, values)
+    ours = KernelSystem(frame, system.n - len(system.loops))
+    ours.assemble(values)
+    found, q, _ = equilibrium_of(system)
+    kernel().equilibrium(ours.structure, False, 0.0, found)
+    assert_same(q, statics.equilibrium(system).q, scale=1.0)
 
 
 @pytest.mark.parametrize("displacement", [0.2, -0.06])

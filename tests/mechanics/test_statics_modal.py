@@ -9,6 +9,7 @@ from scipy.optimize import minimize
 from many_parts import cantilever
 from prbm.base.errors import EquilibriumError
 from prbm.base.tolerances import STATICS_LOAD_STEP_MIN
+from prbm.files.mechanism_file import load
 from prbm.mechanics import statics
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.forces import elastic_energy, gravitational_energy
@@ -16,7 +17,7 @@ from prbm.mechanics.modal import modes
 from prbm.mechanics.statics import equilibrium, release_velocity
 from prbm.mechanics.system import jacobian, values
 from prbm.mechanism.flexure import MODELS
-from support import mechanism
+from support import ROOT, mechanism
 
 
 def tip_deflection(model, force):
@@ -142,6 +143,33 @@ def test_release_velocity_is_that_after_an_impulse_along_the_release():
     np.testing.assert_allclose(rows.T @ lam, M @ v, atol=1e-14)
 
 
+BUCKLED = load(ROOT / "tests" / "cases" / "buckle.toml")
+
+
+@pytest.mark.parametrize("share", [1.0, 0.1, 1e-2, 1e-3])
+def test_slow_loading_beyond_buckling_bends_to_the_side_of_a_small_load(share):
+    """The frame buckles under 0.85 of its weight, to the side of a small gravity across it.
+
+    Its other shapes on that side of buckling are unstable.
+    """
+    across = share * BUCKLED.values()["gravity.x"]
+    rests = []
+    for gx in (across, -across):
+        system = assemble(BUCKLED, BUCKLED.values({"gravity.x": gx}))
+        shape = equilibrium(system)
+        assert modes(system, shape).frequency[0] > 0.5
+        rests.append(system.amount(shape.q))
+    assert rests[0] > 0.02
+    assert rests[1] == pytest.approx(-rests[0], rel=1e-7)
+
+
+def test_a_symmetric_column_stays_straight_beyond_buckling_and_is_unstable():
+    system = assemble(BUCKLED, BUCKLED.values({"gravity.x": 0.0}))
+    shape = equilibrium(system)
+    assert abs(system.amount(shape.q)) < 1e-9
+    assert modes(system, shape).frequency[0] < 0.0
+
+
 def test_a_displacement_out_of_reach_is_rejected():
     guide = mechanism("PRBDM")
     system = assemble(guide, guide.values())
@@ -167,6 +195,7 @@ def test_slow_loading_ends_at_the_largest_load_that_can_be_carried(monkeypatch):
             return np.full(system.n, slope * share) if share <= limit else None
 
         monkeypatch.setattr(statics, "_newton", carried)
+        monkeypatch.setattr(statics, "_determinant_sign", lambda *_: 1)
         start = np.zeros(system.n)
         _, done = statics._follow(system, lambda share: (None, None, share), start)
         assert limit - 1.001 * STATICS_LOAD_STEP_MIN <= done <= limit

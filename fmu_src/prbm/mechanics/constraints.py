@@ -178,6 +178,31 @@ def solve(kkt: Real, right: Real, n: int, length: float) -> Real:
     return x
 
 
+def determinant_sign(kkt: Real, n: int, length: float) -> int:
+    """Return the sign of the determinant of a saddle-point matrix; 0 if it is singular.
+
+    Along a path of equilibria it changes where an odd number of motions become unstable.
+
+    Parameters
+    ----------
+    kkt, n, length
+        As for :func:`scales`.
+
+    Examples
+    --------
+    >>> row = np.array([[0.0, 1.0]])
+    >>> [determinant_sign(saddle(np.diag([k, 1.0]), row, row), 2, 1.0) for k in (2.0, 0.0, -2.0)]
+    [-1, 0, 1]
+    """
+    try:
+        scale = scales(kkt, n, length)
+        A = kkt * scale * scale[:, None]
+        _check_pivots(_pivots(A))
+    except SimulationError:
+        return 0
+    return int(np.linalg.slogdet(A)[0])
+
+
 def cholesky(M: Real) -> Real:
     """Return the lower triangle L of a mass matrix M = L L^T, or reject M as singular.
 

@@ -23,6 +23,7 @@ from ..base.tolerances import (
     STATICS_CONSTRAINT_RTOL,
     STATICS_FORCE_RTOL,
     STATICS_GROWTH_MAX,
+    STATICS_HINT_SHARE,
     STATICS_ITERATIONS_MAX,
     STATICS_LOAD_STEP_MIN,
     STATICS_SHRINK,
@@ -123,8 +124,9 @@ def equilibrium(
     """Return the shape under gravity and loads, free or with the released body held.
 
     Gravity, loads and displacement are raised together from the straight, unloaded shape, and the
-    shape is followed.  It is the one that the mechanism reaches when it is loaded slowly, unless it
-    buckles or snaps on the way: the stability of the shapes is not tested.
+    shape is followed.  It is the one that the mechanism reaches when it is loaded slowly.  If it
+    buckles to either side of a shape that stays in equilibrium, this unstable shape is followed.
+    If it snaps, the result is an equilibrium beyond the snap, stable or not, if one is found.
 
     Parameters
     ----------
@@ -175,20 +177,24 @@ def equilibrium(
         change = displacement - begin
         state = np.concatenate([near.q, near.lam, [near.force / unit]])
         state, done = _follow(system, lambda share: (begin + share * change, w, moment), state)
-    if done < 1.0:
-        state = np.concatenate([system.q0, np.zeros(r + (displacement is not None))])
-        state, done = _follow(system, from_straight, state)
+    straight = np.concatenate([system.q0, np.zeros(r + (displacement is not None))])
+    for may_snap in (False, True):
+        if done < 1.0:
+            state, done = _follow(system, from_straight, straight, may_snap)
     if done < 1.0:
         raise EquilibriumError(_unreachable(system, displacement, bool(loads), done))
     force = unit * float(state[n + r]) if displacement is not None else 0.0
     return Equilibrium(state[:n], state[n : n + r], force, w)
 
 
-def _follow(system: System, given: Callable[[float], _Given], state: Real) -> tuple[Real, float]:
+def _follow(
+    system: System, given: Callable[[float], _Given], state: Real, may_snap: bool = False
+) -> tuple[Real, float]:
     """Change what is given from a share of 0, with the state there, slowly towards a share of 1.
 
     The turn in a step determines the size of the next one, which does not grow after a rejected
-    step.
+    step.  A step that changes the sign of the determinant is only taken with the smallest size, unless
+    the mechanism may snap: a longer one may have jumped to an unstable branch beside the path.
 
     Returns
     -------
@@ -201,24 +207,40 @@ def _follow(system: System, given: Callable[[float], _Given], state: Real) -> tu
     # another coordinate jumps, slow loading does not reach the shape.
     bent = sorted({*system.links, *np.flatnonzero(np.diag(system.K) > 0.0).tolist()})
     done, step, growth = 0.0, 1.0, STATICS_GROWTH_MAX
+    sign = _determinant_sign(system, given(0.0), state)
     while done < 1.0:
         target = min(1.0, done + step)
         # The difference of target and done may be rounded to more than the smallest step.
-        step, turn, ratio = min(step, 1.0 - done), math.inf, STATICS_SHRINK
+        step, turn, crossed = min(step, 1.0 - done), math.inf, sign
+        smallest = step <= STATICS_LOAD_STEP_MIN
         held, w, moment = given(target)
         trial = _newton(system, held, (w, moment), state)
         if trial is not None and _holds(system, held, trial):
-            turn = float(np.abs((trial - state)[bent]).max(initial=0.0))
-            ratio = STATICS_TURN_AIM / max(turn, STATICS_TURN_MIN)
+            crossed = _determinant_sign(system, (held, w, moment), trial)
+            if may_snap or smallest or sign * crossed >= 0:
+                turn = float(np.abs((trial - state)[bent]).max(initial=0.0))
+        ratio = STATICS_TURN_AIM / max(turn, STATICS_TURN_MIN)
         if trial is not None and turn <= STATICS_TURN_MAX:
-            state, done = trial, target
+            state, done, sign = trial, target, crossed
             ratio, growth = min(growth, ratio), STATICS_GROWTH_MAX
-        elif step <= STATICS_LOAD_STEP_MIN:
+        elif smallest:
             break
         else:
-            ratio, growth = max(STATICS_SHRINK_MIN, ratio), 1.0
+            ratio = max(STATICS_SHRINK_MIN, ratio if math.isfinite(turn) else STATICS_SHRINK)
+            growth = 1.0
         step = max(STATICS_LOAD_STEP_MIN, ratio * step)
     return state, done
+
+
+def _determinant_sign(system: System, given: _Given, state: Real) -> int:
+    """Return the sign of the determinant of the balance in a state; 0 if it is singular."""
+    held, w, _ = given
+    B = system.loops if held is None else np.vstack([system.loops, system.holding(held)[0]])
+    e = system.directions(state[: system.n])
+    rows = system.gradient(B, e)
+    K_t = tangent_stiffness(system.K, w, B, state[system.n :], e, system.arm, system.Phi)
+    kkt = constraints.saddle(K_t, rows, rows)
+    return constraints.determinant_sign(kkt, system.n, system.length)
 
 
 def _loads(system: System, loads: Mapping[str, float]) -> tuple[Complex, Real]:
@@ -310,14 +332,16 @@ def _unreachable(system: System, displacement: float | None, loaded: bool, done:
     if not system.gravity:  # The shape does not depend on the size of the stiffness.
         pins = (
             ""
-            if done
+            if done > STATICS_HINT_SHARE
             else (
                 "; if a body or a flexure turns freely on pins, nothing holds it without gravity: "
                 "clamp an end of it, or add gravity"
             )
         )
         return f"{where}; release closer to the straight shape{pins}"
-    units = "" if done else "; or check the units of youngs_modulus and thickness"
+    units = (
+        "" if done > STATICS_HINT_SHARE else "; or check the units of youngs_modulus and thickness"
+    )
     return (
         f"{where} (gravity raised in proportion); release closer to the straight shape, or reduce "
         f"gravity across the motion{units}"

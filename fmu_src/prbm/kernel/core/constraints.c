@@ -238,6 +238,19 @@ PRBM bool solve(int n, int r, double *kkt, double *right, double length, Scratch
     return regular;
 }
 
+PRBM int determinant_sign(int n, int r, double *kkt, double length, Scratch *scratch) {
+    size_t mark = scratch->used;
+    ScaledFactors factors = take_factors(scratch, n + r, kkt);
+    Problem ignored;
+    bool regular = factor_saddle(n, r, length, &factors, &ignored), odd = false;
+    for (int i = 0; regular && i < factors.size; i++) {
+        odd ^= factors.pivots[i] != i;
+        odd ^= factors.lu[i * factors.size + i] < 0.0;
+    }
+    scratch->used = mark;
+    return regular ? (odd ? -1 : 1) : 0;
+}
+
 /* --- projection ------------------------------------------------------------------------------- */
 
 PRBM bool project_positions(const System *system, const Rows *rows, double *q, const double *c,

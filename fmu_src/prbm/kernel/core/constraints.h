@@ -54,6 +54,10 @@ PRBM bool factor_saddle(int n, int r, double length, const ScaledFactors *factor
                         Problem *problem);
 /* Replace right (n + r,) by the solution. */
 PRBM void solve_saddle(const ScaledFactors *factors, double *right);
+
+/* Return the sign of the determinant of a saddle-point matrix, which is overwritten; 0 if it is
+ * singular.  Along a path of equilibria it changes where an odd number of motions become unstable. */
+PRBM int determinant_sign(int n, int r, double *kkt, double length, Scratch *scratch);
 /* Solve a saddle-point system; kkt is overwritten, right (n + r,) replaced by the solution. */
 PRBM bool solve(int n, int r, double *kkt, double *right, double length, Scratch *scratch,
                 Problem *problem);

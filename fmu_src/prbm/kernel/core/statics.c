@@ -157,9 +157,27 @@ static bool balance_out(const Balance *balance, double *state, Scratch *scratch)
     return done || (balanced && !going);
 }
 
-/* Find the equilibrium at a fraction of gravity and, if held, of the displacement. */
+/* Return the sign of the determinant of the balance in a state; 0 if it is singular. */
+static int determinant_sign_at(const Balance *balance, const double *state, Scratch *scratch) {
+    const System *system = balance->system;
+    size_t used = scratch->used;
+    int n = system->n, r = balance->rows.count, size = n + r;
+    Complex *e = take_complex(scratch, 1, system->d);
+    double *K_t = take_matrix(scratch, n, n), *kkt = take_matrix(scratch, size, size);
+    double *rows = take_matrix(scratch, r, n);
+    directions(system, state, e);
+    jacobian(&balance->rows, e, rows);
+    tangent_stiffness(system, r, balance->w, balance->rows.B, state + n, e, K_t);
+    saddle(n, r, K_t, rows, rows, kkt);
+    int sign = determinant_sign(n, r, kkt, system->length, scratch);
+    scratch->used = used;
+    return sign;
+}
+
+/* Find the equilibrium at a fraction of gravity and, if held, of the displacement.  At the fraction
+ * 0 the state is the equilibrium.  sign is that of the determinant there. */
 static bool loaded(const System *system, bool held, double displacement, double fraction,
-                   double *state, Scratch *scratch) {
+                   double *state, int *sign, Scratch *scratch) {
     size_t used = scratch->used;
     int d = system->d, r = system->r;
     Complex *B = take_complex(scratch, r + 1, d);
@@ -168,7 +186,8 @@ static bool loaded(const System *system, bool held, double displacement, double 
     stack_holding(system, fraction * displacement, B, c);
     field_row(d, system->S, scaled(fraction, system->gravity), balance.w);
     spread(system, 1, balance.w, balance.w);
-    bool balanced = balance_out(&balance, state, scratch);
+    bool balanced = fraction == 0.0 || balance_out(&balance, state, scratch);
+    *sign = balanced ? determinant_sign_at(&balance, state, scratch) : 0;
     scratch->used = used;
     return balanced;
 }
@@ -243,7 +262,7 @@ static bool unreachable(const System *system, bool held, double displacement, do
                 name, displacement, unit_name, done * displacement + 0.0, unit_name,
                 heavy(system) ? " (gravity raised in proportion)" : "",
                 heavy(system) ? ", or reduce gravity across the motion" : "",
-                done > 0.0 ? "" : hint);
+                done > STATICS_HINT_SHARE ? "" : hint);
 }
 
 /* Return whether a shape is held at an amount, and not half a turn or more away.  The sine that
@@ -256,37 +275,56 @@ static bool holds(const System *system, bool held, double amount, const double *
 
 /* Increase the load and the displacement together from the straight, unloaded shape, so that the
  * result is the equilibrium that slow loading reaches.  The turn in a load step determines the size of
- * the next one, which does not grow after a rejected step.  state is (q, lam, force). */
-static bool load_slowly(const System *system, bool held, double displacement, double *state,
-                        Scratch *scratch, Problem *problem) {
+ * the next one, which does not grow after a rejected step.  A step that changes the sign of the
+ * determinant is only taken with the smallest size, unless the mechanism may snap: a longer one may
+ * have jumped to an unstable branch beside the path.  state is (q, lam, force).  Returns the share of
+ * the load that is reached. */
+static double load_slowly(const System *system, bool held, double displacement, bool may_snap,
+                          double *state, Scratch *scratch) {
     size_t used = scratch->used;
-    int size = system->n + system->r + held;
+    int size = system->n + system->r + held, sign, crossed;
     double *trial = take(scratch, (size_t)size), done = 0.0, step = 1.0;
     double growth = STATICS_GROWTH_MAX;
     bool going = true;
+    zeros(size, state);
+    copy(system->n, system->q0, state);
+    loaded(system, held, displacement, 0.0, state, &sign, scratch);
     while (done < 1.0 && going) {
         double target = lesser(1.0, done + step), turn = HUGE_VAL, ratio = STATICS_SHRINK;
         /* The difference of target and done may be rounded to more than the smallest step. */
         step = lesser(step, 1.0 - done);
+        bool smallest = step <= STATICS_LOAD_STEP_MIN;
         copy(size, state, trial);
-        if (loaded(system, held, displacement, target, trial, scratch) &&
-            holds(system, held, target * displacement, trial)) {
+        if (loaded(system, held, displacement, target, trial, &crossed, scratch) &&
+            holds(system, held, target * displacement, trial) &&
+            (may_snap || smallest || sign * crossed >= 0)) {
             turn = jump(system, state, trial);
             ratio = STATICS_TURN_AIM / greater(turn, STATICS_TURN_MIN);
         }
         if (turn <= STATICS_TURN_MAX) {
             copy(size, trial, state);
             done = target;
+            sign = crossed;
             ratio = lesser(growth, ratio);
             growth = STATICS_GROWTH_MAX;
         } else { /* If a link jumps, slow loading does not reach this equilibrium. */
-            going = step > STATICS_LOAD_STEP_MIN;
+            going = !smallest;
             ratio = greater(STATICS_SHRINK_MIN, ratio);
             growth = 1.0;
         }
         step = greater(STATICS_LOAD_STEP_MIN, ratio * step);
     }
     scratch->used = used;
+    return done;
+}
+
+/* Load the mechanism slowly; if it snaps on the way, find an equilibrium beyond the snap. */
+static bool load_fully(const System *system, bool held, double displacement, double *state,
+                       Scratch *scratch, Problem *problem) {
+    double done = load_slowly(system, held, displacement, false, state, scratch);
+    if (done < 1.0) {
+        done = load_slowly(system, held, displacement, true, state, scratch);
+    }
     return done >= 1.0 || unreachable(system, held, displacement, done, problem);
 }
 
@@ -310,7 +348,7 @@ PRBM bool equilibrium(const System *system, bool held, double displacement, Equi
     copy(n, system->q0, state);
     bool straight = !heavy(system) && !(held && displacement != 0.0) && drawn_closed(system, scratch);
     bool found = straight || ((!held || displaceable(system, displacement, scratch, problem)) &&
-                              load_slowly(system, held, displacement, state, scratch, problem));
+                              load_fully(system, held, displacement, state, scratch, problem));
     copy(n, state, shape->q);
     copy(r, state + n, shape->lam);
     /* The constraint of an angle is the rotation times the size. */
