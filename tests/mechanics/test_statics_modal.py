@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from kernel_simulation import KernelSimulation
 from many_parts import cantilever
 from prbm.base.errors import EquilibriumError
 from prbm.base.tolerances import STATICS_LOAD_STEP_MIN
@@ -168,6 +169,22 @@ def test_a_symmetric_column_stays_straight_beyond_buckling_and_is_unstable():
     shape = equilibrium(system)
     assert abs(system.amount(shape.q)) < 1e-9
     assert modes(system, shape).frequency[0] < 0.0
+
+
+@pytest.mark.parametrize("name", ["ligo_3R", "ligo_beam"])
+def test_a_mass_hangs_at_rest_on_fibres_whose_stiffness_is_small_beside_its_weight(name):
+    """Round-off of the weight is more than 1e-12 of the springs.
+
+    The frequency of a model with few coordinates is above that of the continuous fibre, 0.64458 Hz.
+    """
+    hanging = load(ROOT / "tests" / "cases" / f"{name}.toml")
+    system = assemble(hanging, hanging.values())
+    shape = equilibrium(system)
+    assert np.abs(shape.q - system.q0).max() < 1e-9
+    frequency = modes(system, shape).frequency[0]
+    assert 0.64458 < frequency < 0.69
+    kernel = KernelSimulation(hanging)
+    assert kernel.get("mode.frequency") == pytest.approx(frequency, rel=1e-9)
 
 
 def test_a_displacement_out_of_reach_is_rejected():

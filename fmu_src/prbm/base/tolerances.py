@@ -30,12 +30,16 @@ STATICS_TURN_MAX = 0.5  # rad per Newton step and load step; a larger turn reach
 STATICS_TURN_AIM = 0.45  # rad per load step, at which the control of load steps aims.
 STATICS_TURN_MIN = 1e-300  # rad; any positive number, to divide by.
 STATICS_LOAD_STEP_MIN = 2**-14  # Of the load: smallest continuation step.
-STATICS_HINT_SHARE = 1 / 128  # Of the load: if less is carried, a unit may be wrong.
+STATICS_HINT_SHARE = 1 / 128  # Of the load: if less is carried, pins may turn freely.
+STATICS_LIMP_RATIO = (
+    1e3  # Of the stiffest spring at one radian: a unit may be wrong if weight is more.
+)
 STATICS_SHRINK_MIN = 0.25  # Smallest ratio of a load step to the one before.
 STATICS_SHRINK = 0.5  # Ratio of a load step to one without an equilibrium.
 STATICS_GROWTH_MAX = 2.0  # Largest ratio of a load step to an accepted one before.
 STATICS_CONSTRAINT_RTOL = 1e-13  # Of the size: residual of closed loops at an equilibrium.
-STATICS_FORCE_RTOL = 1e-12  # Of the stiffest spring at one radian, or of the load: residual torque.
+STATICS_FORCE_RTOL = 1e-12  # Of the stiffest spring at one radian: residual torque.
+STATICS_ROUNDING_RTOL = 1e-13  # Of the torques that are added: residual torque of round-off.
 STATICS_STEP_ATOL = 1e-8  # rad; Newton step that ends the iteration: the error is its square.
 RELEASE_LEVER_RTOL = 0.02  # Of the size: a body turns about a point with a shorter lever.
 RELEASE_MODE_RTOL = 1e-6  # Of the size times the largest turn: no motion of a point by a mode.

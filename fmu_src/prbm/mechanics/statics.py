@@ -25,7 +25,9 @@ from ..base.tolerances import (
     STATICS_GROWTH_MAX,
     STATICS_HINT_SHARE,
     STATICS_ITERATIONS_MAX,
+    STATICS_LIMP_RATIO,
     STATICS_LOAD_STEP_MIN,
+    STATICS_ROUNDING_RTOL,
     STATICS_SHRINK,
     STATICS_SHRINK_MIN,
     STATICS_STEP_ATOL,
@@ -193,8 +195,8 @@ def _follow(
     """Change what is given from a share of 0, with the state there, slowly towards a share of 1.
 
     The turn in a step determines the size of the next one, which does not grow after a rejected
-    step.  A step that changes the sign of the determinant is only taken with the smallest size, unless
-    the mechanism may snap: a longer one may have jumped to an unstable branch beside the path.
+    step.  A step that changes the sign of the determinant may have jumped to an unstable branch
+    beside the path: unless the mechanism may snap, only a step of the smallest size may do so.
 
     Returns
     -------
@@ -273,7 +275,7 @@ def _newton(
     if held is not None:
         row, constant = system.holding(held)
         B, c = np.vstack([B, row]), np.append(c, constant)
-    scale = STATICS_FORCE_RTOL * float(np.abs(system.K).max() or np.abs(w).max())
+    springs_scale = STATICS_FORCE_RTOL * float(np.abs(system.K).max())
     state, turn = start.copy(), math.inf
     for _ in range(STATICS_ITERATIONS_MAX):
         q, lam = state[:n], state[n:]
@@ -285,6 +287,9 @@ def _newton(
         closed = (
             not len(open_by) or np.abs(open_by).max() <= STATICS_CONSTRAINT_RTOL * system.length
         )
+        # Torques of springs, and the torques that are added here: these are rounded.
+        added = float(np.abs(w).max() + np.abs(lam) @ np.abs(B).max(axis=1, initial=0.0))
+        scale = max(springs_scale, STATICS_ROUNDING_RTOL * added)
         balanced = closed and np.abs(torque).max() <= scale
         if balanced and turn <= STATICS_STEP_ATOL:
             return state
@@ -339,9 +344,10 @@ def _unreachable(system: System, displacement: float | None, loaded: bool, done:
             )
         )
         return f"{where}; release closer to the straight shape{pins}"
-    units = (
-        "" if done > STATICS_HINT_SHARE else "; or check the units of youngs_modulus and thickness"
+    limp = abs(system.gravity) * float(np.abs(system.S).max()) > STATICS_LIMP_RATIO * float(
+        np.abs(system.K).max()
     )
+    units = "; or check the units of youngs_modulus and thickness" if limp else ""
     return (
         f"{where} (gravity raised in proportion); release closer to the straight shape, or reduce "
         f"gravity across the motion{units}"

@@ -77,6 +77,14 @@ PRBM void tangent_stiffness(const System *system, int r, const Complex *w, const
     }
 }
 
+static double largest_modulus(int count, const Complex *x) {
+    double top = 0.0;
+    for (int j = 0; j < count; j++) {
+        top = greater(top, modulus(x[j]));
+    }
+    return top;
+}
+
 /* The equations at a fraction of the load: constraints Re(B e) + c = 0 and dead loads Re(w e). */
 typedef struct {
     const System *system;
@@ -131,6 +139,16 @@ static bool newton_step(const Balance *balance, const Complex *e, double *torque
     return finite_number(turn);
 }
 
+/* Return the size of the torques of loads and constraints, before they cancel. */
+static double added_torques(const Balance *balance, const double *lam) {
+    int d = balance->system->d;
+    double sum = largest_modulus(d, balance->w);
+    for (int i = 0; i < balance->rows.count; i++) {
+        sum += fabs(lam[i]) * largest_modulus(d, balance->rows.B + i * d);
+    }
+    return sum;
+}
+
 /* Solve the balance from a state (q, lam), which is overwritten; false if it does not converge. */
 static bool balance_out(const Balance *balance, double *state, Scratch *scratch) {
     const System *system = balance->system;
@@ -139,17 +157,15 @@ static bool balance_out(const Balance *balance, double *state, Scratch *scratch)
     Complex *e = take_complex(scratch, 1, system->d);
     double *torque = take(scratch, (size_t)n), *open_by = take(scratch, (size_t)r);
     double *rows = take_matrix(scratch, r, n);
-    double scale = STATICS_FORCE_RTOL * largest(n * n, system->K);
+    double springs_scale = STATICS_FORCE_RTOL * largest(n * n, system->K);
     double turn = HUGE_VAL;
     bool going = true, balanced = false, done = false;
-    for (int j = 0; j < system->d && scale == 0.0; j++) {
-        scale = greater(scale, STATICS_FORCE_RTOL * modulus(balance->w[j]));
-    }
     for (int step = 0; step < STATICS_ITERATIONS_MAX && going && !done; step++) {
         directions(system, state, e);
         unbalanced(balance, state, e, torque, open_by, rows, scratch);
         bool closed = largest(r, open_by) <= STATICS_CONSTRAINT_RTOL * system->length;
-        balanced = closed && largest(n, torque) <= scale;
+        double rounded = STATICS_ROUNDING_RTOL * added_torques(balance, state + n);
+        balanced = closed && largest(n, torque) <= greater(springs_scale, rounded);
         done = balanced && turn <= STATICS_STEP_ATOL;
         going = done || newton_step(balance, e, torque, open_by, rows, state, &turn, scratch);
     }
@@ -244,6 +260,12 @@ static bool heavy(const System *system) {
     return system->gravity.re != 0.0 || system->gravity.im != 0.0;
 }
 
+/* Return whether the weight is far beyond what the springs can carry. */
+static bool limp(const System *system) {
+    double weight = modulus(system->gravity) * largest_modulus(system->d, system->S);
+    return weight > STATICS_LIMP_RATIO * largest(system->n * system->n, system->K);
+}
+
 static bool unreachable(const System *system, bool held, double displacement, double done,
                         Problem *problem) {
     if (!held) {
@@ -253,16 +275,19 @@ static bool unreachable(const System *system, bool held, double displacement, do
     }
     const char *name = turns(system) ? "angle" : "displacement";
     const char *unit_name = turns(system) ? "rad" : "m";
-    const char *hint = heavy(system) ? "; or check the units of youngs_modulus and thickness"
-                             : "; if a body or a flexure turns freely on pins, nothing holds it "
-                               "without gravity: clamp an end of it, or add gravity";
+    const char *hint =
+        limp(system) ? "; or check the units of youngs_modulus and thickness"
+        : !heavy(system) && !(done > STATICS_HINT_SHARE)
+            ? "; if a body or a flexure turns freely on pins, nothing holds it without gravity: clamp an "
+              "end of it, or add gravity"
+            : "";
     return fail(problem,
                 "release.%s = %g %s cannot be reached: no equilibrium was found beyond %.4g %s%s; "
                 "release closer to the straight shape%s%s",
                 name, displacement, unit_name, done * displacement + 0.0, unit_name,
                 heavy(system) ? " (gravity raised in proportion)" : "",
                 heavy(system) ? ", or reduce gravity across the motion" : "",
-                done > STATICS_HINT_SHARE ? "" : hint);
+                hint);
 }
 
 /* Return whether a shape is held at an amount, and not half a turn or more away.  The sine that
