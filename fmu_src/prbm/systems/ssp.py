@@ -18,8 +18,8 @@ from ..base.progress import Progress
 from ..runs.result import Columns
 from . import cosimulation
 from .components import CouplingError, Value, check_wire, described, start_value
-from .nodes import Flat
-from .structure import SLASH, Package
+from .nodes import SLASH, Flat
+from .structure import Package
 
 SSD = "http://ssp-standard.org/SSP1/SystemStructureDescription"
 SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
