@@ -110,6 +110,11 @@ def _fmus():
     return {name: (_fmu(variables), variables) for name, variables in VARIABLES.items()}
 
 
+def fmu_without_binary(name):
+    """Return the content of an FMU 2.0 with the variables of a name in :data:`VARIABLES`."""
+    return _fmus()[name][0]
+
+
 def random_package(path, seed, fmus=None):
     """Write a package; return the fault in it, or None.
 

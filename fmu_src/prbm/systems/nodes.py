@@ -19,6 +19,12 @@ def kind_of(variable: Any) -> str:
     return REAL if kind.startswith("Float") else kind
 
 
+def items_of(variable: Any) -> dict[int, str]:
+    """Return the items of an enumeration by value."""
+    items = () if variable.declaredType is None else variable.declaredType.items
+    return {int(x.value): x.name for x in items}
+
+
 @dataclass(frozen=True)
 class Connector:
     """A connector: its kind, and its type and unit if they are given or can be deduced."""

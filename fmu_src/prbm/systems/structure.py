@@ -18,7 +18,18 @@ from lxml import etree  # type: ignore[import-untyped]
 
 from ..base.archives import DESCRIPTION_SIZE_MAX, check_unpacked_size
 from .components import CouplingError, Value, described, start_value
-from .nodes import SLASH, Connector, Flat, Node, Wire, check_loops, deduce_units, kind_of, place
+from .nodes import (
+    SLASH,
+    Connector,
+    Flat,
+    Node,
+    Wire,
+    check_loops,
+    deduce_units,
+    items_of,
+    kind_of,
+    place,
+)
 from .signals import BOOLEAN, ENUMERATION, INTEGER, REAL, Linear, Signal, Table, Unit, exact
 
 NAMESPACE = "http://ssp-standard.org/SSP1/SystemStructure"
@@ -563,25 +574,19 @@ def _inside(node: Node | None, owner: Node) -> bool:
     return node is not None and (node is owner or _inside(node.parent, owner))
 
 
-def _items(variable: Any) -> dict[int, str]:
-    """Return the items of an enumeration by value."""
-    items = () if variable.declaredType is None else variable.declaredType.items
-    return {int(x.value): x.name for x in items}
-
-
 def _from(component: Node, name: str, variable: Any) -> Iterator[tuple[Node, str, Signal]]:
     """Yield where an output of a component leads: node, name and signal."""
     signal = Signal(kind_of(variable), component.unit(variable))
     full = f"{component.path}.{name}"
     if signal.kind == ENUMERATION:
-        signal = signal.after(Table(ENUMERATION, tuple(_items(variable).items()), full))
+        signal = signal.after(Table(ENUMERATION, tuple(items_of(variable).items()), full))
     assert component.parent is not None
     for node, end, found in _forward(component.parent, (component.name, name), signal):
         if component.connectors[name].kind == "output":
             _check_numeric(full, variable)
         if node.fmu is not None:
             _check_numeric(place(node, "", end), node.variables[end])
-            found = _settled(found, _items(variable), place(node, "", end))
+            found = _settled(found, items_of(variable), place(node, "", end))
         elif signal.kind == ENUMERATION:
             raise CouplingError(
                 f"{end}: an Enumeration as output of the system is not supported; remove the "
@@ -637,7 +642,7 @@ def _last(
     signal = signal.at(kind, unit, where, *options)
     if kind != ENUMERATION:
         return signal
-    entries = tuple((name, value) for value, name in _items(variable).items())
+    entries = tuple((name, value) for value, name in items_of(variable).items())
     return signal.after(Table(ENUMERATION, entries, where))
 
 
