@@ -14,7 +14,7 @@ from coupled import guide, integrator
 from package_meaning import Meaning
 from prbm.systems import cosimulation, ssp
 from prbm.systems.components import CouplingError, described
-from prbm.systems.container import container
+from prbm.systems.container import _common_platforms, container
 from prbm.systems.cosimulation import JACOBI
 from prbm.systems.structure import Package
 from random_packages import fmu_without_binary
@@ -241,6 +241,14 @@ def test_a_container_has_the_platforms_of_all_its_fmus(fmi, tmp_path):
     assert found == {"linux64" if fmi == 2 else "x86_64-linux"}
     with pytest.raises(CouplingError, match=r"win: .* binaries for win64, none of which"):
         container(path, system | {"win": moved(tmp_path, "win64")}, {}, 1e-3, fmi=fmi)
+
+
+def test_a_container_has_no_platform_that_an_fmu_may_lack(tmp_path):
+    """The folder darwin64 of FMI 2.0 is for x86-64; FMPy has libraries for some platforms only."""
+    found = _common_platforms({"mac": moved(tmp_path, "darwin64")})
+    assert found == {"x86_64-darwin"}
+    with pytest.raises(CouplingError, match="binaries for aarch64-linux, none of which"):
+        _common_platforms({"arm": moved(tmp_path, "aarch64-linux")})
 
 
 def test_texts_and_enumerations_are_written_by_the_schema(tmp_path):
