@@ -14,6 +14,7 @@ from fmpy import simulate_fmu
 from coupled import guide, integrator
 from prbm.base.errors import ParameterError
 from prbm.references.scalar_guide import ScalarGuide
+from prbm.runs.result import structured
 from prbm.systems import cosimulation
 from prbm.systems.components import CO_SIMULATION, Component, CouplingError, start_value
 from prbm.systems.cosimulation import GAUSS_SEIDEL, JACOBI, System, simulate
@@ -365,3 +366,11 @@ def test_the_end_of_a_simulation_in_event_mode_is_not_ignored(monkeypatch):
         monkeypatch.setattr(own.fmu, "updateDiscreteStates", lambda: (False, True, False))
         with pytest.raises(CouplingError, match=r"guide terminated the simulation at 0 s"):
             own.update()
+
+
+@pytest.mark.parametrize(
+    "values", [[1, 2**31], [-5, 2**53 + 1], [0, 2**64 - 1], ["", "ä b"], [b"", b"\x01\x00"]]
+)
+def test_rows_of_large_integers_texts_and_bytes_keep_their_values(values):
+    found = structured([{"time": 0.0, "a.x": x} for x in values])
+    assert found["a.x"].tolist() == values
