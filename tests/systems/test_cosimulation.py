@@ -2,7 +2,9 @@
 
 import gc
 import math
+import os
 import re
+import shutil
 import tempfile
 import zipfile
 from pathlib import Path
@@ -18,6 +20,7 @@ from prbm.runs.result import structured
 from prbm.systems import cosimulation
 from prbm.systems.components import CO_SIMULATION, Component, CouplingError, start_value
 from prbm.systems.cosimulation import GAUSS_SEIDEL, JACOBI, System, simulate
+from reference_fmus import table
 from support import mechanism, possible
 
 pytestmark = [pytest.mark.fmu, pytest.mark.native]
@@ -374,3 +377,15 @@ def test_the_end_of_a_simulation_in_event_mode_is_not_ignored(monkeypatch):
 def test_rows_of_large_integers_texts_and_bytes_keep_their_values(values):
     found = structured([{"time": 0.0, "a.x": x} for x in values])
     assert found["a.x"].tolist() == values
+
+
+@pytest.mark.slow
+def test_the_reference_fmus_are_partners_or_refused():
+    """The folder is a clone of the Reference FMUs of the Modelica Association."""
+    if "REFERENCE_FMUS" not in os.environ or shutil.which("cmake") is None:
+        pytest.skip("needs CMake, and the variable REFERENCE_FMUS with the path of a clone")
+    found = table(Path(os.environ["REFERENCE_FMUS"]))
+    assert len(found) == 9
+    for name, fmi, texts in found:
+        assert "WRONG" not in texts, (name, fmi)
+        assert name == "Clocks" or texts[:2] == ("equal", "equal"), (name, fmi, texts)
