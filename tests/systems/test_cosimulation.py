@@ -379,6 +379,22 @@ def test_rows_of_large_integers_texts_and_bytes_keep_their_values(values):
     assert found["a.x"].tolist() == values
 
 
+@pytest.mark.parametrize(("fmi", "attribute"), [(2, b'guid="'), (3, b'instantiationToken="')])
+def test_the_message_of_an_fmu_that_cannot_be_instantiated_appears(fmi, attribute, tmp_path):
+    path = tmp_path / "other.fmu"
+    with zipfile.ZipFile(guide(fmi)) as source, zipfile.ZipFile(path, "w") as copy:
+        for name in source.namelist():
+            content = source.read(name)
+            if name == "modelDescription.xml":
+                content = content.replace(attribute, attribute + b"other", 1)
+            copy.writestr(name, content)
+    word = attribute.decode().removesuffix('="')
+    with pytest.raises(
+        CouplingError, match=rf"(?i)a: instantiate failed \(.*({word}|token).*other"
+    ):
+        simulate({"a": path}, {}, 0.1, 0.1)
+
+
 @pytest.mark.slow
 def test_the_reference_fmus_are_partners_or_refused():
     """The folder is a clone of the Reference FMUs of the Modelica Association."""
