@@ -1,6 +1,7 @@
 """``prbm ssp`` prints and writes the motion of a package; the rows before a failure too."""
 
 import csv
+import zipfile
 
 import numpy as np
 import pytest
@@ -75,3 +76,15 @@ def test_a_mistake_is_named(words, message, package, capsys, monkeypatch):
     (package.parent / "text.ssp").write_text("text", encoding="utf-8")
     assert main(["ssp", *words]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_start_values_without_a_variable_are_named(package, tmp_path, capsys):
+    path = tmp_path / "renamed.ssp"
+    with zipfile.ZipFile(package) as source, zipfile.ZipFile(path, "w") as copy:
+        for name in source.namelist():
+            content = source.read(name)
+            if name == ssp.DESCRIPTION:
+                content = content.replace(b'Parameter name="gain"', b'Parameter name="gian"')
+            copy.writestr(name, content)
+    assert main(["ssp", str(path)]) == 0
+    assert "note: the start value sum.gian is ignored" in capsys.readouterr().err

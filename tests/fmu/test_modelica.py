@@ -5,6 +5,7 @@ that the force moves in place of the imported block.
 """
 
 import dataclasses
+import re
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -34,6 +35,24 @@ end Test;
 MASS, OMEGA = 0.05, 20.0
 
 
+RESERVED = re.findall(
+    r"\w+",
+    """
+algorithm and annotation block break class connect connector constant constrainedby der discrete
+each else elseif elsewhen encapsulated end enumeration equation expandable extends external false
+final flow for function if import impure in initial inner input loop model not operator or outer
+output package parameter partial protected public pure record redeclare replaceable return stream
+then true type when while within
+""",
+)
+"""The reserved words of Modelica 3.6, section 2.3.3."""
+
+
+def quoted(name: str) -> str:
+    """Return a name with quotes around the parts that are reserved words."""
+    return ".".join(f"'{x}'" if x in RESERVED else x for x in name.split("."))
+
+
 def law(v: Variable, name: str) -> str:
     """Return the equation of an output of the stand-in: a mass on which the force acts."""
     if v.name == "shuttle.x":
@@ -59,9 +78,9 @@ def flat_block(block: str, variables: Iterable[Variable], names: str) -> str:
     """Return a stand-in with renamed variables."""
     renamed = NAMES[names][1]
     shown = [v for v in variables if v.causality in ("parameter", "input", "output")]
-    lines = [declaration(v, renamed(v.name)) for v in shown]
+    lines = [declaration(v, quoted(renamed(v.name))) for v in shown]
     lines.append("equation")
-    lines += [law(v, renamed(v.name)) for v in shown if v.causality == "output"]
+    lines += [law(v, quoted(renamed(v.name))) for v in shown if v.causality == "output"]
     return "\n".join([f"block {block}", *lines, f"end {block};"])
 
 
@@ -79,16 +98,16 @@ def structured_block(block: str, variables: Iterable[Variable]) -> str:
                 if tail:
                     inner[head] = True
                 else:
-                    lines.append(declaration(v, head))
+                    lines.append(declaration(v, quoted(head)))
         for head in inner:
             name = "Part_" + (prefix + head).replace(".", "_")
             members = nested(f"{prefix}{head}.")
             classes.append("\n".join([f"block {name}", *members, f"end {name};"]))
-            lines.append(f"{name} {head};")
+            lines.append(f"{name} {quoted(head)};")
         return lines
 
     members = nested("")
-    laws = [law(v, v.name) for v in shown if v.causality == "output"]
+    laws = [law(v, quoted(v.name)) for v in shown if v.causality == "output"]
     return "\n".join([*classes, f"block {block}", *members, "equation", *laws, f"end {block};"])
 
 
@@ -98,9 +117,9 @@ def compiled(text: str, model: str, folder: Path):
     return rumoca.Session().load(str(path), model=model)
 
 
-def complete(chosen, names: str, further: str = "") -> str:
-    """Return the package with its stand-ins."""
-    variables = interface(chosen, {})
+def complete(chosen, names: str, further: str = "", added: Iterable[Variable] = ()) -> str:
+    """Return the package with its stand-ins, for the variables of a mechanism and others."""
+    variables = (*interface(chosen, {}), *added)
     block = NAMES[names][0].format(chosen.name)
     inside = (
         structured_block(block, variables)
@@ -110,10 +129,11 @@ def complete(chosen, names: str, further: str = "") -> str:
     return "\n".join([LIBRARY, inside, wrapper(chosen, variables, names), further])
 
 
+@pytest.mark.parametrize("names", list(NAMES))
 @each_shipped
-def test_the_package_compiles_for_every_mechanism(model, tmp_path):
+def test_the_package_compiles_for_every_mechanism(model, names, tmp_path):
     chosen = mechanism(model)
-    text = complete(chosen, "underscore")
+    text = complete(chosen, names)
     for name in ("Signals", "Flanges"):
         assert compiled(text, f"{chosen.name}Wrapper.{name}", tmp_path)
 
@@ -130,6 +150,23 @@ def test_a_spring_on_the_flange_moves_the_body_harmonically(names, tmp_path):
     result = model.simulate(t=(0.0, 0.4), dt=0.01).to_dataframe()
     x, t = result["guide.mechanism.shuttle_x"].to_numpy(), result.index.to_numpy()
     np.testing.assert_allclose(x, np.cos(OMEGA * t), atol=1e-3)
+
+
+@pytest.mark.parametrize("names", list(NAMES))
+def test_every_reserved_word_may_be_part_of_a_name(names, tmp_path):
+    """A parameter, an input and an output for each word, which is the first or the last part."""
+    chosen = mechanism("PRBDM")
+    own = {v.causality: v for v in interface(chosen, {}) if v.type == "Real"}
+    forms = {"parameter": "{}.size", "input": "own.{}", "output": "{}.place"}
+    if names == "underscore":
+        forms["parameter"] = "{}"
+    added = [
+        dataclasses.replace(own[causality], name=form.format(word))
+        for word in RESERVED
+        for causality, form in forms.items()
+    ]
+    text = complete(chosen, names, added=added)
+    assert compiled(text, "PRBDMWrapper.Signals", tmp_path)
 
 
 def test_an_error_of_syntax_is_found_by_the_compiler(tmp_path):

@@ -2,7 +2,9 @@
 
 import gc
 import math
+import os
 import re
+import shutil
 import tempfile
 import zipfile
 from pathlib import Path
@@ -14,9 +16,11 @@ from fmpy import simulate_fmu
 from coupled import guide, integrator
 from prbm.base.errors import ParameterError
 from prbm.references.scalar_guide import ScalarGuide
+from prbm.runs.result import structured
 from prbm.systems import cosimulation
 from prbm.systems.components import CO_SIMULATION, Component, CouplingError, start_value
 from prbm.systems.cosimulation import GAUSS_SEIDEL, JACOBI, System, simulate
+from reference_fmus import table
 from support import mechanism, possible
 
 pytestmark = [pytest.mark.fmu, pytest.mark.native]
@@ -365,3 +369,39 @@ def test_the_end_of_a_simulation_in_event_mode_is_not_ignored(monkeypatch):
         monkeypatch.setattr(own.fmu, "updateDiscreteStates", lambda: (False, True, False))
         with pytest.raises(CouplingError, match=r"guide terminated the simulation at 0 s"):
             own.update()
+
+
+@pytest.mark.parametrize(
+    "values", [[1, 2**31], [-5, 2**53 + 1], [0, 2**64 - 1], ["", "ä b"], [b"", b"\x01\x00"]]
+)
+def test_rows_of_large_integers_texts_and_bytes_keep_their_values(values):
+    found = structured([{"time": 0.0, "a.x": x} for x in values])
+    assert found["a.x"].tolist() == values
+
+
+@pytest.mark.parametrize(("fmi", "attribute"), [(2, b'guid="'), (3, b'instantiationToken="')])
+def test_the_message_of_an_fmu_that_cannot_be_instantiated_appears(fmi, attribute, tmp_path):
+    path = tmp_path / "other.fmu"
+    with zipfile.ZipFile(guide(fmi)) as source, zipfile.ZipFile(path, "w") as copy:
+        for name in source.namelist():
+            content = source.read(name)
+            if name == "modelDescription.xml":
+                content = content.replace(attribute, attribute + b"other", 1)
+            copy.writestr(name, content)
+    word = attribute.decode().removesuffix('="')
+    with pytest.raises(
+        CouplingError, match=rf"(?i)a: instantiate failed \(.*({word}|token).*other"
+    ):
+        simulate({"a": path}, {}, 0.1, 0.1)
+
+
+@pytest.mark.slow
+def test_the_reference_fmus_are_partners_or_refused():
+    """The folder is a clone of the Reference FMUs of the Modelica Association."""
+    if "REFERENCE_FMUS" not in os.environ or shutil.which("cmake") is None:
+        pytest.skip("needs CMake, and the variable REFERENCE_FMUS with the path of a clone")
+    found = table(Path(os.environ["REFERENCE_FMUS"]))
+    assert len(found) == 9
+    for name, fmi, texts in found:
+        assert "WRONG" not in texts, (name, fmi)
+        assert name == "Clocks" or texts[:2] == ("equal", "equal"), (name, fmi, texts)

@@ -11,10 +11,13 @@ from fmpy import read_model_description, simulate_fmu
 from lxml import etree
 
 from coupled import guide, integrator
+from package_meaning import Meaning
 from prbm.systems import cosimulation, ssp
 from prbm.systems.components import CouplingError, described
-from prbm.systems.container import container
+from prbm.systems.container import _common_platforms, container
 from prbm.systems.cosimulation import JACOBI
+from prbm.systems.structure import Package
+from random_packages import fmu_without_binary
 
 pytestmark = [
     pytest.mark.fmu, pytest.mark.native, pytest.mark.usefixtures("plain_temporary_folder")
@@ -238,6 +241,33 @@ def test_a_container_has_the_platforms_of_all_its_fmus(fmi, tmp_path):
     assert found == {"linux64" if fmi == 2 else "x86_64-linux"}
     with pytest.raises(CouplingError, match=r"win: .* binaries for win64, none of which"):
         container(path, system | {"win": moved(tmp_path, "win64")}, {}, 1e-3, fmi=fmi)
+
+
+def test_a_container_has_no_platform_that_an_fmu_may_lack(tmp_path):
+    """The folder darwin64 of FMI 2.0 is for x86-64; FMPy has libraries for some platforms only."""
+    found = _common_platforms({"mac": moved(tmp_path, "darwin64")})
+    assert found == {"x86_64-darwin"}
+    with pytest.raises(CouplingError, match="binaries for aarch64-linux, none of which"):
+        _common_platforms({"arm": moved(tmp_path, "aarch64-linux")})
+
+
+def test_texts_and_enumerations_are_written_by_the_schema(tmp_path):
+    """The reader of the standard finds the start values and the connection."""
+    paths = {}
+    for name, kind in (("a", "one"), ("b", "other kind #1")):
+        paths[name] = tmp_path / f"{name}.fmu"
+        paths[name].write_bytes(fmu_without_binary(kind))
+    path, values = tmp_path / "x.ssp", {"a.h": 5, "b.h": 3, "a.s": 'a "b" & <c>'}
+    ssp.package(path, paths, {"b.e": "a.g"}, values)
+    found = Meaning(path)
+    assert found.values == values
+    source, function, _ = found.links["b.e"]
+    assert (source, [function(x) for x in (1, 2, 5)]) == ("a.g", [3, 7, 1])
+    copies = tmp_path / "copies"
+    copies.mkdir()
+    assert Package(path, copies).flat.values == values
+    with pytest.raises(CouplingError, match=r"a\.h = 4 must be one of 1, 2, 5"):
+        ssp.package(path, paths, {}, {"a.h": 4})
 
 
 def test_a_container_refuses_what_its_library_does_not_support(tmp_path, monkeypatch):

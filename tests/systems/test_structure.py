@@ -149,6 +149,26 @@ def test_a_connection_is_transformed_and_names_are_decoded(tmp_path):
     assert (to, source, float(signal(3.0))) == ("b.stop.displacement", "a.shuttle.x", 1.75)
 
 
+def nested(connector: str, *wires: str) -> str:
+    """Return a system of a component, with one connector and connections to the component."""
+    inside = "".join(f"<ssd:Connection {wire}/>" for wire in wires)
+    text = system(component(), name="inner", rest=f"<ssd:Connections>{inside}</ssd:Connections>")
+    start = '<ssd:System name="inner">'
+    return text.replace(start, f"{start}<ssd:Connectors>{connector}</ssd:Connectors>")
+
+
+BARE = '<ssd:Connector name="C" kind="input">{}</ssd:Connector>'
+DISPLACED = 'startConnector="C" endElement="a" endConnector="stop.displacement"'
+SUPPRESSED = f'{DISPLACED} suppressUnitConversion="true"'
+
+
+def test_a_connector_without_a_unit_has_that_of_what_is_connected_inside(tmp_path):
+    """The value is converted on its way to C; there is no conversion after C."""
+    given = binding(parameters('inner.C Real value="-12" unit="mm"', units=SET_UNITS))
+    found = meaning(tmp_path, system(nested(BARE.format(""), SUPPRESSED), given))
+    assert found.values == {"inner/a.stop.displacement": -0.012}
+
+
 @pytest.mark.parametrize(
     ("content", "words"),
     [
@@ -178,6 +198,26 @@ def test_a_connection_is_transformed_and_names_are_decoded(tmp_path):
         (
             system(component(), binding(parameters(f'{START} String value="1"'))),
             "type String is no Real",
+        ),
+        (
+            system(
+                nested(BARE.format(""), DISPLACED, DISPLACED.replace("displacement", "velocity"))
+                .replace(IN, IN + IN.replace("displacement", "velocity")),
+                binding(parameters('inner.C Real value="1"')),
+            ),
+            "cannot be deduced",
+        ),
+        (system(nested(BARE.format("<ssc:String/>"), DISPLACED)), "type String is no Real"),
+        (
+            system(
+                nested(
+                    BARE.format("") + '<ssd:Connector name="D" kind="output"/>',
+                    'startConnector="C" endConnector="D"',
+                ),
+                rest='<ssd:Connections><ssd:Connection startElement="inner" startConnector="D" '
+                'endElement="inner" endConnector="C"/></ssd:Connections>',
+            ),
+            "loop without an FMU",
         ),
         ("<ssd:System/>", "not valid by SSP 1.0"),
     ],

@@ -1,6 +1,7 @@
 """``prbm ssp``: the motion of coupled FMUs in a package of SSP 1.0."""
 
 import argparse
+import sys
 import time
 
 from ..base.atomic import FileError
@@ -34,7 +35,7 @@ def run_package(options: argparse.Namespace) -> None:
     output = Output(options.out)
     begin, ended = time.perf_counter(), None
     try:
-        columns = ssp.simulate(options.package, stop_time, step, reporter())
+        columns = ssp.simulate(options.package, stop_time, step, reporter(), _note)
     except CouplingError as error:
         if error.columns is None:
             raise
@@ -47,6 +48,10 @@ def run_package(options: argparse.Namespace) -> None:
     output.write()
     if ended is not None:
         raise SimulationError(str(ended)) from None
+
+
+def _note(sentence: str) -> None:
+    print(f"note: {sentence}", file=sys.stderr)
 
 
 def _ranges(columns: Columns) -> str:

@@ -114,6 +114,16 @@ def identifier(name: str) -> str:
     return f"'{name}'" if KEYWORDS.fullmatch(plain) else plain
 
 
+def _member(name: str, renamed: Callable[[str], str] | None) -> str:
+    """Return the name of a variable in the imported block; reserved words are quoted."""
+    parts = name.split(".") if renamed is None else [renamed(name)]
+    return ".".join(map(_quoted, parts))
+
+
+def _quoted(part: str) -> str:
+    return f"'{part}'" if KEYWORDS.fullmatch(part) else part
+
+
 def _check_names(variables: Iterable[Variable]) -> None:
     """Reject two names that are the same in Modelica."""
     found: dict[str, str] = {"fmu": "the imported block"}
@@ -181,15 +191,14 @@ def _signals(
     for v in inputs:
         yield f'  {INTERFACES}.{v.type}Input {_inner(v)} "Value of the input";'
     yield "equation"
-    member = renamed or (lambda name: name)
     for v in inputs:
         yield f"  connect({identifier(v.name)}, {_inner(v)});"
         yield f"  if not {identifier(f'use.{_group(v)}')} then"
         yield f"    {_inner(v)} = {number(float(v.start or 0.0))};"
         yield "  end if;"
-        yield f"  fmu.{member(v.name)} = {_inner(v)};"
+        yield f"  fmu.{_member(v.name, renamed)} = {_inner(v)};"
     for v in outputs:
-        yield f"  {identifier(v.name)} = fmu.{member(v.name)};"
+        yield f"  {identifier(v.name)} = fmu.{_member(v.name, renamed)};"
     yield "end Signals;"
 
 
@@ -220,7 +229,7 @@ def _places(count: int, x: int) -> Iterator[str]:
 def _modification(values: Mapping[str, str], renamed: Callable[[str], str] | None) -> str:
     """Return the modification of the parameters of a block."""
     if renamed is not None:
-        return ", ".join(f"{renamed(name)}={value}" for name, value in values.items())
+        return ", ".join(f"{_member(name, renamed)}={value}" for name, value in values.items())
     nested: dict[str, dict[str, str]] = {}
     found = []
     for name, value in values.items():
@@ -228,8 +237,8 @@ def _modification(values: Mapping[str, str], renamed: Callable[[str], str] | Non
         if tail:
             nested.setdefault(head, {})[tail] = value
         else:
-            found.append(f"{name}={value}")
-    found += [f"{head}({_modification(inside, None)})" for head, inside in nested.items()]
+            found.append(f"{_quoted(name)}={value}")
+    found += [f"{_quoted(head)}({_modification(inside, None)})" for head, inside in nested.items()]
     return ", ".join(found)
 
 

@@ -122,8 +122,10 @@ def names(columns: Columns) -> tuple[str, ...]:
     return columns.dtype.names or ()
 
 
-def structured(rows: Iterable[Mapping[str, float | int | bool]]) -> Columns:
+def structured(rows: Iterable[Mapping[str, float | int | bool | str | bytes]]) -> Columns:
     """Return rows of values by name as a structured array with FMPy's types.
+
+    Integers have 64 bits if a value of their column needs them; texts and bytes are objects.
 
     Examples
     --------
@@ -131,7 +133,23 @@ def structured(rows: Iterable[Mapping[str, float | int | bool]]) -> Columns:
     array([ True])
     """
     table = list(rows)
-    return np.array([tuple(row.values()) for row in table], row_type(table[0]))
+    columns = {name: [row[name] for row in table] for name in table[0]}
+    types = np.dtype([(name, _column_type(values)) for name, values in columns.items()])
+    return np.array([tuple(row.values()) for row in table], types)
+
+
+def _column_type(values: list[Any]) -> Any:
+    """Return the type of a column, which is that of its first value."""
+    kind = type(values[0])
+    if kind in (str, bytes):
+        return object
+    if kind is not int:
+        return np.bool_ if kind is bool else np.float64
+    fitting = (
+        x for x in (np.int32, np.int64)
+        if np.iinfo(x).min <= min(values) and max(values) <= np.iinfo(x).max
+    )  # fmt: skip
+    return next(fitting, np.uint64)
 
 
 def row_type(row: Mapping[str, float | int | bool]) -> np.dtype[Any]:

@@ -154,7 +154,8 @@ class Component:
                 f"{error.status}: {why}"
             ) from None
         except Exception as error:
-            raise CouplingError(f"{self.name}: {function} failed ({error})") from None
+            why = self.last_error or str(error)
+            raise CouplingError(f"{self.name}: {function} failed ({why})") from None
 
     def variable(self, name: str) -> Any:
         """Return FMPy's description of a variable.

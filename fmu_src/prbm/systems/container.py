@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 from uuid import NAMESPACE_URL, uuid5
 
+from fmpy import container_fmu  # type: ignore[import-untyped]
 from fmpy.container_fmu import config  # type: ignore[import-untyped]
 from fmpy.container_fmu.cli import create_container_fmu  # type: ignore[import-untyped]
 from fmpy.model_description import (  # type: ignore[import-untyped]
@@ -20,6 +21,7 @@ from fmpy.model_description import (  # type: ignore[import-untyped]
 )
 
 from ..base.atomic import write
+from ..kernel import compiler
 from .components import CouplingError, Value, attribute, check_wire, described, start_value
 from .signals import BASE_UNITS
 
@@ -27,10 +29,7 @@ from .signals import BASE_UNITS
 NAMES3 = {"Real": "Float64", "Integer": "Int32"}
 KINDS = ("parameter", "input", "output")
 SUPPORTED = ("Float64", "Int32", "Boolean")  # types of FMI 3.0 that FMPy's library passes on
-PLATFORMS = {
-    "linux64": ("x86_64-linux",), "win64": ("x86_64-windows",),
-    "darwin64": ("x86_64-darwin", "aarch64-darwin"),
-}  # fmt: skip
+PLATFORMS = {platform.folder2: platform.name for platform in compiler.PLATFORMS.values()}
 """Platforms in FMI 3.0 by their names in FMI 2.0."""
 
 
@@ -136,12 +135,13 @@ def _inside(name: str, fmu: str | Path, folder: Path) -> Any:
 
 def _common_platforms(fmus: Mapping[str, str | Path]) -> set[str]:
     """Return the platforms of FMPy's library that all FMUs have, by their names in FMI 3.0."""
-    common = {x for names in PLATFORMS.values() for x in names}
+    folder = Path(container_fmu.__file__).parent / "binaries"
+    common = {x.name for x in folder.iterdir()}
     for name, fmu in fmus.items():
         with zipfile.ZipFile(fmu) as archive:
             parts = [x.split("/") for x in archive.namelist()]
         own = {x[1] for x in parts if x[0] == "binaries" and len(x) > 2 and x[2]}
-        common &= {x for platform in own for x in PLATFORMS.get(platform, (platform,))}
+        common &= {PLATFORMS.get(platform, platform) for platform in own}
         if not common:
             raise CouplingError(
                 f"{name}: {fmu} has binaries for {', '.join(sorted(own)) or 'no platform'}, none "
@@ -153,7 +153,7 @@ def _common_platforms(fmus: Mapping[str, str | Path]) -> set[str]:
 def _remove_binaries(folder: Path, platforms: set[str]) -> None:
     """Remove the binaries of other platforms."""
     for found in folder.iterdir():
-        if not platforms.intersection(PLATFORMS.get(found.name, (found.name,))):
+        if PLATFORMS.get(found.name, found.name) not in platforms:
             shutil.rmtree(found)
 
 

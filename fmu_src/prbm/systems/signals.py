@@ -140,14 +140,14 @@ class Signal:
         Its unit; None: not known.
     steps : tuple of functions
         The functions from the origin to here.
-    open : bool
-        A step has depended on the unit of a connector that has none: no conversion may follow.
+    vague : bool
+        The unit of the connector here cannot be deduced.
     """
 
     kind: str
     unit: Unit | None = None
     steps: tuple[Transformation, ...] = ()
-    open: bool = False
+    vague: bool = False
 
     def __call__(self, value: Any) -> Any:
         """Return the value here for a value at the origin."""
@@ -185,6 +185,7 @@ class Signal:
         where: str,
         transformation: Transformation | None = None,
         suppress: bool = False,
+        vague: bool = False,
     ) -> "Signal":
         """Return the signal at the next connector.
 
@@ -198,12 +199,13 @@ class Signal:
             Transformation after the conversion of the unit.
         suppress : bool
             The unit is not converted.
+        vague : bool
+            The unit of the connector cannot be deduced from what is connected inside.
 
         Raises
         ------
         CouplingError
-            If types or units do not match, or the order of conversion and transformation is not
-            determined since a connector has no unit.
+            If types or units do not match, or the value depends on a unit that cannot be deduced.
         """
         signal = self
         if isinstance(transformation, Table):
@@ -214,17 +216,17 @@ class Signal:
                 )
             signal = signal.after(transformation)
         signal = signal.of_kind(kind, where)
-        if unit is None:
-            linear = isinstance(transformation, Linear)
-            signal = replace(signal, open=signal.open or linear or suppress)
-        else:
+        linear = isinstance(transformation, Linear)
+        depends = (suppress and self.vague) or (vague and (suppress or linear or self.unit is None))
+        if depends and signal.kind == REAL:
+            raise CouplingError(
+                f"{where}: the unit of a connector on the way cannot be deduced from what is "
+                "connected inside its system; give the connector a unit"
+            )
+        if unit is not None:
             converted = IDENTITY if suppress else conversion(self.unit, unit, where)
-            if self.open and converted != IDENTITY:
-                raise CouplingError(
-                    f"{where}: a transformation or suppressUnitConversion before needs the unit of "
-                    "its connector; give that connector a unit"
-                )
-            signal = replace(signal.after(converted), unit=unit, open=False)
+            signal = replace(signal.after(converted), unit=unit)
+        signal = replace(signal, vague=vague)
         if isinstance(transformation, Linear):
             if signal.kind != REAL:
                 raise CouplingError(

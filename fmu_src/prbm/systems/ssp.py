@@ -6,7 +6,7 @@ Co-simulation masters read such packages.  :func:`simulate` runs one with :mod:`
 import io
 import tempfile
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -18,8 +18,8 @@ from ..base.progress import Progress
 from ..runs.result import Columns
 from . import cosimulation
 from .components import CouplingError, Value, check_wire, described, start_value
-from .nodes import Flat
-from .structure import SLASH, Package
+from .nodes import SLASH, Flat, items_of
+from .structure import Package
 
 SSD = "http://ssp-standard.org/SSP1/SystemStructureDescription"
 SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
@@ -27,7 +27,7 @@ SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
 DESCRIPTION = "SystemStructure.ssd"
 EPOCH = (1980, 1, 1, 0, 0, 0)  # Date of all files: equal systems give equal bytes.
 KINDS = {"Real": "Real", "Float64": "Real", "Integer": "Integer", "Int32": "Integer",
-         "Boolean": "Boolean"}  # fmt: skip
+         "Boolean": "Boolean", "String": "String", "Enumeration": "Enumeration"}  # fmt: skip
 """Types of SSP by the types of FMI 2.0 and 3.0."""
 
 
@@ -83,6 +83,7 @@ def package(
             raise CouplingError(f"{source} is not an output: connect {to} to an output")
         _add(wires, SSD, "Connection", startElement=start, startConnector=output,
              endElement=end, endConnector=given)  # fmt: skip
+    _enumerations(root, variables)
     _add(root, SSD, "DefaultExperiment", startTime="0.0", stopTime=repr(float(stop_time)))
     contents = {DESCRIPTION: _text(root)}
     contents |= {f"resources/{name}.fmu": Path(fmu).read_bytes() for name, fmu in fmus.items()}
@@ -133,7 +134,8 @@ def _component(
     connectors = _add(component, SSD, "Connectors") if ends else component
     for x in ends:
         connector = _add(connectors, SSD, "Connector", name=x.name, kind=x.causality)
-        _add(connector, SSC, _kind(f"{name}.{x.name}", x))
+        kind = _kind(f"{name}.{x.name}", x)
+        _add(connector, SSC, kind, **_enumeration(name, x) if kind == "Enumeration" else {})
     own = {x.partition(".")[2]: value for x, value in values.items() if x.startswith(f"{name}.")}
     if not own:
         return
@@ -144,9 +146,10 @@ def _component(
     )
     for variable, value in own.items():
         full = f"{name}.{variable}"
-        kind = _kind(full, variables[_found({name: variables}, full)[1]])
+        known = variables[_found({name: variables}, full)[1]]
+        kind = _kind(full, known)
         parameter = _add(parameters, SSV, "Parameter", name=variable)
-        _add(parameter, SSV, kind, value=_number(kind, value))
+        _add(parameter, SSV, kind, value=_text_of(full, kind, value, known))
 
 
 def _kind(full: str, variable: Any) -> str:
@@ -155,10 +158,38 @@ def _kind(full: str, variable: Any) -> str:
     return KINDS[variable.type]
 
 
-def _number(kind: str, value: Value) -> str:
+def _text_of(full: str, kind: str, value: Any, variable: Any) -> str:
+    """Return a start value as text; that of an enumeration is the name of its item."""
+    if kind == "Enumeration":
+        items = items_of(variable)
+        if value not in items:
+            raise CouplingError(f"{full} = {value} must be one of {', '.join(map(str, items))}")
+        return items[value]
     if kind == "Boolean":
         return "true" if value else "false"
+    if kind == "String":
+        return str(value)
     return str(int(value)) if kind == "Integer" else repr(float(value))
+
+
+def _enumeration(name: str, variable: Any) -> dict[str, str]:
+    """Return the name of an enumeration; FMUs may have different ones of one name."""
+    return {"name": f"{name}.{variable.declaredType.name}"}
+
+
+def _enumerations(root: ET.Element, variables: Mapping[str, Mapping[str, Any]]) -> None:
+    """Add the enumerations of all inputs and outputs to the description."""
+    found = {
+        _enumeration(name, x)["name"]: items_of(x)
+        for name, some in variables.items()
+        for x in some.values()
+        if x.type == "Enumeration" and x.causality in ("input", "output")
+    }
+    parent = _add(root, SSD, "Enumerations") if found else root
+    for name, items in found.items():
+        element = _add(parent, SSC, "Enumeration", name=name)
+        for value, item in items.items():
+            _add(element, SSC, "Item", name=item, value=str(value))
 
 
 def simulate(
@@ -166,6 +197,7 @@ def simulate(
     stop_time: float | None = None,
     step: float | None = None,
     progress: Progress | None = None,
+    note: Callable[[str], None] | None = None,
 ) -> Columns:
     """Simulate a package, from the start values in the package.
 
@@ -179,6 +211,9 @@ def simulate(
         Communication step [s]; None: a thousandth of the duration.
     progress : callable or None
         Called with the completed fraction, from 0 to 1.
+    note : callable or None
+        Called with a sentence about each start value that matches no variable.  The standard
+        ignores such values.
 
     Returns
     -------
@@ -201,6 +236,9 @@ def simulate(
     with tempfile.TemporaryDirectory(prefix="prbm_ssp_") as folder:
         package = Package(path, folder)
         flat = package.flat
+        if note is not None:
+            for name in dict.fromkeys(flat.ignored):
+                note(f"the start value {name} is ignored: no variable has this name")
         stop = flat.stop_time if stop_time is None else stop_time
         if stop is None:
             raise CouplingError(f"{path}: the package has no stop time; give one")

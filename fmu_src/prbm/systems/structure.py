@@ -18,7 +18,18 @@ from lxml import etree  # type: ignore[import-untyped]
 
 from ..base.archives import DESCRIPTION_SIZE_MAX, check_unpacked_size
 from .components import CouplingError, Value, described, start_value
-from .nodes import Connector, Flat, Node, Wire, kind_of
+from .nodes import (
+    SLASH,
+    Connector,
+    Flat,
+    Node,
+    Wire,
+    check_loops,
+    deduce_units,
+    items_of,
+    kind_of,
+    place,
+)
 from .signals import BOOLEAN, ENUMERATION, INTEGER, REAL, Linear, Signal, Table, Unit, exact
 
 NAMESPACE = "http://ssp-standard.org/SSP1/SystemStructure"
@@ -34,7 +45,6 @@ TRANSFORMATIONS = {
 """Transformations by the types of their values."""
 ENTERING, PARAMETRIC = ("input", "parameter"), ("parameter", "calculatedParameter")
 """Kinds of connectors that take a value, and that are constant."""
-SLASH = "/"  # between the names of nested systems in the name of an instance
 
 
 # -- files --
@@ -174,6 +184,8 @@ class _Reader:
                 f"DefaultExperiment: startTime = {times['startTime']} s is not supported; use 0"
             )
         top = self.system(self.root.find(f"{SSD}System"), None)
+        check_loops(top)
+        deduce_units(top)
         components = list(_components(top))
         wires: dict[str, tuple[str, Signal]] = {}
         outputs: dict[str, tuple[str, Signal]] = {}
@@ -192,7 +204,7 @@ class _Reader:
                             f"{full}: connections of calculatedParameter are not supported; give "
                             "the parameter a start value"
                         )
-                    (outputs if node.fmu is None else wires)[_place(node, "", end)] = full, signal
+                    (outputs if node.fmu is None else wires)[place(node, "", end)] = full, signal
         stop = times.get("stopTime")
         return Flat(
             {x.path: x.fmu or "" for x in components}, wires, outputs, self.values(top),
@@ -218,7 +230,7 @@ class _Reader:
         for child in element.iterfind(f"{SSD}Connections/{SSD}Connection"):
             wire = _wire(node, child)
             if wire.sink in sinks:
-                raise CouplingError(f"{_place(node, *wire.sink)} has two sources; remove one")
+                raise CouplingError(f"{place(node, *wire.sink)} has two sources; remove one")
             sinks.add(wire.sink)
             node.wires.append(wire)
         return node
@@ -232,7 +244,7 @@ class _Reader:
         node = Node(name, path, parent)
         for child in element.iterfind(f"{SSD}Connectors/{SSD}Connector"):
             own = child.get("name")
-            where = f"connector {_place(node, '', own)}"
+            where = f"connector {place(node, '', own)}"
             if own in node.connectors:
                 raise CouplingError(f"{where}: two have this name; rename one")
             node.connectors[own] = self.connector(child, where)
@@ -289,13 +301,12 @@ class _Reader:
         for binding in node.bindings:
             given: dict[str, Value] = {}
             for name, parameter, options in self.parameters(node, binding):
-                where = f"start value {_place(node, '', name)}"
+                where = f"start value {place(node, '', name)}"
                 owner = _owner(node, name)
                 if owner is None:
-                    self.ignored.append(_place(node, "", name))
+                    self.ignored.append(place(node, "", name))
                     continue
                 ends = list(_ends(*owner, parameter.signal, options, where))
-                _check_deduced(where, parameter.signal, ends)
                 for component, variable, signal in ends:
                     full = f"{component.path}.{variable.name}"
                     if full in given or names.setdefault(full, name) != name:
@@ -341,7 +352,7 @@ class _Reader:
                     "that name; add a MappingEntry"
                 )
             if not mapped:
-                self.ignored.append(_place(node, "", name))
+                self.ignored.append(place(node, "", name))
             for entry in mapped:
                 yield entry.get("target"), parameter, _options(entry, f"{where}: {name}")
 
@@ -391,12 +402,6 @@ def _components(node: Node) -> Iterator[Node]:
         yield from _components(element)
 
 
-def _place(node: Node, element: str, name: str) -> str:
-    """Return the full name of a connector, for messages and results."""
-    path = SLASH.join(x for x in (node.path, element) if x)
-    return f"{path}.{name}" if path else name
-
-
 def _numeric(variable: Any) -> bool:
     return kind_of(variable) in (REAL, INTEGER, BOOLEAN, ENUMERATION) and not variable.dimensions
 
@@ -442,17 +447,31 @@ def _wire(node: Node, element: Any) -> Wire:
     for end in ends:
         owner = node if not end[0] else node.elements.get(end[0])
         if owner is None or end[1] not in owner.connectors:
-            raise CouplingError(f"connection: there is no connector {_place(node, *end)}")
+            raise CouplingError(f"connection: there is no connector {place(node, *end)}")
         kinds.append((owner.connectors[end[1]].kind, bool(end[0])))
     # Outputs of elements and inputs of the system itself are sources inside it.
     sources = [(kind in ENTERING) != inner for kind, inner in kinds]
-    names = " and ".join(_place(node, *end) for end in ends)
+    names = " and ".join(place(node, *end) for end in ends)
     if sources[0] == sources[1] or len({kind in PARAMETRIC for kind, _ in kinds}) > 1:
         raise CouplingError(
             f"connection of {names}: kinds {kinds[0][0]} and {kinds[1][0]} cannot be connected"
         )
     source, sink = ends if sources[0] else ends[::-1]
-    return Wire(source, sink, *_options(element, f"connection of {names}"))
+    wire = Wire(source, sink, *_options(element, f"connection of {names}"))
+    (kind, unit), (given, other) = (_declared(node, *end) for end in (source, sink))
+    if kind is not None:
+        options = wire.transformation, wire.suppress
+        Signal(kind, unit).at(given, other, f"connection to {place(node, *sink)}", *options)
+    return wire
+
+
+def _declared(node: Node, element: str, name: str) -> tuple[str | None, Unit | None]:
+    """Return the type and the unit of a connector of a system or of one of its elements."""
+    owner = node.elements[element] if element else node
+    if owner.fmu is not None:
+        variable = owner.variables[name]
+        return kind_of(variable), owner.unit(variable)
+    return owner.connectors[name].type, owner.connectors[name].unit
 
 
 def _options(element: Any, where: str) -> tuple[Linear | Table | None, bool]:
@@ -517,7 +536,7 @@ def _owner(node: Node, name: str) -> tuple[Node, str] | None:
         return inner
     if inner is not None:
         raise CouplingError(
-            f"{_place(node, '', name)} is a connector and a variable of {first}; rename one"
+            f"{place(node, '', name)} is a connector and a variable of {first}; rename one"
         )
     return node, name
 
@@ -541,11 +560,11 @@ def _ends(
     connector = owner.connectors[name]
     if connector.kind not in ENTERING:
         raise CouplingError(f"{where}: start values of outputs are not supported; remove it")
-    signal = signal.at(connector.type, connector.unit, where, *options)
-    for node, end_name, end in _forward(owner, ("", name), signal, ()):
+    signal = signal.at(connector.type, connector.unit, where, *options, connector.vague)
+    for node, end_name, end in _forward(owner, ("", name), signal):
         if node.fmu is None or not _inside(node, owner):
             raise CouplingError(
-                f"{where}: it reaches the output {_place(node, '', end_name)} through a connection "
+                f"{where}: it reaches the output {place(node, '', end_name)} through a connection "
                 "of two connectors of a system, which is not supported for start values"
             )
         yield node, node.variables[end_name], end
@@ -555,25 +574,19 @@ def _inside(node: Node | None, owner: Node) -> bool:
     return node is not None and (node is owner or _inside(node.parent, owner))
 
 
-def _items(variable: Any) -> dict[int, str]:
-    """Return the items of an enumeration by value."""
-    items = () if variable.declaredType is None else variable.declaredType.items
-    return {int(x.value): x.name for x in items}
-
-
 def _from(component: Node, name: str, variable: Any) -> Iterator[tuple[Node, str, Signal]]:
     """Yield where an output of a component leads: node, name and signal."""
     signal = Signal(kind_of(variable), component.unit(variable))
     full = f"{component.path}.{name}"
     if signal.kind == ENUMERATION:
-        signal = signal.after(Table(ENUMERATION, tuple(_items(variable).items()), full))
+        signal = signal.after(Table(ENUMERATION, tuple(items_of(variable).items()), full))
     assert component.parent is not None
-    for node, end, found in _forward(component.parent, (component.name, name), signal, ()):
+    for node, end, found in _forward(component.parent, (component.name, name), signal):
         if component.connectors[name].kind == "output":
             _check_numeric(full, variable)
         if node.fmu is not None:
-            _check_numeric(_place(node, "", end), node.variables[end])
-            found = _settled(found, _items(variable), _place(node, "", end))
+            _check_numeric(place(node, "", end), node.variables[end])
+            found = _settled(found, items_of(variable), place(node, "", end))
         elif signal.kind == ENUMERATION:
             raise CouplingError(
                 f"{end}: an Enumeration as output of the system is not supported; remove the "
@@ -591,29 +604,27 @@ def _settled(signal: Signal, items: Mapping[int, str], where: str) -> Signal:
 
 
 def _forward(
-    system: Node, source: tuple[str, str], signal: Signal, seen: tuple[Wire, ...]
+    system: Node, source: tuple[str, str], signal: Signal
 ) -> Iterator[tuple[Node, str, Signal]]:
     """Yield the variables of FMUs and outputs of the outermost system that a signal reaches."""
     for wire in system.wires:
         if wire.source != source:
             continue
         element, name = wire.sink
-        where = f"connection to {_place(system, *wire.sink)}"
-        if any(wire is x for x in seen):
-            raise CouplingError(f"{where}: the connections are a loop without an FMU; remove one")
+        where = f"connection to {place(system, *wire.sink)}"
         node = system.elements[element] if element else system
         options = wire.transformation, wire.suppress
         if node.fmu is not None:
             yield node, name, _last(signal, node, node.variables[name], where, options)
             continue
         connector = node.connectors[name]
-        passed = signal.at(connector.type, connector.unit, where, *options)
+        passed = signal.at(connector.type, connector.unit, where, *options, connector.vague)
         if element:
-            yield from _forward(node, ("", name), passed, (*seen, wire))
+            yield from _forward(node, ("", name), passed)
         elif system.parent is None:
             yield node, name, passed
         else:
-            yield from _forward(system.parent, (system.name, name), passed, (*seen, wire))
+            yield from _forward(system.parent, (system.name, name), passed)
 
 
 def _last(
@@ -631,16 +642,8 @@ def _last(
     signal = signal.at(kind, unit, where, *options)
     if kind != ENUMERATION:
         return signal
-    entries = tuple((name, value) for value, name in _items(variable).items())
+    entries = tuple((name, value) for value, name in items_of(variable).items())
     return signal.after(Table(ENUMERATION, entries, where))
-
-
-def _check_deduced(where: str, signal: Signal, ends: list[End]) -> None:
-    """Check that a value without a unit has the same unit in all variables that it reaches."""
-    units = {node.unit(variable) for node, variable, _ in ends}
-    if signal.kind == REAL and signal.unit is None and len(units) > 1:
-        names = sorted("1" if x is None else x.name for x in units)
-        raise CouplingError(f"{where}: its unit is one of {', '.join(names)}; write the unit")
 
 
 def _value(full: str, parameter: Parameter, signal: Signal, variable: Any) -> Value:
