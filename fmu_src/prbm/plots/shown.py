@@ -124,7 +124,7 @@ class Result(results.Result):
 
     def _repr_html_(self) -> str:
         """Return the summary and a small figure for a notebook."""
-        text = "\n".join([repr(self), *headline(self, self.mechanism, self.values)])
+        text = "\n".join([repr(self), *headline(self, self.mechanism, self.start_values)])
         return f"<pre>{html.escape(text)}</pre>{self._preview()}"
 
     def _preview(self) -> str:
