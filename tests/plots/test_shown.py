@@ -6,7 +6,6 @@ import io
 import pickle
 import re
 import sys
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -42,10 +41,7 @@ def test_the_public_function_simulates_as_the_module_does(result):
 def test_texts_of_objects_fit_on_a_line(result):
     text = repr(result)
     assert text == "<Result of PRBDM: 0.06 s in 61 rows, 46 columns, impacts: 1>"
-    shown: list[str] = []
-    result.mechanism._repr_pretty_(SimpleNamespace(text=shown.append), False)
-    assert shown == [f"<Mechanism PRBDM: {result.mechanism.title}>"]
-    for thing in (result, *result.impacts):
+    for thing in (result, result.mechanism, *result.impacts):
         assert len(repr(thing)) < 120
         assert "\n" not in repr(thing)
 
