@@ -82,6 +82,20 @@ def test_columns_are_those_of_the_data_frame(result):
     np.testing.assert_array_equal(frame.index, result["time"])
 
 
+def test_units_of_the_columns_are_those_of_the_interface(result):
+    """A force times a velocity has the unit of a power; the rate of a quantity is per second."""
+    units = result.to_pandas().attrs["units"]
+    assert [*units] == [*result]
+    assert units["time"] == "s"
+    assert units["stop.contact"] == units["stop.impact_count"] == ""
+    for name, unit in units.items():
+        rate = name.replace(".x", ".vx").replace(".gap", ".gap_rate").replace(".angle", ".omega")
+        if rate != name and rate in units:
+            assert units[rate] == f"{unit}/s"
+    assert units["stop.force"] == "N"
+    assert {unit for name, unit in units.items() if name.startswith("energy.")} == {"J"}
+
+
 def test_a_missing_pandas_is_reported_with_a_remedy(result, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(ResultError, match=r"install it with: .*prbm-impact\[notebook\]"):

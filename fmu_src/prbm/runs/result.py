@@ -13,9 +13,10 @@ from ..base.errors import PrbmError
 from ..base.names import proposal
 from ..base.reading import opening_error, shown
 from ..hybrid.records import Impact
+from ..interface.variables import variables
 from ..mechanics.arrays import Real
 from ..mechanism.description import Mechanism
-from .quantities import QUANTITIES
+from .quantities import FREQUENCY, QUANTITIES
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -115,6 +116,9 @@ class Result(Mapping[str, Columns]):
     def to_pandas(self) -> "pd.DataFrame":
         """Return the columns as a pandas DataFrame over the time.
 
+        ``attrs["units"]`` has the SI units by column, empty for integers and Booleans, and
+        ``attrs["mechanism"]`` the name of the mechanism.
+
         Raises
         ------
         ResultError
@@ -127,7 +131,22 @@ class Result(Mapping[str, Columns]):
                 "pandas is not installed; install it with: python -m pip install "
                 "'prbm-impact[notebook]'"
             ) from None
-        return pandas.DataFrame.from_records(self.columns, index="time")
+        frame = pandas.DataFrame.from_records(self.columns, index="time")
+        frame.attrs = {"mechanism": self.mechanism.name, "units": self.units()}
+        return frame
+
+    def units(self) -> dict[str, str]:
+        """Return the SI units by column, empty for integers and Booleans.
+
+        Raises
+        ------
+        MechanismError
+            If a column is no variable of the mechanism.
+        """
+        first = {name: float(x[0]) for name, x in self.items() if name != "time"}
+        first = {FREQUENCY: 0.0} | first
+        known = {v.name: v.unit for v in variables(self.mechanism, first)}
+        return {name: "s" if name == "time" else known[name] for name in self}
 
 
 def column(columns: Columns, name: str) -> Columns:
