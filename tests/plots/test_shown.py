@@ -9,6 +9,7 @@ import sys
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from PIL import Image
 
 import prbm
@@ -112,3 +113,20 @@ def test_a_result_is_restored_from_a_pickle(result):
     back = pickle.loads(pickle.dumps(result))
     assert type(back) is prbm.Result
     np.testing.assert_array_equal(back.columns, result.columns)
+
+
+def test_given_axes_have_the_same_curves_as_a_new_figure(result):
+    """One axes shows the displacement, several show the first panels; nothing else is drawn."""
+    new = result.plot().figure
+    own = Figure()
+    left, right = own.subplots(1, 2)
+    assert result.plot(ax=left).figure is own
+    assert not right.has_data()
+    result.plot(ax=[right])
+    one = Figure()
+    result.plot(ax=one.subplots(2, 1))
+    for drawn, expected in ((left, 0), (right, 0), (one.axes[0], 0), (one.axes[1], 1)):
+        for line, same in zip(drawn.lines, new.axes[expected].lines, strict=True):
+            np.testing.assert_array_equal(line.get_xydata(), same.get_xydata())
+    with pytest.raises(ResultError, match="ax has 5 axes for 4 panels"):
+        result.plot(ax=Figure().subplots(5, 1))
