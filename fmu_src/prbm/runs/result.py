@@ -129,7 +129,7 @@ class Result(Mapping[str, Columns]):
         except ModuleNotFoundError:
             raise ResultError(
                 "pandas is not installed; install it with: python -m pip install "
-                "'prbm-impact[notebook]'"
+                '"prbm-impact[notebook]"'
             ) from None
         frame = pandas.DataFrame.from_records(self.columns, index="time")
         frame.attrs = {"mechanism": self.mechanism.name, "units": self.units()}
