@@ -31,9 +31,9 @@ def run(line: str) -> int:
     return cli.main(shlex.split(line))
 
 
-def table() -> list[list[str]]:
+def table(name: str = "stress") -> list[list[str]]:
     """Return the rows of the written table."""
-    return list(csv.reader(io.StringIO(Path("out/PRBDM2R-stress.csv").read_text("utf-8"))))
+    return list(csv.reader(io.StringIO(Path(f"out/PRBDM2R-{name}.csv").read_text("utf-8"))))
 
 
 @pytest.fixture
@@ -52,7 +52,7 @@ def guide(tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_held_shapes_have_the_static_stress(guide, capsys):
     assert run(f"stress {guide} --held 10 18 mm --set gravity.x=0 --out out") == cli.OK
-    rows = table()
+    rows = table("stress-held")
     found = {(row[0], row[1]): float(row[2]) for row in rows[1:]}
     expected = {
         ("0.01", "left_flexure"): 366.7e6, ("0.01", "right_flexure"): 331.8e6,
@@ -166,3 +166,11 @@ def test_a_shock_with_rigid_impacts_has_the_caveat(guide, options, capsys):
     for place, caveat in (("1mm", True), ("70mm", False)):
         assert run(f"{base} {position}={place}") == cli.OK
         assert ("not reliable" in capsys.readouterr().out) == caveat
+
+
+def test_tables_of_held_shapes_and_of_motion_do_not_replace_each_other(guide):
+    assert run(f"stress {guide} --stop-time 10ms --out out") == cli.OK
+    moving = table()
+    assert run(f"stress {guide} --held 10mm --out out") == cli.OK
+    assert table() == moving
+    assert table("stress-held") != moving

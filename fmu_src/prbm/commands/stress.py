@@ -67,7 +67,7 @@ def _held(options: argparse.Namespace, mechanism: Mechanism) -> None:
     print(aligned(head, rows))
     output = Output(options.out)
     output.table(
-        f"{mechanism.name}-stress.csv",
+        f"{mechanism.name}-stress-held.csv",
         [
             f"{unit.amount} [{unit.si}]", "flexure", "start [Pa]", "end [Pa]", "largest [Pa]",
             "position [m]",
@@ -79,7 +79,7 @@ def _held(options: argparse.Namespace, mechanism: Mechanism) -> None:
 
         labels = [f"held at {unit.factor * x:.4g} {unit.shown}" for x in held]
         output.figure(
-            f"{mechanism.name}-stress.png",
+            f"{mechanism.name}-stress-held.png",
             lambda: stress_figure(mechanism, values, held, labels),
         )
     output.write()
