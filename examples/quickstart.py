@@ -13,8 +13,7 @@ from pathlib import Path
 import fmpy
 import numpy as np
 
-from prbm import load
-from prbm.base.errors import PrbmError
+from prbm import PrbmError, load
 from prbm.fmu.python_fmu import build
 from prbm.fmu.unpack import unpacked
 from prbm.plots.animation import animate

@@ -23,8 +23,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from pythonfmu import FmuBuilder
 
-from prbm import load
-from prbm.base.errors import PrbmError
+from prbm import PrbmError, load
 from prbm.base.progress import Progress, reporter
 from prbm.fmu.native_fmu import build
 from prbm.references.scalar_guide import Monolith, ScalarGuide

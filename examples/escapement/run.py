@@ -29,8 +29,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from parts import both, oscillator, wheel
 
+from prbm import PrbmError
 from prbm import simulate as simulate_one
-from prbm.base.errors import PrbmError
 from prbm.base.progress import Progress, reporter
 from prbm.fmu.native_fmu import build
 from prbm.hybrid.records import Impact

@@ -21,8 +21,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from pythonfmu import FmuBuilder
 
-from prbm import load
-from prbm.base.errors import PrbmError
+from prbm import PrbmError, load
 from prbm.base.progress import reporter
 from prbm.fmu.native_fmu import build
 from prbm.systems import model_exchange

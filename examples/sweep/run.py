@@ -21,8 +21,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from scipy import stats
 
-from prbm import load
-from prbm.base.errors import PrbmError
+from prbm import PrbmError, load
 from prbm.base.progress import reporter
 from prbm.fmu.native_fmu import build
 from prbm.sweeps.sweep import samples, sweep

@@ -14,21 +14,52 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .base.errors import EquilibriumError as EquilibriumError
+    from .base.errors import MechanismError as MechanismError
+    from .base.errors import ParameterError as ParameterError
+    from .base.errors import PrbmError as PrbmError
+    from .base.errors import SimulationError as SimulationError
     from .base.version import __version__ as __version__
     from .files.mechanism_file import load as load
     from .mechanism.description import Mechanism
     from .plots.shown import Result, simulate
     from .runs.engine import simulation as Simulation
+    from .runs.result import ResultError as ResultError
+    from .runs.result import UnknownColumnError as UnknownColumnError
+    from .sweeps.study import study as study
 
-__all__ = ["Mechanism", "Result", "Simulation", "__version__", "load", "simulate"]
+__all__ = [
+    "EquilibriumError",
+    "Mechanism",
+    "MechanismError",
+    "ParameterError",
+    "PrbmError",
+    "Result",
+    "ResultError",
+    "Simulation",
+    "SimulationError",
+    "UnknownColumnError",
+    "__version__",
+    "load",
+    "simulate",
+    "study",
+]
 
 _MODULES = {
+    "EquilibriumError": ("base.errors", "EquilibriumError"),
     "Mechanism": ("mechanism.description", "Mechanism"),
+    "MechanismError": ("base.errors", "MechanismError"),
+    "ParameterError": ("base.errors", "ParameterError"),
+    "PrbmError": ("base.errors", "PrbmError"),
     "Result": ("plots.shown", "Result"),
+    "ResultError": ("runs.result", "ResultError"),
     "Simulation": ("runs.engine", "simulation"),
+    "SimulationError": ("base.errors", "SimulationError"),
+    "UnknownColumnError": ("runs.result", "UnknownColumnError"),
     "__version__": ("base.version", "__version__"),
     "load": ("files.mechanism_file", "load"),
     "simulate": ("plots.shown", "simulate"),
+    "study": ("sweeps.study", "study"),
 }
 
 

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import math
 import shlex
 import sys
 from pathlib import Path
@@ -11,6 +12,7 @@ import pytest
 import prbm
 from prbm.commands import command_line as cli
 from prbm.files.mechanism_file import shipped
+from prbm.runs.struck import first_rigid_impact, peak_before
 
 MATERIAL = """
 [[materials]]
@@ -29,9 +31,9 @@ def run(line: str) -> int:
     return cli.main(shlex.split(line))
 
 
-def table() -> list[list[str]]:
+def table(name: str = "stress") -> list[list[str]]:
     """Return the rows of the written table."""
-    return list(csv.reader(io.StringIO(Path("out/PRBDM2R-stress.csv").read_text("utf-8"))))
+    return list(csv.reader(io.StringIO(Path(f"out/PRBDM2R-{name}.csv").read_text("utf-8"))))
 
 
 @pytest.fixture
@@ -50,7 +52,7 @@ def guide(tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_held_shapes_have_the_static_stress(guide, capsys):
     assert run(f"stress {guide} --held 10 18 mm --set gravity.x=0 --out out") == cli.OK
-    rows = table()
+    rows = table("stress-held")
     found = {(row[0], row[1]): float(row[2]) for row in rows[1:]}
     expected = {
         ("0.01", "left_flexure"): 366.7e6, ("0.01", "right_flexure"): 331.8e6,
@@ -110,3 +112,65 @@ def test_the_summary_of_a_simulation_has_the_safety_factor(guide, capsys):
     peak = prbm.simulate(prbm.load(guide), stop_time=0.02)["right_flexure.peak_stress"][-1]
     assert f"stress in right_flexure {1e-6 * peak:.4g} MPa" in printed
     assert f"safety factor {1e9 / peak:.3g} (yield)" in printed
+
+
+# The stress after the impact is larger than at the release.
+STRUCK = "--set release.displacement=0 --set gravity.x=0 --set release.velocity=2"
+CHANGES = {"release.displacement": 0.0, "gravity.x": 0.0, "release.velocity": 2.0}
+
+
+def test_the_stress_before_a_rigid_impact_is_the_peak_of_a_run_that_ends_there(guide):
+    mechanism = prbm.load(guide)
+    whole = prbm.simulate(mechanism, CHANGES | {"stop.position": 2e-3}, stop_time=0.01)
+    hit = first_rigid_impact(whole.columns, mechanism)
+    assert hit == whole.impacts[0].time
+    until = prbm.simulate(
+        mechanism, CHANGES | {"stop.position": 2e-3}, stop_time=0.99999 * hit, step=hit / 50
+    )
+    assert math.isinf(first_rigid_impact(until.columns, mechanism))
+    before = peak_before(whole.columns, "left_flexure", hit)
+    assert before <= until["left_flexure.peak_stress"][-1]
+    fine = prbm.simulate(
+        mechanism, CHANGES | {"stop.position": 2e-3}, stop_time=0.01, step=hit / 200.3
+    )
+    before = peak_before(fine.columns, "left_flexure", hit)
+    assert before == pytest.approx(until["left_flexure.peak_stress"][-1], rel=0.02)
+    assert before < fine["left_flexure.peak_stress"][-1]
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("simulate {}", ["before the first impact", "not reliable, safety", "factor of 5"]),
+        ("stress {}", ["before the first impact", "factor of 5"]),
+    ],
+)
+def test_a_safety_factor_after_a_rigid_impact_has_a_caveat_and_the_one_before(
+    guide, command, words, capsys
+):
+    base = f"{command.format(guide)} {STRUCK} --stop-time 10ms"
+    assert run(f"{base} --set stop.position=2mm") == cli.OK
+    struck = capsys.readouterr().out
+    assert all(word in struck for word in words)
+    assert run(f"{base} --set stop.position=70mm") == cli.OK
+    free = capsys.readouterr().out
+    assert not any(word in free for word in words)
+    assert "stress" in free
+
+
+@pytest.mark.parametrize("options", ["--peak", "--peaks"])
+def test_a_shock_with_rigid_impacts_has_the_caveat(guide, options, capsys):
+    """The free guide moves by less than 10 mm."""
+    base = f'shock {guide} {options} "20 g" --duration 2ms --stop-time 200ms'
+    position = "--set gravity.x=0 --set stop.position"
+    for place, caveat in (("1mm", True), ("70mm", False)):
+        assert run(f"{base} {position}={place}") == cli.OK
+        assert ("not reliable" in capsys.readouterr().out) == caveat
+
+
+def test_tables_of_held_shapes_and_of_motion_do_not_replace_each_other(guide):
+    assert run(f"stress {guide} --stop-time 10ms --out out") == cli.OK
+    moving = table()
+    assert run(f"stress {guide} --held 10mm --out out") == cli.OK
+    assert table() == moving
+    assert table("stress-held") != moving

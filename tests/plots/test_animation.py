@@ -63,12 +63,12 @@ def scene_of(result: Result, **settings: float) -> Scene:
 
 def test_links_are_drawn_at_their_recorded_angles_with_their_lengths(result: Result) -> None:
     scene = scene_of(result, slow=40.0, fps=25.0)  # A frame at every communication point.
-    h = result.values["flexure.length"] / 2
-    if "flexure.gamma" in result.values:
-        gamma = result.values["flexure.gamma"]
+    h = result.start_values["flexure.length"] / 2
+    if "flexure.gamma" in result.start_values:
+        gamma = result.start_values["flexure.gamma"]
         lengths = h * np.array([1 - gamma, 2 * gamma, 1 - gamma])
     else:
-        g1, g2 = result.values["flexure.gamma1"], result.values["flexure.gamma2"]
+        g1, g2 = result.start_values["flexure.gamma1"], result.start_values["flexure.gamma2"]
         lengths = h * np.array([1 - g1 - g2, g1, 2 * g2, g1, 1 - g1 - g2])
     per_flexure = len(lengths) - 2
     for k in (0, 17, 60, 120):
@@ -86,8 +86,8 @@ def test_links_are_drawn_at_their_recorded_angles_with_their_lengths(result: Res
 
 def test_bodies_are_drawn_at_their_recorded_positions(result: Result) -> None:
     scene = scene_of(result, slow=40.0, fps=25.0)
-    width, length = result.values["shuttle.width"], result.values["flexure.length"]
-    centre = complex(width / 2, length + result.values["shuttle.com_height"])
+    width, length = result.start_values["shuttle.width"], result.start_values["flexure.length"]
+    centre = complex(width / 2, length + result.start_values["shuttle.com_height"])
     for k in (0, 30, 95):
         scene.frame(k)
         row = result.columns[k]

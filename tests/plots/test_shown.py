@@ -6,10 +6,10 @@ import io
 import pickle
 import re
 import sys
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from PIL import Image
 
 import prbm
@@ -33,7 +33,7 @@ def picture(content: bytes) -> Image.Image:
 def test_the_public_function_simulates_as_the_module_does(result):
     bare = run.simulate(result.mechanism, {"stop.position": -1e-3}, stop_time=0.06)
     np.testing.assert_array_equal(result.columns, bare.columns)
-    assert result.values == bare.values
+    assert result.start_values == bare.start_values
     assert type(result) is prbm.Result
     assert isinstance(result, BareResult)
     assert inspect.signature(prbm.simulate) == inspect.signature(run.simulate)
@@ -42,10 +42,7 @@ def test_the_public_function_simulates_as_the_module_does(result):
 def test_texts_of_objects_fit_on_a_line(result):
     text = repr(result)
     assert text == "<Result of PRBDM: 0.06 s in 61 rows, 46 columns, impacts: 1>"
-    shown: list[str] = []
-    result.mechanism._repr_pretty_(SimpleNamespace(text=shown.append), False)
-    assert shown == [f"<Mechanism PRBDM: {result.mechanism.title}>"]
-    for thing in (result, *result.impacts):
+    for thing in (result, result.mechanism, *result.impacts):
         assert len(repr(thing)) < 120
         assert "\n" not in repr(thing)
 
@@ -86,6 +83,20 @@ def test_columns_are_those_of_the_data_frame(result):
     np.testing.assert_array_equal(frame.index, result["time"])
 
 
+def test_units_of_the_columns_are_those_of_the_interface(result):
+    """A force times a velocity has the unit of a power; the rate of a quantity is per second."""
+    units = result.to_pandas().attrs["units"]
+    assert [*units] == [*result]
+    assert units["time"] == "s"
+    assert units["stop.contact"] == units["stop.impact_count"] == ""
+    for name, unit in units.items():
+        rate = name.replace(".x", ".vx").replace(".gap", ".gap_rate").replace(".angle", ".omega")
+        if rate != name and rate in units:
+            assert units[rate] == f"{unit}/s"
+    assert units["stop.force"] == "N"
+    assert {unit for name, unit in units.items() if name.startswith("energy.")} == {"J"}
+
+
 def test_a_missing_pandas_is_reported_with_a_remedy(result, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(ResultError, match=r"install it with: .*prbm-impact\[notebook\]"):
@@ -102,3 +113,20 @@ def test_a_result_is_restored_from_a_pickle(result):
     back = pickle.loads(pickle.dumps(result))
     assert type(back) is prbm.Result
     np.testing.assert_array_equal(back.columns, result.columns)
+
+
+def test_given_axes_have_the_same_curves_as_a_new_figure(result):
+    """One axes shows the displacement, several show the first panels; nothing else is drawn."""
+    new = result.plot().figure
+    own = Figure()
+    left, right = own.subplots(1, 2)
+    assert result.plot(ax=left).figure is own
+    assert not right.has_data()
+    result.plot(ax=[right])
+    one = Figure()
+    result.plot(ax=one.subplots(2, 1))
+    for drawn, expected in ((left, 0), (right, 0), (one.axes[0], 0), (one.axes[1], 1)):
+        for line, same in zip(drawn.lines, new.axes[expected].lines, strict=True):
+            np.testing.assert_array_equal(line.get_xydata(), same.get_xydata())
+    with pytest.raises(ResultError, match="ax has 5 axes for 4 panels"):
+        result.plot(ax=Figure().subplots(5, 1))

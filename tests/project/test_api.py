@@ -10,7 +10,22 @@ import pytest
 import prbm
 
 ROOT = Path(__file__).parents[2]
-PUBLIC = ["Mechanism", "Result", "Simulation", "__version__", "load", "simulate"]
+PUBLIC = [
+    "EquilibriumError",
+    "Mechanism",
+    "MechanismError",
+    "ParameterError",
+    "PrbmError",
+    "Result",
+    "ResultError",
+    "Simulation",
+    "SimulationError",
+    "UnknownColumnError",
+    "__version__",
+    "load",
+    "simulate",
+    "study",
+]
 THIRD_PARTY = ("numpy", "scipy", "matplotlib", "pydantic", "pint", "fmpy")
 
 
@@ -88,3 +103,19 @@ def test_load_rejects_a_folder(tmp_path):
 
 def test_only_public_names_are_listed():
     assert {name for name in dir(prbm) if not name.startswith("__")} == {*PUBLIC} - {"__version__"}
+
+
+def test_every_error_of_the_package_is_a_public_error():
+    """A caller of the public functions can catch each kind by a public name."""
+    from prbm.base import errors
+
+    named = {x for x in vars(errors).values() if isinstance(x, type) and issubclass(x, Exception)}
+    assert named == {getattr(prbm, x.__name__) for x in named}
+    assert issubclass(prbm.ResultError, prbm.PrbmError)
+    with pytest.raises(prbm.UnknownColumnError):
+        prbm.simulate(prbm.load("PRBDM"), stop_time=1e-3)["shuttel.x"]
+
+
+def test_the_types_of_the_package_are_those_of_its_annotations():
+    """PEP 561: type checkers ignore the annotations of an installed package without this file."""
+    assert (Path(prbm.__file__).parent / "py.typed").is_file()

@@ -1,5 +1,7 @@
 """Contents of the wheel and the sdist."""
 
+import re
+import shlex
 import subprocess
 import sys
 import tarfile
@@ -8,6 +10,8 @@ import zipfile
 from pathlib import Path
 
 import pytest
+
+from prbm.commands.missing import missing_package
 
 ROOT = Path(__file__).parents[2]
 SOURCE = ROOT / "fmu_src"
@@ -56,3 +60,18 @@ def test_an_sdist_has_one_import_package_with_all_its_files(dist):
 @pytest.mark.parametrize("kind", [".c", ".h", ".toml", ".txt", ".py"])
 def test_c_sources_data_and_licences_are_files_of_the_package(kind):
     assert [name for name in source_files() if name.endswith(kind)]
+
+
+def test_extras_are_quoted_for_all_shells_wherever_they_are_to_be_installed():
+    """Brackets are patterns in zsh; cmd.exe knows double quotes only."""
+    texts = [*(ROOT / "fmu_src").rglob("*.py"), *(ROOT / "docs").glob("*.md"), ROOT / "README.md"]
+    found = [
+        (path.name, command[0])
+        for path in texts
+        for command in re.finditer(r"install [^\n`]{0,12}(.)prbm-impact\[", path.read_text("utf-8"))
+        if command[1] != '"'
+    ]
+    assert found == []
+    command = missing_package(ModuleNotFoundError(name="rainflow")).partition(": ")[2]
+    assert shlex.split(command)[-1] == "prbm-impact[fatigue]"
+    assert '"prbm-impact[fatigue]"' in command

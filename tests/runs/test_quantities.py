@@ -111,7 +111,7 @@ def test_quantities_of_a_simulation_agree_with_its_impacts(mechanisms):
 def test_the_headline_states_whether_the_motion_has_settled(mechanisms, stop_time, words):
     result = simulate(mechanisms["PRBDM"], stop_time=stop_time)
     (line,) = (
-        line for line in headline(result.columns, result.mechanism, result.values)
+        line for line in headline(result.columns, result.mechanism, result.start_values)
         if line.startswith("settled")
     )  # fmt: skip
     assert re.search(words, line)

@@ -55,12 +55,12 @@ def test_the_summary_of_a_rest_has_the_place_of_the_released_point():
     result = simulate(FINGER, pressed, stop_time=0.05, step=5e-4)
     millimetres = 1e3 * float(probed(result.columns, "x", "y")[-1])
     place = f"finger {millimetres:.2f} mm from straight along 30 degrees at the released point"
-    assert sum(place in line for line in headline(result, FINGER, result.values)) == 1
+    assert sum(place in line for line in headline(result, FINGER, result.start_values)) == 1
 
 
 def test_a_fitted_displacement_is_that_of_the_released_point(result):
     series = Series(result["time"], np.zeros(len(result["time"])), "m")
-    model = Response(series, DISPLACEMENT, None, 1e-8).model(FINGER, result.values)
+    model = Response(series, DISPLACEMENT, None, 1e-8).model(FINGER, result.start_values)
     assert model == pytest.approx(probed(result.columns, "x", "y"), rel=1e-6, abs=1e-9)
 
 

@@ -2,6 +2,7 @@
 
 import io
 import time
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,7 +22,7 @@ from prbm.hybrid.simulation import Simulation
 from prbm.mechanism.description import Mechanism
 from prbm.plots.figures import response
 from prbm.runs.headline import headline
-from prbm.runs.result import Result, ResultError, read_csv, rest_time
+from prbm.runs.result import Result, ResultError, UnknownColumnError, read_csv, rest_time
 from prbm.runs.run import simulate
 
 
@@ -77,9 +78,9 @@ def test_values_are_those_at_the_start(mechanisms: dict[str, Mechanism]) -> None
         stop_time=0.002,
         source=lambda t: {},
     )
-    assert driven.values["stop.offset"] == 1e-3
-    assert driven.values["force.y"] == 0.1
-    assert driven.values["stop.restitution"] == 0.6
+    assert driven.start_values["stop.offset"] == 1e-3
+    assert driven.start_values["force.y"] == 0.1
+    assert driven.start_values["stop.restitution"] == 0.6
 
 
 def test_progress_ends_at_one(mechanisms: dict[str, Mechanism]) -> None:
@@ -134,12 +135,36 @@ def test_texts_with_units_equal_numbers_in_si(mechanisms: dict[str, Mechanism]) 
     texts = simulate(guide, {"release.displacement": "-10 mm"}, stop_time="20 ms", step="2 ms")
     numbers = simulate(guide, {"release.displacement": -0.01}, stop_time=0.02, step=0.002)
     np.testing.assert_array_equal(texts.columns, numbers.columns)
-    assert texts.values == numbers.values
+    assert texts.start_values == numbers.start_values
 
 
-def test_a_missing_column_is_named(result: Result) -> None:
-    with pytest.raises(ResultError, match=r"no column 'stop\.gapp'"):
+def test_a_missing_column_is_an_error_of_its_own_with_a_proposal(result: Result) -> None:
+    with pytest.raises(
+        UnknownColumnError, match=r"^the result has no column 'stop\.gapp'; did"
+    ) as e:
         result["stop.gapp"]
+    assert "did you mean stop.gap or" in str(e.value)
+    assert isinstance(e.value, KeyError)
+    with pytest.raises(
+        ResultError, match=r"^stop.restitution has .* result.start_values\['stop\.re"
+    ):
+        result["stop.restitution"]
+
+
+def test_a_result_is_a_mapping_from_names_to_columns(result: Result) -> None:
+    assert isinstance(result, Mapping)
+    assert tuple(result) == tuple(result.keys()) == result.columns.dtype.names
+    assert len(result) == len(result.columns.dtype)
+    assert "stop.gap" in result
+    assert "stop.gapp" not in result
+    assert 0 not in result
+    assert result.get("stop.gapp") is None
+    copy = dict(result)
+    for (name, x), y in zip(copy.items(), result.values(), strict=True):
+        np.testing.assert_array_equal(x, result.columns[name])
+        np.testing.assert_array_equal(y, result.columns[name])
+    assert result == result
+    assert result != replace(result)
 
 
 def test_rest_time_is_the_first_row_of_the_last_hold(result: Result) -> None:
@@ -280,11 +305,11 @@ def test_a_result_without_motion_is_reported_and_not_plotted(
     (axes,) = response(still).axes
     assert not axes.lines
     assert [text.get_text() for text in axes.texts] == ["nothing moves in 0.05 s"]
-    lines = headline(still.columns, still.mechanism, still.values)
+    lines = headline(still.columns, still.mechanism, still.start_values)
     assert any("nothing moves" in line for line in lines)
     assert "impacts at stop      0, the smallest gap was 5.00 mm" in lines
     moving = simulate(mechanisms["PRBDM2R"], at_rest | {"force.x": 1e-6}, stop_time=0.05)
-    lines = headline(moving.columns, moving.mechanism, moving.values)
+    lines = headline(moving.columns, moving.mechanism, moving.start_values)
     assert not any("nothing moves" in line for line in lines)
 
 

@@ -153,6 +153,24 @@ def test_peaks_of_short_contacts_do_not_depend_on_the_samples():
     assert result.quantity("peak_force") == found.outputs["peak_force"][0]
 
 
+@pytest.mark.parametrize("law", ["rigid", "compliant"])
+def test_extremes_of_a_stop_see_all_impacts_between_two_samples(mechanisms, law):
+    """Several impacts pass between samples of 20 ms; samples of 2 us resolve the gap."""
+    mass, span = (point_mass(young=1e10), 0.1) if law == "compliant" else (mechanisms["PRBDM"], 0.2)
+    fine = simulate(mass, stop_time=span, step=2e-6 if law == "compliant" else 1e-3)
+    names = ["max(stop.approach_speed)", "min(stop.gap)", "max(stop.impulse)"]
+    found = study(
+        mass, {"stop.friction": [0.0, 1e-9]}, names, stop_time=span, step=span / 2, workers=1
+    )  # fmt: skip
+    hits = [impact.latched for impact in fine.impacts]
+    assert len(hits) >= 2
+    speed, gap, impulse = (found.outputs[name][0] for name in names)
+    assert speed == pytest.approx(max(hit.approach_speed for hit in hits), rel=1e-5)
+    assert impulse == pytest.approx(max(hit.impulse for hit in hits), rel=1e-4)
+    deepest = fine["stop.gap"].min() if law == "compliant" else 0.0
+    assert gap == pytest.approx(deepest, rel=5e-3, abs=1e-12)
+
+
 @pytest.mark.parametrize(
     ("output", "words"),
     [

@@ -20,13 +20,13 @@ def missing_package(error: ModuleNotFoundError) -> str:
     Examples
     --------
     >>> print(missing_package(ModuleNotFoundError(name="scipy")))
-    the Python package scipy is missing; install it with 'python -m pip install prbm-impact'
+    the Python package scipy is missing; install it with: python -m pip install "prbm-impact"
     >>> print(missing_package(ModuleNotFoundError(name="fmpy.model_description")))
-    the Python package fmpy is missing; install it with 'python -m pip install prbm-impact[fmpy]'
+    the Python package fmpy is missing; install it with: python -m pip install "prbm-impact[fmpy]"
     """
     module = (error.name or str(error)).partition(".")[0]
     extra = f"[{EXTRAS[module]}]" if module in EXTRAS else ""
     return (
-        f"the Python package {module} is missing; install it with "
-        f"'python -m pip install prbm-impact{extra}'"
+        f"the Python package {module} is missing; install it with: "
+        f'python -m pip install "prbm-impact{extra}"'
     )

@@ -13,8 +13,9 @@ from ..mechanics.assembly import assemble
 from ..mechanism.description import Mechanism
 from ..runs.headline import contact_line, instant, length
 from ..runs.released import released_label
+from ..runs.struck import UNRELIABLE, first_rigid_impact
 from .output import Output, aligned
-from .stress import no_damage
+from .stress import no_damage, struck
 
 FIRST_PEAK = 100 * GRAVITY  # First peak of a search for the level of failure [m/s^2].
 
@@ -104,12 +105,16 @@ def _print(found: Shock, mechanism: Mechanism, about: str) -> None:
         print(f"impacts at {hits.stop:9} {hits.count}{how}")
         if hits.force and hits.indentation is not None and hits.duration is not None:
             print(contact_line(hits.stop, hits.force, hits.indentation, hits.duration))
+    hit = first_rigid_impact(found.result.columns, mechanism)
+    for line in struck(found.result, found.loadings, hit):
+        print(line)
     for one in found.loadings:
         safety = "" if one.safety is None else f", safety factor {one.safety:.3g} (yield)"
         damage = "" if one.damage is None else f", damage {one.damage:.3g}"
+        doubtful = ", not reliable" if one.time > hit else ""
         print(
             f"stress in {one.flexure:10} {1e-6 * one.peak:.4g} MPa at t = "
-            f"{instant(one.time, end, 5)}{safety}{damage}"
+            f"{instant(one.time, end, 5)}{doubtful}{safety}{damage}"
         )
     for line in no_damage(mechanism):
         print(line)
@@ -156,6 +161,8 @@ def _sweep(
         print("yield                at none of these peaks, or below the first")
     else:
         print(f"yield                from a peak of {level / GRAVITY:.4g} g on")
+    if any(first_rigid_impact(x.result.columns, mechanism) < math.inf for x in found.shocks):
+        print(UNRELIABLE)
     output.table(
         f"{mechanism.name}-fragility.csv",
         ["peak [m/s2]", "displacement", "hits", *force, "stress [Pa]", "safety factor [-]"],

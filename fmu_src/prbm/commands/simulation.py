@@ -54,7 +54,7 @@ def run_simulation(options: argparse.Namespace) -> None:
         progress=reporter(), engine=options.engine,
     )  # fmt: skip
     print(f"simulated            {stop_time:g} s in {time.perf_counter() - begin:.2f} s")
-    for line in headline(result, mechanism, result.values):
+    for line in headline(result, mechanism, result.start_values):
         print(line)
     columns = names(result.columns)
     output.table(f"{mechanism.name}.csv", columns, (list(row) for row in result.columns.tolist()))

@@ -1,6 +1,8 @@
 """``prbm stress``: the stress of flexures at rest, held and in motion, and their fatigue."""
 
 import argparse
+import math
+from collections.abc import Sequence
 
 from ..analysis.strength import Loading, counts_cycles, loadings
 from ..analysis.stress_field import StressRecorder
@@ -12,8 +14,10 @@ from ..mechanics.statics import equilibrium
 from ..mechanics.stress import Stress, static_stresses, with_stress
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import FlexureType
-from ..runs.headline import instant, length
+from ..runs.headline import instant, length, stress_text
+from ..runs.result import Result
 from ..runs.run import communication_points, simulate
+from ..runs.struck import UNRELIABLE, first_rigid_impact, peak_before
 from .duration import given_inputs, span
 from .missing import missing_package
 from .output import Output, aligned
@@ -63,7 +67,7 @@ def _held(options: argparse.Namespace, mechanism: Mechanism) -> None:
     print(aligned(head, rows))
     output = Output(options.out)
     output.table(
-        f"{mechanism.name}-stress.csv",
+        f"{mechanism.name}-stress-held.csv",
         [
             f"{unit.amount} [{unit.si}]", "flexure", "start [Pa]", "end [Pa]", "largest [Pa]",
             "position [m]",
@@ -75,7 +79,7 @@ def _held(options: argparse.Namespace, mechanism: Mechanism) -> None:
 
         labels = [f"held at {unit.factor * x:.4g} {unit.shown}" for x in held]
         output.figure(
-            f"{mechanism.name}-stress.png",
+            f"{mechanism.name}-stress-held.png",
             lambda: stress_figure(mechanism, values, held, labels),
         )
     output.write()
@@ -99,7 +103,8 @@ def _moving(options: argparse.Namespace, mechanism: Mechanism) -> None:
     size = assemble(mechanism, mechanism.values()).length
     print(f"{mechanism.name}: largest stress in {stop_time:g} s")
     print(aligned(HEAD, [_row(one, stop_time, size) for one in found]))
-    for line in [*_missing(mechanism), *no_damage(mechanism)]:
+    hit = first_rigid_impact(result.columns, mechanism)
+    for line in [*struck(result, found, hit), *_missing(mechanism), *no_damage(mechanism)]:
         print(line)
     output.table(
         f"{mechanism.name}-stress.csv",
@@ -107,6 +112,21 @@ def _moving(options: argparse.Namespace, mechanism: Mechanism) -> None:
         [[x.flexure, x.peak, x.time, x.position, x.safety, x.damage] for x in found],
     )
     output.write()
+
+
+def struck(result: Result, found: Sequence[Loading], hit: float) -> list[str]:
+    """Return the stress before the first rigid impact, and a caveat about the one after it."""
+    if math.isinf(hit):
+        return []
+    kinds = {f.name: result.mechanism.type_of(f) for f in result.mechanism.flexures}
+    lines = [
+        stress_text(
+            one.flexure, peak_before(result.columns, one.flexure, hit),
+            kinds[one.flexure].yield_strength,
+        ) + ", before the first impact"
+        for one in found if one.time > hit
+    ]  # fmt: skip
+    return [*lines, UNRELIABLE]
 
 
 def _row(one: Loading, stop_time: float, size: float) -> list[str]:

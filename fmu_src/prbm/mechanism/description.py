@@ -15,7 +15,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from keyword import iskeyword
-from typing import Any
 
 from ..base.errors import MechanismError, ParameterError
 from ..base.names import proposal, unknown
@@ -75,7 +74,7 @@ DIMENSIONS = {
 RESERVED = (GROUND, "base", "damping", "energy", "gravity", "link", "mode", "release", "solver")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Mechanism:
     """Description of a mechanism: parts, parameters and their defaults.
 
@@ -126,9 +125,8 @@ class Mechanism:
     description: str = ""
     drawing: str = ""
 
-    def _repr_pretty_(self, printer: Any, cycle: bool) -> None:
-        """Show one line in notebooks, instead of the complete description."""
-        printer.text(f"<Mechanism {self.name}: {self.title}>")
+    def __repr__(self) -> str:
+        return f"<Mechanism {self.name}: {self.title}>"
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[A-Za-z_]\w*", self.name, re.ASCII) or iskeyword(self.name):

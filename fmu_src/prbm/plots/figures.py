@@ -1,6 +1,6 @@
 """Figures of results for reports, without a window and independent of any matplotlibrc."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -113,7 +113,12 @@ class _Plot:
 
 
 @own_style()
-def response(result: Result | Columns, mechanism: Mechanism | None = None) -> Figure:
+def response(
+    result: Result | Columns,
+    mechanism: Mechanism | None = None,
+    *,
+    ax: Axes | Sequence[Axes] | None = None,
+) -> Figure:
     """Plot a result over time: motion, speeds of the impacts, energies.
 
     Parameters
@@ -122,20 +127,23 @@ def response(result: Result | Columns, mechanism: Mechanism | None = None) -> Fi
         Result of :func:`prbm.runs.run.simulate`, or of FMPy.
     mechanism : Mechanism or None
         The mechanism; not needed for a :class:`~prbm.runs.result.Result`.
+    ax : Axes, sequence of Axes, or None
+        Axes of an own figure for the first panels, one each; None: a new figure with all panels.
 
     Returns
     -------
     Figure
-        One panel for each recorded quantity: displacement and velocity of the released point along
-        the direction of its release, or rotation and rate of its body for a release by an angle;
-        closing and opening speeds of the impacts, energies.  The sum of the energies less the work
-        is constant.  Times at which a stop holds are shaded.  The time axis ends shortly after the
-        motion has settled.  If no body moves, the figure says so.
+        The figure of the axes.  One panel for each recorded quantity: displacement and velocity of
+        the released point along the direction of its release, or rotation and rate of its body for
+        a release by an angle; closing and opening speeds of the impacts, energies.  The sum of the
+        energies less the work is constant.  Times at which a stop holds are shaded.  The time axis
+        ends shortly after the motion has settled.  If no body moves, the figure says so.
 
     Raises
     ------
     ResultError
-        If the mechanism is not given, or none of these quantities was recorded.
+        If the mechanism is not given, none of these quantities was recorded, or there are more axes
+        than panels.
     """
     if isinstance(result, Result):
         mechanism = result.mechanism
@@ -144,14 +152,62 @@ def response(result: Result | Columns, mechanism: Mechanism | None = None) -> Fi
             "the result has no mechanism; give the mechanism: response(result, mechanism)"
         )
     plot = _Plot(result, mechanism)
+    given = None if ax is None else [ax] if isinstance(ax, Axes) else [*ax]
     if not moves(plot.columns, mechanism, plot.size):
-        return _motionless(plot)
-    body = mechanism.release.body
+        return _motionless(plot, given)
+    drawn = _panels(plot)
+    if given is None:
+        figure = Figure((WIDTH, 0.7 + PANEL_HEIGHT * len(drawn)), dpi=120, layout="constrained")
+        every = [*np.atleast_1d(figure.subplots(len(drawn), 1, sharex=True))]
+    else:
+        if not 0 < len(given) <= len(drawn):
+            raise ResultError(f"ax has {len(given)} axes for {len(drawn)} panels: give 1 or more")
+        every = given
+    for axes, panel in zip(every, drawn, strict=False):
+        earlier = [*axes.get_ylim(), *axes.get_xlim()] if axes.has_data() else None
+        _shade_rest(axes, plot)
+        panel(axes, plot)
+        plain(axes)
+        axes.set_xlim(plot.time[0], plot.factor * plot.end)
+        if given is not None:
+            _share(axes, earlier)
+    every[-1].set_xlabel(f"time [{plot.unit}]")
+    if given is not None:
+        return _figure_of(every[0])
+    above = 20.0 if drawn[0] is _energies else None  # Room for the legend [points].
+    every[0].set_title(mechanism.title, fontsize=11, loc="left", pad=above)
+    figure.align_ylabels(every)
+    return figure
+
+
+def _share(axes: Axes, earlier: list[float] | None) -> None:
+    """Show what was drawn before, too, and list each label once, in a column."""
+    if earlier is not None:
+        bottom, top, left, right = earlier
+        low, high = axes.get_ylim()
+        axes.set_ylim(min(low, bottom), max(high, top))
+        axes.set_xlim(min(left, axes.get_xlim()[0]), max(right, axes.get_xlim()[1]))
+    handles, labels = axes.get_legend_handles_labels()
+    once = dict(zip(labels, handles, strict=True))
+    if len(once) > 1:
+        axes.legend([*once.values()], [*once], loc="best", fontsize=9, frameon=False)
+
+
+def _figure_of(axes: Axes) -> Figure:
+    """Return the figure of axes, that of all subfigures."""
+    figure = axes.get_figure(root=True)
+    assert isinstance(figure, Figure)
+    return figure
+
+
+def _panels(plot: _Plot) -> list[Panel]:
+    """Return the panels of the recorded quantities."""
+    release = plot.mechanism.release
+    body, turns = release.body, release.turns
     drawn: list[Panel] = []
-    turns = mechanism.release.turns
-    if plot.has(f"{body}.angle") if turns else plot.has(*displacement_outputs(mechanism.release)):
+    if plot.has(f"{body}.angle") if turns else plot.has(*displacement_outputs(release)):
         drawn.append(_rotation if turns else _displacement)
-    if plot.has(f"{body}.omega") if turns else plot.has(*velocity_outputs(mechanism.release)):
+    if plot.has(f"{body}.omega") if turns else plot.has(*velocity_outputs(release)):
         drawn.append(_turning if turns else _velocity)
     if plot.marks:
         drawn.append(_speeds)
@@ -162,28 +218,22 @@ def response(result: Result | Columns, mechanism: Mechanism | None = None) -> Fi
             f"the result has nothing to plot: record {body}.x, {body}.y and the like, with FMPy "
             "as in simulate_fmu(...), which records all outputs by itself"
         )
-    figure = Figure((WIDTH, 0.7 + PANEL_HEIGHT * len(drawn)), dpi=120, layout="constrained")
-    every = np.atleast_1d(figure.subplots(len(drawn), 1, sharex=True))
-    for axes, panel in zip(every, drawn, strict=True):
-        _shade_rest(axes, plot)
-        panel(axes, plot)
-        plain(axes)
-    above = 20.0 if drawn[0] is _energies else None  # Room for the legend [points].
-    every[0].set_title(mechanism.title, fontsize=11, loc="left", pad=above)
-    every[-1].set_xlabel(f"time [{plot.unit}]")
-    every[-1].set_xlim(plot.time[0], plot.factor * plot.end)
-    figure.align_ylabels(list(every))
-    return figure
+    return drawn
 
 
-def _motionless(plot: _Plot) -> Figure:
+def _motionless(plot: _Plot, given: Sequence[Axes] | None) -> Figure:
     """Return the figure of a result without motion."""
-    figure = Figure((WIDTH, PANEL_HEIGHT), dpi=120, layout="constrained")
-    axes = figure.subplots()
+    if given:
+        axes = given[0]
+    else:
+        axes = Figure((WIDTH, PANEL_HEIGHT), dpi=120, layout="constrained").subplots()
+        axes.set_title(plot.mechanism.title, fontsize=11, loc="left")
     axes.axis("off")
-    axes.set_title(plot.mechanism.title, fontsize=11, loc="left")
-    axes.text(0.5, 0.5, f"nothing moves in {plot.seconds[-1]:g} s", ha="center", va="center")
-    return figure
+    axes.text(
+        0.5, 0.5, f"nothing moves in {plot.seconds[-1]:g} s", ha="center", va="center",
+        transform=axes.transAxes,
+    )  # fmt: skip
+    return _figure_of(axes)
 
 
 def save(figure: Figure, path: str | Path) -> Path:

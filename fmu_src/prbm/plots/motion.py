@@ -127,7 +127,7 @@ def motion(
         If the mechanism is not given, columns are missing, or the shapes do not fit it.
     """
     if isinstance(result, Result):
-        columns, mechanism, values = result.columns, result.mechanism, result.values
+        columns, mechanism, values = result.columns, result.mechanism, result.start_values
     else:
         columns = result
     if mechanism is None:

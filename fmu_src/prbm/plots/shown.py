@@ -8,7 +8,7 @@ import base64
 import functools
 import html
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, ParamSpec
@@ -20,6 +20,7 @@ from ..runs.headline import headline
 from ..runs.result import ResultError
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 PREVIEW_DPI = 60.0  # Resolution of the figure of a result in a notebook.
@@ -78,8 +79,14 @@ class Film:
 class Result(results.Result):
     """The result of a simulation, with figures and films."""
 
-    def plot(self) -> Picture:
+    def plot(self, *, ax: "Axes | Sequence[Axes] | None" = None) -> Picture:
         """Plot motion, impact speeds and energies over time.
+
+        Parameters
+        ----------
+        ax : Axes, sequence of Axes, or None
+            Axes of an own figure for the first panels, one each, for example for the displacements
+            of several results; None: a new figure.
 
         Raises
         ------
@@ -88,7 +95,7 @@ class Result(results.Result):
         """
         from .figures import response  # imported here: Matplotlib takes half a second
 
-        return Picture(response(self))
+        return Picture(response(self, ax=ax))
 
     def animate(
         self,
@@ -124,7 +131,7 @@ class Result(results.Result):
 
     def _repr_html_(self) -> str:
         """Return the summary and a small figure for a notebook."""
-        text = "\n".join([repr(self), *headline(self, self.mechanism, self.values)])
+        text = "\n".join([repr(self), *headline(self, self.mechanism, self.start_values)])
         return f"<pre>{html.escape(text)}</pre>{self._preview()}"
 
     def _preview(self) -> str:

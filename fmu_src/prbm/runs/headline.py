@@ -13,6 +13,7 @@ from .marks import largest_latched, marks
 from .quantities import FREQUENCY, KINETIC, SETTLED_ENERGY_RTOL, settling
 from .released import displacement_outputs, released_displacement
 from .result import Columns, Result, column, moves, rest_time
+from .struck import UNRELIABLE, first_rigid_impact, peak_before
 
 SECONDS_MIN = 0.1  # Times of shorter runs are printed in ms or µs [s].
 
@@ -137,22 +138,50 @@ def headline(
 
 
 def _stress(columns: Columns, mechanism: Mechanism, size: float) -> list[str]:
-    """Return a line about the largest stress of each flexure whose stress is an output."""
+    """Return lines about the largest stress of each flexure whose stress is an output.
+
+    A stress that is larger after the first rigid impact than before has a second line.
+    """
     time = column(columns, "time")
     span = float(time[-1] - time[0])
     lines = []
+    hit = first_rigid_impact(columns, mechanism)
     for flexure in (mechanism.flexures[i] for i in stressed(mechanism)):
         peak, when, place = (
             float(column(columns, f"{flexure.name}.peak_stress{output}")[-1])
             for output in ("", "_time", "_position")
         )
         strength = mechanism.type_of(flexure).yield_strength
-        factor = f", safety factor {strength / peak:.3g} (yield)" if strength and peak else ""
-        lines.append(
-            f"stress in {flexure.name:10} {1e-6 * peak:.4g} MPa at t = {instant(when, span, 5)}, "
-            f"{length(place, size)} from the start{factor}"
-        )
-    return lines
+        at = f" at t = {instant(when, span, 5)}, {length(place, size)} from the start"
+        if when > hit:
+            before = peak_before(columns, flexure.name, hit)
+            lines.append(f"{stress_text(flexure.name, before, strength)}, before the first impact")
+            at += ", not reliable"
+        lines.append(stress_text(flexure.name, peak, strength, at))
+    return [*lines, UNRELIABLE] if lines and hit < math.inf else lines
+
+
+def stress_text(flexure: str, peak: float, strength: float | None, at: str = "") -> str:
+    """Return the largest stress of a flexure and its safety factor as text.
+
+    Parameters
+    ----------
+    flexure : str
+        Name of the flexure.
+    peak : float
+        The stress [Pa].
+    strength : float or None
+        Yield strength [Pa].
+    at : str
+        Phrase for time and place.
+
+    Examples
+    --------
+    >>> stress_text("leaf", 1e8, 2.5e8, " at t = 2 s")
+    'stress in leaf       100 MPa at t = 2 s, safety factor 2.5 (yield)'
+    """
+    factor = f", safety factor {strength / peak:.3g} (yield)" if strength and peak else ""
+    return f"stress in {flexure:10} {1e-6 * peak:.4g} MPa{at}{factor}"
 
 
 def _settled(columns: Columns, span: float) -> str:

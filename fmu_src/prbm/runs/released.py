@@ -13,7 +13,7 @@ from .result import Result
 def system_of(result: Result) -> System:
     """Return the mechanism of a result with the values of its start."""
     own = {p.name for p in result.mechanism.parameters}
-    return assemble(result.mechanism, {k: x for k, x in result.values.items() if k in own})
+    return assemble(result.mechanism, {k: x for k, x in result.start_values.items() if k in own})
 
 
 def displacement_outputs(release: Release) -> list[str]:

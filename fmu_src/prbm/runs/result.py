@@ -1,7 +1,7 @@
 """Results of simulations, computed or read from files: columns by name, and impacts."""
 
 import csv
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,9 +13,10 @@ from ..base.errors import PrbmError
 from ..base.names import proposal
 from ..base.reading import opening_error, shown
 from ..hybrid.records import Impact
+from ..interface.variables import variables
 from ..mechanics.arrays import Real
 from ..mechanism.description import Mechanism
-from .quantities import QUANTITIES
+from .quantities import FREQUENCY, QUANTITIES
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,17 +30,24 @@ class ResultError(PrbmError, ValueError):
     """A result lacks a column, cannot be read, or belongs to another mechanism."""
 
 
-@dataclass(frozen=True, repr=False)
-class Result:
-    """The result of a simulation.
+class UnknownColumnError(ResultError, KeyError):
+    """A result has no column of this name; the message proposes similar names."""
 
-    ``result["shuttle.x"]`` is the column ``shuttle.x``.
+    __str__ = Exception.__str__  # The one of KeyError would show the message in quotes.
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Result(Mapping[str, Columns]):
+    """The result of a simulation: a mapping from names to columns.
+
+    ``result["shuttle.x"]`` is the column ``shuttle.x``; ``time`` is a column, too.  Two results are
+    equal if they are the same object.
 
     Parameters
     ----------
     mechanism : Mechanism
         The mechanism that was simulated.
-    values : mapping
+    start_values : mapping
         All parameters at the start, and the inputs that were given at the start.
     columns : (m,) structured array
         ``time`` and the variables by name, in SI units, one row per communication point.
@@ -50,14 +58,37 @@ class Result:
     """
 
     mechanism: Mechanism
-    values: Mapping[str, float]
+    start_values: Mapping[str, float]
     columns: Columns
     impacts: tuple[Impact, ...] = field(default=())
     engine: str = ""
 
+    __eq__ = object.__eq__
+    __hash__ = object.__hash__
+
     def __getitem__(self, name: str) -> Columns:
-        """Return a column by name."""
+        """Return a column by name.
+
+        Raises
+        ------
+        UnknownColumnError
+            If the result has no column of that name.
+        """
+        if name in self.start_values and name not in self:
+            raise UnknownColumnError(
+                f"{name} has no column, because it was not changed; its value is "
+                f"result.start_values[{name!r}]"
+            )
         return column(self.columns, name)
+
+    def __contains__(self, name: object) -> bool:
+        return name in names(self.columns)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(names(self.columns))
+
+    def __len__(self) -> int:
+        return len(names(self.columns))
 
     def __repr__(self) -> str:
         rows, end = len(self.columns), float(self.columns["time"][-1])
@@ -85,6 +116,9 @@ class Result:
     def to_pandas(self) -> "pd.DataFrame":
         """Return the columns as a pandas DataFrame over the time.
 
+        ``attrs["units"]`` has the SI units by column, empty for integers and Booleans, and
+        ``attrs["mechanism"]`` the name of the mechanism.
+
         Raises
         ------
         ResultError
@@ -95,9 +129,24 @@ class Result:
         except ModuleNotFoundError:
             raise ResultError(
                 "pandas is not installed; install it with: python -m pip install "
-                "'prbm-impact[notebook]'"
+                '"prbm-impact[notebook]"'
             ) from None
-        return pandas.DataFrame.from_records(self.columns, index="time")
+        frame = pandas.DataFrame.from_records(self.columns, index="time")
+        frame.attrs = {"mechanism": self.mechanism.name, "units": self.units()}
+        return frame
+
+    def units(self) -> dict[str, str]:
+        """Return the SI units by column, empty for integers and Booleans.
+
+        Raises
+        ------
+        MechanismError
+            If a column is no variable of the mechanism.
+        """
+        first = {name: float(x[0]) for name, x in self.items() if name != "time"}
+        first = {FREQUENCY: 0.0} | first
+        known = {v.name: v.unit for v in variables(self.mechanism, first)}
+        return {name: "s" if name == "time" else known[name] for name in self}
 
 
 def column(columns: Columns, name: str) -> Columns:
@@ -105,13 +154,14 @@ def column(columns: Columns, name: str) -> Columns:
 
     Raises
     ------
-    ResultError
+    UnknownColumnError
         If the result has no column of that name.
     """
-    if name not in names(columns):
-        raise ResultError(
-            f"the result has no column {name!r}; record it, in FMPy with "
-            f"simulate_fmu(..., output=[..., {name!r}])"
+    known = names(columns)
+    if name not in known:
+        raise UnknownColumnError(
+            f"the result has no column {name!r}; {proposal(str(name), dict.fromkeys(known))} "
+            "FMPy records the columns in simulate_fmu(..., output=[...])"
         )
     found: Columns = columns[name]
     return found

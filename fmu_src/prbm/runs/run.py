@@ -106,7 +106,7 @@ def simulate(
     >>> len(result["time"]), int(result["stop.impact_count"][-1])
     (51, 1)
     >>> result = simulate(load("PRBDM"), {"release.displacement": "-10 mm"}, stop_time="20 ms")
-    >>> result.values["release.displacement"], float(result["time"][-1])
+    >>> result.start_values["release.displacement"], float(result["time"][-1])
     (-0.01, 0.02)
     >>> result = simulate(load("PRBDM"), inputs={"force.x": "step(1 N, 5 ms)"}, stop_time="20 ms")
     >>> result["force.x"][[4, 5]].tolist()

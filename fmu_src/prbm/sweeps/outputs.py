@@ -26,6 +26,11 @@ PULSES = {
     ".stress_end": "peak_stress",
 }  # fmt: skip
 """Ends of the names of outputs with pulses shorter than a step, and the quantity that sees them."""
+OF_IMPACTS = (
+    "approach_speed", "rebound_speed", "impulse", "energy_lost", "modal_restitution", "peak_force",
+    "indentation", "contact_duration",
+)  # fmt: skip
+"""Outputs of stops that each impact replaces."""
 
 
 class SpecificationError(ValueError):
@@ -159,7 +164,8 @@ def evaluate(
     columns : mapping
         ``time`` and the variables of the output; only the last value is needed for ``final``.
     impacts : sequence of Impact
-        All impacts, if the engine has recorded them; named quantities then see each of them.
+        All impacts, if the engine has recorded them; named quantities and extremes then see each
+        of them, also of several between two communication points.
 
     Examples
     --------
@@ -170,7 +176,22 @@ def evaluate(
     if output.reduction == QUANTITY:
         return QUANTITIES[output.variable].value(columns, impacts)
     x = np.asarray(columns[output.variable], np.float64)
+    if output.reduction in ("max", "min"):
+        x = np.append(x, _at_impacts(output.variable, impacts))
     return reduce(output, columns["time"], np.abs(x) if output.absolute else x)
+
+
+def _at_impacts(variable: str, impacts: Sequence[Impact]) -> list[float]:
+    """Return the values of an output of a stop at its impacts.
+
+    Other outputs have none.  The gap at an impact is 0, or the negative largest indentation of a
+    compliant stop.
+    """
+    stop, _, name = variable.rpartition(".")
+    own = [impact.latched for impact in impacts if impact.stop == stop]
+    if name == "gap":
+        return [-latched.indentation for latched in own]
+    return [getattr(latched, name) for latched in own] if name in OF_IMPACTS else []
 
 
 def reduce(output: Output, t: Real, x: Real) -> float:

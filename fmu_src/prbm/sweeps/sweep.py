@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from .results import Results
 
 EXTRA = ("distributed", "pandas", "pyarrow")
-REMEDY = "install the packages for sweeps with: python -m pip install 'prbm-impact[sweep]'"
+REMEDY = 'install the packages for sweeps with: python -m pip install "prbm-impact[sweep]"'
 
 BATCH_MIN, BATCH_MAX = 1.0, 30.0  # Limits of the duration of a batch [s].
 BATCH_SHARE = 0.02  # Duration of a batch, as a share of the time so far.
@@ -526,7 +526,7 @@ class _Sweep:
                 raise
             raise SweepError(
                 "a worker cannot import prbm; install it there: "
-                "python -m pip install 'prbm-impact[sweep]'"
+                'python -m pip install "prbm-impact[sweep]"'
             ) from None
 
     def _threads(self) -> int:

@@ -29,7 +29,7 @@ from ...mechanism.parts import (
     value,
 )
 
-REMEDY = "install it with: python -m pip install 'prbm-impact[fe]', or: pip install exudyn"
+REMEDY = 'install it with: python -m pip install "prbm-impact[fe]"'
 
 
 class FiniteElementError(PrbmError, ValueError):
