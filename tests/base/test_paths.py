@@ -1,5 +1,6 @@
 """Paths that the file system cannot hold are rejected with a message."""
 
+import os
 import sys
 
 import pytest
@@ -56,3 +57,15 @@ def test_a_name_that_the_encoding_lacks_cannot_be_read(tmp_path, kind):
 def test_a_name_with_a_null_byte_cannot_be_read(tmp_path, kind):
     with pytest.raises(PrbmError, match=r"read.*null"):
         READERS[kind](tmp_path / "half\0.toml")
+
+
+@pytest.mark.parametrize("write", [lambda path: atomic.write(path, b""), atomic.check_file])
+@pytest.mark.parametrize("linked", [False, True])
+def test_a_pipe_is_not_replaced_by_a_file(tmp_path, write, linked):
+    pipe, link = tmp_path / "pipe", tmp_path / "link"
+    os.mkfifo(pipe)
+    link.symlink_to(pipe)
+    with pytest.raises(PrbmError, match="a pipe or a device; choose another name"):
+        write(link if linked else pipe)
+    assert pipe.is_fifo()
+    assert link.is_symlink()

@@ -39,11 +39,14 @@ def write_all(files: Mapping[Path, bytes]) -> None:
 
     Raises
     ------
+    FileError
+        If a path is a pipe or a device, which the renaming would remove.
     OSError
         If a folder cannot be created or a file cannot be written; ``filename`` is that file.
     """
     for path in files:
         check_name(path)
+        _check_kind(path)
     partial: dict[Path, str] = {}
     path = Path()
     try:
@@ -63,6 +66,12 @@ def write_all(files: Mapping[Path, bytes]) -> None:
     finally:
         for name in partial.values():
             Path(name).unlink(missing_ok=True)
+
+
+def _check_kind(path: Path) -> None:
+    """Check that a path is a file, a folder or does not exist; links are followed."""
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise FileError(f"cannot write {path}: it is a pipe or a device; choose another name")
 
 
 def check_name(path: Path) -> None:
@@ -118,9 +127,11 @@ def check_file(path: Path) -> None:
     Raises
     ------
     FileError
-        If the path is a folder, its parent is a file, or there is no permission to write.
+        If the path is a folder, a pipe or a device, its parent is a file, or there is no
+        permission to write.
     """
     check_name(path)
+    _check_kind(path)
     if path.is_dir():
         raise FileError(f"cannot write {path}: it is a folder; choose another name")
     check_writable(path.parent, "choose another folder")
