@@ -2,6 +2,7 @@
 
 import os
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -10,6 +11,7 @@ from prbm.base import atomic
 from prbm.base.errors import PrbmError
 from prbm.data.records import read_record
 from prbm.fmu.parameter_sets import read_parameter_set
+from prbm.runs import inputs, result
 from prbm.runs.inputs import read_signal
 from prbm.runs.result import read_csv
 from prbm.sweeps.sweep import read_fmu
@@ -69,3 +71,10 @@ def test_a_pipe_is_not_replaced_by_a_file(tmp_path, write, linked):
         write(link if linked else pipe)
     assert pipe.is_fifo()
     assert link.is_symlink()
+
+
+@pytest.mark.parametrize(("kind", "module"), [("signal", inputs), ("result", result)])
+def test_no_more_of_an_endless_file_is_read_than_the_limit(monkeypatch, kind, module):
+    monkeypatch.setattr(module, "FILE_SIZE_MAX", 1000, raising=False)
+    with pytest.raises(PrbmError, match="larger than 1000 bytes, the limit"):
+        READERS[kind](Path("/dev/zero"))

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base import reading
 from ..base.errors import PrbmError
 from ..base.names import proposal
-from ..base.reading import opening_error, shown
 from ..hybrid.records import Impact
 from ..mechanics.arrays import Real
 from ..mechanism.description import Mechanism
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 Columns = NDArray[Any]
 ZERO_MOTION_RTOL = 1e-9  # Smaller motions, relative to the size of the mechanism, are round-off.
+FILE_SIZE_MAX = 1 << 30  # bytes; 100,000 rows of 500 columns have 900 MB.
 BOOLEANS = {"true": 1.0, "false": 0.0}  # Texts that some tools write for Booleans.
 
 
@@ -168,12 +169,10 @@ def read_csv(path: str | Path) -> Columns:
     """
     path = Path(path)
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            lines = [line for line in csv.reader(file) if line]
+        text = reading.text(path, FILE_SIZE_MAX, ResultError)
+        lines = [line for line in csv.reader(text) if line]
     except (UnicodeDecodeError, csv.Error) as error:
         raise ResultError(f"{path}: not a CSV file ({error})") from None
-    except (OSError, ValueError) as error:
-        raise ResultError(f"{shown(path)}: cannot be read ({opening_error(error)})") from None
     if len(lines) < 3 or lines[0][0].strip() != "time":
         raise ResultError(
             f"{path}: not a result; the first line must name the columns, the first of them time, "
