@@ -1,6 +1,7 @@
 """Results of simulations, computed or read from files: columns by name, and impacts."""
 
 import csv
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -179,7 +180,7 @@ def read_csv(path: str | Path) -> Columns:
             "and at least two rows must follow"
         )
     header = [name.strip() for name in lines[0]]
-    repeated = [name for k, name in enumerate(header) if name in header[:k]]
+    repeated = [name for name, count in Counter(header).items() if count > 1]
     if repeated:
         raise ResultError(f"{path}: two columns are named {repeated[0]!r}")
     rows = []
