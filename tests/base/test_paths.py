@@ -78,3 +78,12 @@ def test_no_more_of_an_endless_file_is_read_than_the_limit(monkeypatch, kind, mo
     monkeypatch.setattr(module, "FILE_SIZE_MAX", 1000, raising=False)
     with pytest.raises(PrbmError, match="larger than 1000 bytes, the limit"):
         READERS[kind](Path("/dev/zero"))
+
+
+def test_files_have_the_permissions_of_the_umask(tmp_path):
+    before = os.umask(0o077)
+    try:
+        atomic.write(tmp_path / "file", b"content")
+    finally:
+        os.umask(before)
+    assert (tmp_path / "file").stat().st_mode & 0o777 == 0o600
