@@ -15,6 +15,7 @@ import pytest
 
 import prbm
 from prbm.base import lock as locks
+from prbm.base.atomic import FileError
 from prbm.base.lock import LockedError, locked
 
 HOLDER = """
@@ -90,6 +91,22 @@ def test_a_block_runs_without_lock_on_a_file_system_without_locks(tmp_path, monk
     monkeypatch.setattr(locks, "_lock", unsupported)
     with locked(tmp_path / "lock", wait=False), locked(tmp_path / "lock", wait=False):
         pass
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has other links")
+@pytest.mark.parametrize("kind", ["symlink", "dangling", "link", "pipe"])
+def test_the_file_of_a_lock_is_no_other_file(tmp_path, kind):
+    precious, lock = tmp_path / "precious", tmp_path / "lock"
+    if kind != "dangling":
+        precious.write_text("content", encoding="utf-8")
+    make = {"link": lock.hardlink_to, "pipe": lambda _: os.mkfifo(lock)}
+    make.get(kind, lock.symlink_to)(precious)
+    with pytest.raises(FileError, match="not the file of a lock; remove it"), locked(lock):
+        pytest.fail("the lock was taken")
+    if kind == "dangling":
+        assert not precious.exists()
+    else:
+        assert precious.read_text(encoding="utf-8") == "content"
 
 
 class Msvcrt(types.ModuleType):

@@ -1,6 +1,8 @@
 """Paths that the file system cannot hold are rejected with a message."""
 
+import os
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -9,6 +11,7 @@ from prbm.base import atomic
 from prbm.base.errors import PrbmError
 from prbm.data.records import read_record
 from prbm.fmu.parameter_sets import read_parameter_set
+from prbm.runs import inputs, result
 from prbm.runs.inputs import read_signal
 from prbm.runs.result import read_csv
 from prbm.sweeps.sweep import read_fmu
@@ -56,3 +59,31 @@ def test_a_name_that_the_encoding_lacks_cannot_be_read(tmp_path, kind):
 def test_a_name_with_a_null_byte_cannot_be_read(tmp_path, kind):
     with pytest.raises(PrbmError, match=r"read.*null"):
         READERS[kind](tmp_path / "half\0.toml")
+
+
+@pytest.mark.parametrize("write", [lambda path: atomic.write(path, b""), atomic.check_file])
+@pytest.mark.parametrize("linked", [False, True])
+def test_a_pipe_is_not_replaced_by_a_file(tmp_path, write, linked):
+    pipe, link = tmp_path / "pipe", tmp_path / "link"
+    os.mkfifo(pipe)
+    link.symlink_to(pipe)
+    with pytest.raises(PrbmError, match="a pipe or a device; choose another name"):
+        write(link if linked else pipe)
+    assert pipe.is_fifo()
+    assert link.is_symlink()
+
+
+@pytest.mark.parametrize(("kind", "module"), [("signal", inputs), ("result", result)])
+def test_no_more_of_an_endless_file_is_read_than_the_limit(monkeypatch, kind, module):
+    monkeypatch.setattr(module, "FILE_SIZE_MAX", 1000, raising=False)
+    with pytest.raises(PrbmError, match="larger than 1000 bytes, the limit"):
+        READERS[kind](Path("/dev/zero"))
+
+
+def test_files_have_the_permissions_of_the_umask(tmp_path):
+    before = os.umask(0o077)
+    try:
+        atomic.write(tmp_path / "file", b"content")
+    finally:
+        os.umask(before)
+    assert (tmp_path / "file").stat().st_mode & 0o777 == 0o600

@@ -409,3 +409,12 @@ def test_ziglang_makes_a_library_for_every_platform(native, mechanisms, tmp_path
             digests = {hashlib.sha256(fmu.read(n)).digest() for n in names}
         assert folders <= {n.split("/")[1] for n in names}
         assert len(names) == len(digests) == len(PLATFORMS)
+
+
+@pytest.mark.parametrize("option", ["-ffast-math", "-ffinite-math-only"])
+def test_options_that_change_results_are_named(monkeypatch, option):
+    monkeypatch.setenv("CC", f"{SYSTEM} {option}")
+    (found,) = compiler._system_compilers()
+    job = compiler.Job(compiler._host(), found, compiler.ENGINE, compiler.kernel())
+    with pytest.raises(compiler.CompilerError, match="-ffast-math and its parts change"):
+        compiler.compiled(job)

@@ -24,7 +24,7 @@ from prbm.commands.command_line import main
 from prbm.drawing.shapes import CURVED_PIVOTS_MAX, curve
 from prbm.mechanism.description import Mechanism
 from prbm.plots import animation
-from prbm.plots.animation import AnimationError, animate, show
+from prbm.plots.animation import AnimationError, animate, show, write_film
 from prbm.plots.motion import film, motion, needed
 from prbm.plots.scene import Scene, pictures
 from prbm.runs.marks import marks
@@ -514,3 +514,14 @@ def test_an_unidentified_mechanism_must_be_named(
     (tmp_path / "result.csv").write_text("time,crank.angle\n0,0\n1,0\n", encoding="utf-8")
     assert main(["animate", str(tmp_path / "result.csv"), str(tmp_path / "out.gif")]) == 2
     assert re.search(r"--model \(.*PRBDM, PRBDM2R", capsys.readouterr().err)
+
+
+def test_the_folder_has_no_part_of_a_film(short: Result, tmp_path: Path) -> None:
+    seen = []
+
+    def progress(fraction: float) -> None:
+        seen.extend(tmp_path.iterdir())
+
+    write_film(scene_of(short, slow=20.0, fps=10.0), tmp_path / "film.gif", progress)
+    assert seen == []
+    assert [path.name for path in tmp_path.iterdir()] == ["film.gif"]

@@ -425,7 +425,7 @@ MISTAKES = [
         {"stop.displacement": lambda t: None},
         r"stop\.displacement\(0 s\) = None must be a number in m",
     ),
-    ({"force.x": "csv(none.csv, a)"}, r"none\.csv cannot be read"),
+    ({"force.x": "csv(none.csv, a)"}, r"none\.csv: cannot be read"),
     ({"force.x": "csv(a.csv, c)"}, "the file has no column 'c'; known names are a, b"),
     ({"force.x": "csv(a.csv)"}, "the file has 3 columns; name one of a, b"),
     ({"force.x": "csv(a.csv, b)"}, r"column 'b \[mm\]', 1 mm: the unit 'mm' has another dimen"),

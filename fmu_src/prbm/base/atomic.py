@@ -1,13 +1,12 @@
 """Atomic writing of files: readers see the old content or the new one, never a part of it."""
 
 import os
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
 from .errors import PrbmError
 
-FILE_MODE = 0o644  # Temporary files are created with 0o600.
+FILE_MODE = 0o644  # The umask removes further permissions.
 
 
 class FileError(PrbmError, OSError):
@@ -39,30 +38,43 @@ def write_all(files: Mapping[Path, bytes]) -> None:
 
     Raises
     ------
+    FileError
+        If a path is a pipe or a device, which the renaming would remove.
     OSError
         If a folder cannot be created or a file cannot be written; ``filename`` is that file.
     """
     for path in files:
         check_name(path)
-    partial: dict[Path, str] = {}
+        _check_kind(path)
+    partial: dict[Path, Path] = {}
     path = Path()
     try:
         for path, content in files.items():
             path.parent.mkdir(parents=True, exist_ok=True)
-            handle, partial[path] = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-            with os.fdopen(handle, "wb") as file:
+            draft = path.with_name(f".{path.name}.{os.urandom(4).hex()}")
+            with open(draft, "xb", opener=_created) as file:
+                partial[path] = draft
                 file.write(content)
                 file.flush()
                 os.fsync(file.fileno())
-            os.chmod(partial[path], FILE_MODE)
-        for path, name in partial.items():
-            os.replace(name, path)
+        for path, draft in partial.items():
+            draft.replace(path)
     except OSError as error:
         error.filename = str(path)
         raise
     finally:
-        for name in partial.values():
-            Path(name).unlink(missing_ok=True)
+        for draft in partial.values():
+            draft.unlink(missing_ok=True)
+
+
+def _created(name: str, flags: int) -> int:
+    return os.open(name, flags, FILE_MODE)
+
+
+def _check_kind(path: Path) -> None:
+    """Check that a path is a file, a folder or does not exist; links are followed."""
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise FileError(f"cannot write {path}: it is a pipe or a device; choose another name")
 
 
 def check_name(path: Path) -> None:
@@ -118,9 +130,11 @@ def check_file(path: Path) -> None:
     Raises
     ------
     FileError
-        If the path is a folder, its parent is a file, or there is no permission to write.
+        If the path is a folder, a pipe or a device, its parent is a file, or there is no
+        permission to write.
     """
     check_name(path)
+    _check_kind(path)
     if path.is_dir():
         raise FileError(f"cannot write {path}: it is a folder; choose another name")
     check_writable(path.parent, "choose another folder")

@@ -1,16 +1,21 @@
 """Locks between processes, on files that the operating system locks."""
 
+import errno
 import os
 import platform
+import stat
 import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from .atomic import FileError
 from .errors import PrbmError
 
 OWNER_LENGTH_MAX = 200  # Bytes of the text that describes the owner of a lock.
+FLAGS = os.O_RDWR | os.O_CREAT
+FLAGS |= sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_NOCTTY"))
 LOCKED_BYTE = 1 << 30  # On Windows a locked byte cannot be read; this one is behind the text.
 POLLING_INTERVAL = 0.1  # s between two attempts on Windows.
 
@@ -41,11 +46,11 @@ def locked(path: Path, *, wait: bool = True) -> Iterator[None]:
     ------
     LockedError
         If the lock is held and ``wait`` is false.
+    FileError
+        If the path is a link, a pipe or a device, or the file has another name.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-    except OSError:
+    handle = _opened(path)
+    if handle is None:
         yield
         return
     try:
@@ -64,6 +69,29 @@ def locked(path: Path, *, wait: bool = True) -> Iterator[None]:
             _unlock(handle)
     finally:
         os.close(handle)
+
+
+def _opened(path: Path) -> int | None:
+    """Open the file of a lock; return None if it cannot be opened.
+
+    Its content is replaced, so that it must not be the content of another file.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle = os.open(path, FLAGS, 0o666)
+    except OSError as error:
+        if error.errno != errno.ELOOP and not path.is_symlink():
+            return None
+        raise _foreign(path) from None
+    found = os.fstat(handle)
+    if stat.S_ISREG(found.st_mode) and found.st_nlink <= 1:  # 0: removed meanwhile.
+        return handle
+    os.close(handle)
+    raise _foreign(path)
+
+
+def _foreign(path: Path) -> FileError:
+    return FileError(f"{path}: a link, a pipe or a device, not the file of a lock; remove it")
 
 
 def _describe(handle: int, text: str) -> None:

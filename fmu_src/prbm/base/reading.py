@@ -1,11 +1,13 @@
 """Reading of files of limited size."""
 
+import io
+from collections.abc import Callable
 from pathlib import Path
 
 from .errors import PrbmError
 
 
-def content(path: Path, limit: int, error: type[PrbmError]) -> bytes:
+def content(path: Path, limit: int, error: Callable[[str], PrbmError]) -> bytes:
     """Return the content of a file, which may be a device or a pipe.
 
     Parameters
@@ -14,8 +16,8 @@ def content(path: Path, limit: int, error: type[PrbmError]) -> bytes:
         Path of the file.
     limit : int
         Largest size of the file [bytes].
-    error : type of error
-        Type of the error that is raised.
+    error : callable
+        Returns the error that is raised from its message, for instance a type of errors.
 
     Raises
     ------
@@ -30,6 +32,19 @@ def content(path: Path, limit: int, error: type[PrbmError]) -> bytes:
     if len(data) > limit:
         raise error(f"{path}: larger than {limit} bytes, the limit of such files; split it")
     return data
+
+
+def text(path: Path, limit: int, error: Callable[[str], PrbmError]) -> io.StringIO:
+    """Return the text of a file in UTF-8, with or without a mark of the byte order.
+
+    The arguments and errors are those of :func:`content`.
+
+    Raises
+    ------
+    UnicodeDecodeError
+        If the file has another encoding.
+    """
+    return io.StringIO(content(path, limit, error).decode("utf-8-sig"), newline="")
 
 
 def shown(path: Path) -> str:

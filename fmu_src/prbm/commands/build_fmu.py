@@ -14,7 +14,9 @@ from .program import (
     command_name,
     discard_output,
     escape_output,
+    flush_output,
     limit_threads,
+    report_unwritable,
 )
 
 
@@ -31,10 +33,12 @@ def main() -> int:
         from . import building  # imported here: it takes a second, and packages may be missing
 
         status = building.main()
-        sys.stdout.flush()
+        flush_output()
         return status
     except BrokenPipeError:  # The reader of the output, for instance head, has closed the pipe.
         return discard_output()
+    except OSError as error:
+        return report_unwritable(command_name(), error)
     except ModuleNotFoundError as error:
         print(f"{command_name()}: {missing_package(error)}", file=sys.stderr)
         return MISTAKE

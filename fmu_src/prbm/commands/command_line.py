@@ -42,7 +42,15 @@ from .arguments import (
     sweep_arguments,
 )
 from .measure_arguments import measure_arguments
-from .program import FAILED, INTERRUPTED, MISTAKE, OK, discard_output
+from .program import (
+    FAILED,
+    INTERRUPTED,
+    MISTAKE,
+    OK,
+    discard_output,
+    flush_output,
+    report_unwritable,
+)
 from .remedies import in_options
 
 NEGATIVE = re.compile(r"-\.?\d")
@@ -532,9 +540,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
     try:
         status = _run([*(sys.argv[1:] if arguments is None else arguments)])
-        sys.stdout.flush()
+        flush_output()
     except BrokenPipeError:  # The reader of the output, for instance head, has closed the pipe.
         return discard_output()
+    except OSError as error:  # Readers name the files that they cannot read.
+        return report_unwritable("prbm", error)
     return status
 
 

@@ -35,6 +35,27 @@ def discard_output() -> int:
     return FAILED
 
 
+def flush_output() -> None:
+    """Write all output now; there is none if standard output is closed."""
+    if sys.stdout is not None:
+        sys.stdout.flush()
+
+
+def report_unwritable(name: str, error: OSError) -> int:
+    """Report a file or an output that cannot be written; return the exit status."""
+    place = error.filename or "standard output"
+    print(
+        f"{name}: cannot write {place} ({error.strerror or error}); choose another place for the "
+        "output",
+        file=sys.stderr,
+    )
+    try:
+        flush_output()
+    except OSError:
+        discard_output()
+    return FAILED
+
+
 def command_name() -> str:
     """Return the name of the running program as the user typed it."""
     path = Path(sys.argv[0])

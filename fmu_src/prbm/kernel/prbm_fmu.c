@@ -7,6 +7,10 @@
  * The files are the layers of the kernel, the lowest first: each uses only functions and types of
  * earlier files.
  */
+#if defined __FAST_MATH__ || defined __ASSOCIATIVE_MATH__ || defined __RECIPROCAL_MATH__ || \
+    (defined __FINITE_MATH_ONLY__ && __FINITE_MATH_ONLY__ > 0)
+#error "-ffast-math and its parts change results: remove them from the compiler's options"
+#endif
 #include "generated.h"
 #include "kernel.h"
 #include "motion.h"

@@ -1,9 +1,9 @@
 """Films of results: links, flexures, bodies, walls and impacts, in a file or in a window."""
 
 import functools
-import os
 import shutil
 import subprocess
+import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,6 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from ..base.atomic import FileError, check_file, write
 from ..base.errors import PrbmError
 from ..base.progress import Progress
 from ..mechanism.description import Mechanism
@@ -169,16 +170,18 @@ def _writer(path: Path) -> Write:
 
 @contextmanager
 def _complete(path: Path) -> Iterator[Path]:
-    """Yield a temporary path beside the file, which replaces the file after success."""
-    partial = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    """Yield a path in a temporary folder, whose content is written to the file after success."""
     try:
-        partial.touch()  # Fail now if the folder is not writable.
-        yield partial
-        os.replace(partial, path)
+        path.parent.stat()  # A missing folder is not created.
+        check_file(path)
+        with tempfile.TemporaryDirectory(prefix="prbm_") as folder:
+            draft = Path(folder, f"film{path.suffix}")
+            yield draft
+            write(path, draft.read_bytes())
+    except FileError as error:
+        raise AnimationError(str(error)) from None
     except OSError as error:
         raise AnimationError(f"{path}: cannot be written ({error.strerror or error})") from None
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 Frame = TypeVar("Frame")

@@ -7,9 +7,9 @@ from collections.abc import Callable, Collection, Container, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
+from ..base import reading
 from ..base.errors import ParameterError
 from ..base.names import proposal, unknown
-from ..base.reading import opening_error, shown
 from ..mechanics.inputs import input_units
 from ..mechanism.description import Mechanism
 from .signals import (
@@ -48,6 +48,7 @@ SHAPES: dict[str, Arguments] = {  # Arguments with their units and default value
     },
 }  # fmt: skip
 FILE = "csv"
+FILE_SIZE_MAX = 1 << 28  # bytes of the file of a signal; ten million rows have 250 MB.
 DURATION_MIN = 1e-15  # s: a shorter signal is a mistake in a unit.
 PLACEHOLDER = re.compile(r"\{([\w.]+)\}")
 
@@ -363,15 +364,11 @@ def _from_file(where: str, words: Sequence[str], unit: str) -> Table:
 def _rows(where: str, path: Path) -> tuple[list[str], dict[int, list[str]]]:
     """Return the head of a CSV file, and the other rows by the numbers of their last lines."""
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.reader(file)
-            rows = dict((reader.line_num, row) for row in reader if row)
+        text = reading.text(path, FILE_SIZE_MAX, lambda e: ParameterError(f"{where}: {e}"))
+        reader = csv.reader(text)
+        rows = dict((reader.line_num, row) for row in reader if row)
     except (UnicodeDecodeError, csv.Error) as error:
         raise ParameterError(f"{where}: {path} is not a CSV file ({error})") from None
-    except (OSError, ValueError) as error:
-        raise ParameterError(
-            f"{where}: {shown(path)} cannot be read ({opening_error(error)})"
-        ) from None
     head = rows.pop(min(rows, default=0), [])
     if len(rows) < 2 or len(head) < 2 or _numeric(head, (0,)):
         raise ParameterError(

@@ -1,6 +1,7 @@
 """Results of simulations, computed or read from files: columns by name, and impacts."""
 
 import csv
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base import reading
 from ..base.errors import PrbmError
 from ..base.names import proposal
-from ..base.reading import opening_error, shown
 from ..hybrid.records import Impact
 from ..interface.variables import variables
 from ..mechanics.arrays import Real
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 Columns = NDArray[Any]
 ZERO_MOTION_RTOL = 1e-9  # Smaller motions, relative to the size of the mechanism, are round-off.
+FILE_SIZE_MAX = 1 << 30  # bytes; 100,000 rows of 500 columns have 900 MB.
 BOOLEANS = {"true": 1.0, "false": 0.0}  # Texts that some tools write for Booleans.
 
 
@@ -218,19 +220,17 @@ def read_csv(path: str | Path) -> Columns:
     """
     path = Path(path)
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            lines = [line for line in csv.reader(file) if line]
+        text = reading.text(path, FILE_SIZE_MAX, ResultError)
+        lines = [line for line in csv.reader(text) if line]
     except (UnicodeDecodeError, csv.Error) as error:
         raise ResultError(f"{path}: not a CSV file ({error})") from None
-    except (OSError, ValueError) as error:
-        raise ResultError(f"{shown(path)}: cannot be read ({opening_error(error)})") from None
     if len(lines) < 3 or lines[0][0].strip() != "time":
         raise ResultError(
             f"{path}: not a result; the first line must name the columns, the first of them time, "
             "and at least two rows must follow"
         )
     header = [name.strip() for name in lines[0]]
-    repeated = [name for k, name in enumerate(header) if name in header[:k]]
+    repeated = [name for name, count in Counter(header).items() if count > 1]
     if repeated:
         raise ResultError(f"{path}: two columns are named {repeated[0]!r}")
     rows = []

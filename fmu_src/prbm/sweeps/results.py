@@ -19,11 +19,13 @@ import pandas as pd
 import pyarrow as pa  # type: ignore[import-untyped]
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
 
+from ..base.atomic import write
 from ..base.errors import ParameterError
 from ..base.lock import LockedError, locked
 from .outputs import GOOD, Outcome
 
 SETTINGS, LOCK = "_sweep.json", "_sweep.lock"
+DRAFTS = f".{SETTINGS}.*"  # Names of drafts of the settings, which a killed process leaves.
 ROW, STATUS, MESSAGE, SECONDS = "row", "status", "message", "seconds"
 OWN = (ROW, STATUS, MESSAGE, SECONDS)
 """Columns of every sweep; no parameter or output may have these names."""
@@ -80,7 +82,9 @@ class Results:
         """Reject a folder that was not made by a sweep."""
         if (self.folder / SETTINGS).exists() or not self.folder.exists():
             return
-        if not (self.folder.is_dir() and {p.name for p in self.folder.iterdir()} <= {LOCK}):
+        if not self.folder.is_dir() or any(
+            path.name != LOCK and not path.match(DRAFTS) for path in self.folder.iterdir()
+        ):
             raise ParameterError(
                 f"{self.folder} exists but contains no sweep; give another name for the results"
             )
@@ -98,22 +102,25 @@ class Results:
         """
         file = self.folder / SETTINGS
         try:
-            for draft in self.folder.glob("_*.draft"):
-                draft.unlink()
+            for pattern in ("_*.draft", DRAFTS):
+                for draft in self.folder.glob(pattern):
+                    draft.unlink()
             if file.exists() and overwrite:
                 self._clear()
             if file.exists():
-                self._compare(json.loads(file.read_text(encoding="utf-8")))
+                before = json.loads(file.read_bytes())
+                if not isinstance(before, dict):
+                    raise ValueError
+                self._compare(before)
                 return
-            self.folder.mkdir(parents=True, exist_ok=True)
-            draft = file.with_suffix(".json.draft")
-            draft.write_text(json.dumps(self.settings, indent=2), encoding="utf-8")
-            draft.replace(file)
+            write(file, json.dumps(self.settings, indent=2).encode())
+        except ParameterError:
+            raise
         except OSError as error:
             raise ParameterError(
-                f"{self.folder} cannot be written ({error.strerror}); give another name"
+                f"{self.folder} cannot be written ({error.strerror or error}); give another name"
             ) from None
-        except json.JSONDecodeError:
+        except (ValueError, RecursionError):
             raise ParameterError(f"{file} is damaged; delete {self.folder}") from None
 
     def _compare(self, before: Mapping[str, Any]) -> None:
@@ -153,12 +160,15 @@ class Results:
     def _tables(self) -> Iterator[tuple[Path, Any]]:
         for part in self._parts():
             try:
-                yield part, pq.read_table(part, schema=self.schema)
+                table = pq.read_table(part, schema=self.schema)
+                if any(row is None or row < 0 for row in table[ROW].to_pylist()):
+                    raise ValueError("a row has no number, or a negative one")
             except (OSError, ValueError, pa.ArrowException) as error:
                 reason = str(error).splitlines()[0]
                 raise ParameterError(
                     f"{part} cannot be read ({reason}); remove it to repeat its runs"
                 ) from None
+            yield part, table
 
     def sort(self) -> None:
         """Replace all parts by one part with ordered rows, so that every reader gets them in order.

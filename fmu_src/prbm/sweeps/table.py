@@ -1,6 +1,7 @@
 """Tables of parameters: read from files, drawn at random, compared with the variables of an FMU."""
 
 import math
+from collections import Counter
 from collections.abc import Container, Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -130,7 +131,7 @@ def read_table(table: Table) -> pd.DataFrame:
             "headed by its name, and a row for each run"
         )
     names = [str(name).strip() for name in table.columns]
-    twice = sorted({name for name in names if names.count(name) > 1})
+    twice = sorted(name for name, count in Counter(names).items() if count > 1)
     if twice:
         raise ParameterError(f"{where} has the column {twice[0]!r} twice; keep one")
     return table.set_axis(names, axis="columns").reset_index(drop=True)
@@ -197,9 +198,9 @@ def check_settable(name: str, variables: Mapping[str, Any]) -> None:
     ParameterError
         If the variable is unknown or cannot be set before a run.
     """
-    settable = {key: v for key, v in variables.items() if _settable(v)}
-    if name in settable:
+    if name in variables and _settable(variables[name]):
         return
+    settable = {key: v for key, v in variables.items() if _settable(v)}
     hint = proposal(name, settable)
     if len(settable) > NAMES_LISTED_MAX and hint.startswith("known"):
         hint = "fmpy info lists the variables"
