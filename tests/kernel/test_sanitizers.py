@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from c_importer import Job, described, kernel_library, native, needs, run
+from c_importer import PLAIN, Job, described, kernel_library, native, needs, run
 from fuzzing import (
     ENVIRONMENT,
     MODELS,
@@ -81,7 +81,7 @@ def test_valgrind_finds_nothing(fmi, kind):
     A leak of one instance is found; the sanitizers create ten thousand.
     """
     needs("valgrind")
-    library = kernel_library("plain", ("-g",))
+    library = kernel_library(*PLAIN)
     job = Job(native("PRBDM2R", fmi), kind, POINTS[:61], library=library)
     for words in ((), ("interrupt", 30, "serialize"), ("cycles", 100, 0)):
         assert not run(job, *words, before=VALGRIND).errors

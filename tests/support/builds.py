@@ -16,6 +16,9 @@ from prbm.runs.experiment import experiment
 from support import mechanism
 
 LEVELS = ("-O0", "-O2", "-O3")
+UNCHECKED = ("-fno-sanitize=undefined",)
+"""Switches off the checks that ziglang adds at -O0.  They cost most of the time in an emulator, and
+the tests of the sanitizers have them with GCC."""
 DIGITS = 8  # Hexadecimal digits of a hash that are printed.
 
 
@@ -37,15 +40,15 @@ class Compiler:
 COMPILERS = (
     Compiler(NATIVE, "gcc", "gcc"),
     Compiler(NATIVE, "clang", "clang"),
-    Compiler(NATIVE, "zig", target="x86_64-linux-gnu.2.17"),
+    Compiler(NATIVE, "zig", target="x86_64-linux-gnu.2.17", flags=UNCHECKED),
     Compiler(ARM, "gcc", "aarch64-linux-gnu-gcc"),
     Compiler(
         ARM, "clang", "clang", flags=("--target=aarch64-linux-gnu",),
         linker=("aarch64-linux-gnu-gcc",),
     ),
-    Compiler(ARM, "zig", target=ARM.target),
+    Compiler(ARM, "zig", target=ARM.target, flags=UNCHECKED),
     Compiler(WINE, "gcc", "x86_64-w64-mingw32-gcc", flags=("-static-libgcc",)),
-    Compiler(WINE, "zig", target=WINE.target),
+    Compiler(WINE, "zig", target=WINE.target, flags=UNCHECKED),
 )  # fmt: skip
 NATIVE_BUILDS: Mapping[str, tuple[Compiler, str]] = {
     f"{compiler.host.name} {compiler.name} {level}": (compiler, level)

@@ -346,6 +346,11 @@ def native(model: str, fmi: int, platform: str = "host") -> Path:
     return once(name, lambda path: unpack(fmu, path))
 
 
+PLAIN = ("plain", ("-g",))
+WITHOUT_VECTORS = ("without-vectors", ("-DPRBM_PLAIN",))
+"""Names and options of libraries that several tests use: see :func:`kernel_library`."""
+
+
 @cache
 def kernel_library(
     name: str, flags: tuple[str, ...], compiler: str = "cc", host: Host = NATIVE, target: str = ""

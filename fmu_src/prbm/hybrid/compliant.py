@@ -22,7 +22,7 @@ from ..base.tolerances import (
     TOUCH_STEP_FACTOR,
 )
 from ..mechanics.arrays import Real
-from ..mechanics.compliant_stops import Extra
+from ..mechanics.compliant_stops import CompliantState
 from ..mechanics.contact_state import Phase, Touching
 from ..mechanics.inputs import Wall
 from ..mechanics.kinetics import kinetic_energy
@@ -109,8 +109,8 @@ def _touching(
         Touch(
             front.time,
             counted,
-            float(extras[own.index(stop, Extra.IMPULSE)]),
-            float(extras[own.index(stop, Extra.LOSS)]),
+            float(extras[own.index(stop, CompliantState.IMPULSE)]),
+            float(extras[own.index(stop, CompliantState.LOSS)]),
             tuple(front.q.tolist()),
             tuple(front.v.tolist()),
             momentum,
@@ -290,7 +290,8 @@ def _settled(
     loss = kinetic_energy(front.at.M, rest.front.v) - kinetic_energy(front.at.M, slow.v)
     y = slow.y.copy()
     y[2 * front.equations.n] += loss
-    y[2 * front.equations.n + 2 + front.equations.compliant.index(stop, Extra.LOSS)] += loss
+    lost = front.equations.compliant.index(stop, CompliantState.LOSS)
+    y[2 * front.equations.n + 2 + lost] += loss
     slow, impacts = _finished(configuration, replace(slow, y=y), stop)
     touch = slow.touches[stop]
     assert touch is not None
@@ -337,8 +338,8 @@ def fold_gives(front: Front, stops: Sequence[int]) -> tuple[Front, tuple[Wall, .
     own, n, y = front.equations.compliant, front.equations.n, front.y.copy()
     walls = list(front.inputs.walls)
     for i in stops:
-        at = 2 * n + 2 + own.index(i, Extra.GIVE)
-        rate = 2 * n + 2 + own.index(i, Extra.GIVE_RATE)
+        at = 2 * n + 2 + own.index(i, CompliantState.GIVE)
+        rate = 2 * n + 2 + own.index(i, CompliantState.GIVE_RATE)
         walls[i] = walls[i].displaced(float(y[at])).pushed(front.time, float(y[rate]))
         y[at] = y[rate] = 0.0
     return replace(front, y=y), tuple(walls)
@@ -358,8 +359,8 @@ def _finished(configuration: Configuration, front: Front, stop: int) -> tuple[Fr
     latched = replace(
         old,
         rebound_speed=float(rates[stop]),
-        impulse=float(extras[own.index(stop, Extra.IMPULSE)]) - touch.impulse,
-        energy_lost=float(extras[own.index(stop, Extra.LOSS)]) - touch.loss,
+        impulse=float(extras[own.index(stop, CompliantState.IMPULSE)]) - touch.impulse,
+        energy_lost=float(extras[own.index(stop, CompliantState.LOSS)]) - touch.loss,
         contact_duration=front.time - touch.time,
         modal_restitution=_modal_restitution(front, touch),
     )

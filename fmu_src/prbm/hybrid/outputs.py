@@ -6,7 +6,7 @@ import numpy as np
 
 from ..mechanics import contact, forces
 from ..mechanics.arrays import Complex, Real
-from ..mechanics.compliant_stops import Extra
+from ..mechanics.compliant_stops import CompliantState
 from ..mechanics.dynamics import Equations, Evaluation, base_reaction
 from ..mechanics.kinetics import kinetic_energy
 from ..mechanics.stress import stresses
@@ -70,8 +70,8 @@ def all_outputs(
         names = LATCHED + (COMPLIANT if stop.compliant else ())
         out |= {f"{stop.name}.{name}": getattr(latched[i], name) for name in names}
         if stop.compliant:
-            out[f"{stop.name}.impulse_sum"] = float(extras[own.index(i, Extra.IMPULSE)])
-            out[f"{stop.name}.contact_loss"] = float(extras[own.index(i, Extra.LOSS)])
+            out[f"{stop.name}.impulse_sum"] = float(extras[own.index(i, CompliantState.IMPULSE)])
+            out[f"{stop.name}.contact_loss"] = float(extras[own.index(i, CompliantState.LOSS)])
     out |= _links(system, q, v)
     out |= _stress(equations, peaks, q, v, evaluation)
     out |= others

@@ -34,7 +34,7 @@ from ..base.tolerances import (
     STEP_TREND_FACTOR,
 )
 from ..mechanics.arrays import Real
-from ..mechanics.compliant_stops import Extra
+from ..mechanics.compliant_stops import CompliantState
 from ..mechanics.dynamics import Equations, Evaluation
 from .configuration import Configuration, Scales
 from .front import Front
@@ -346,7 +346,7 @@ def contact_error(
         touching = equations.contacts.touching[i]
         assert touching is not None
         speed = touching.reference_speed
-        give = 2 * n + 2 + own.index(i, Extra.GIVE)
+        give = 2 * n + 2 + own.index(i, CompliantState.GIVE)
         depth = max(
             abs(float(rows[i] @ (y1[:n] - y[:n]))), speed * h, INDENTATION_MIN_RTOL * scales.length
         )

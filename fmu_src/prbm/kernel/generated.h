@@ -256,7 +256,7 @@ typedef enum {
     EXTRA_GIVE_RATE = 1,
     EXTRA_IMPULSE = 2,
     EXTRA_LOSS = 3,
-} Extra;
+} CompliantState;
 enum { EXTRA_STATES = 4 };
 
 /* --- prbm.interface.variables ------------------------------------------------------------------- */

@@ -36,7 +36,7 @@ from ..interface.variables import (
     STRESS_OUTPUTS,
     STRETCH_OUTPUTS,
 )
-from ..mechanics.compliant_stops import COMPLIANT_STATES, Extra
+from ..mechanics.compliant_stops import COMPLIANT_STATES, CompliantState
 from ..mechanics.contact_state import ContactMode, Phase
 from ..mechanics.inputs import BASE_AXES, INPUT_GROUPS, LOADS, WALL_INPUTS
 from ..mechanism.flexure import (
@@ -94,9 +94,9 @@ def header() -> str:
         ),
         _section(tables, _tables()),
         _section(
-            sys.modules[Extra.__module__],
+            sys.modules[CompliantState.__module__],
             [
-                _enumeration("Extra", "EXTRA", {m.name: m for m in Extra}),
+                _enumeration("CompliantState", "EXTRA", {m.name: m for m in CompliantState}),
                 _constant("EXTRA_STATES", COMPLIANT_STATES),
             ],
         ),

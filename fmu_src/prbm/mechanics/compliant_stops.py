@@ -23,7 +23,7 @@ from .inputs import Inputs
 COMPLIANT_STATES = 4
 
 
-class Extra(IntEnum):
+class CompliantState(IntEnum):
     """The index of each state of a compliant stop."""
 
     GIVE = 0
@@ -79,11 +79,11 @@ class CompliantStops:
         self.laws = {i: law_of(mechanism, values, i) for i in self.stops}
         self.size = COMPLIANT_STATES * len(self.stops)
 
-    def index(self, stop: int, extra: Extra) -> int:
+    def index(self, stop: int, extra: CompliantState) -> int:
         """Return the index of a state of a compliant stop behind the energies."""
         return COMPLIANT_STATES * self.stops.index(stop) + extra
 
-    def add_gives(self, extras: Real | None, x: Real, extra: Extra) -> None:
+    def add_gives(self, extras: Real | None, x: Real, extra: CompliantState) -> None:
         """Add the displacements of the walls by contact forces, or their rates, to x (..., s)."""
         if extras is not None and self.stops:
             x[..., self.stops] += extras[..., extra::COMPLIANT_STATES]
@@ -110,10 +110,10 @@ class CompliantStops:
         result = np.zeros(self.size)
         for k, i in enumerate(self.stops):
             at = COMPLIANT_STATES * k
-            result[at + Extra.GIVE] = extras[at + Extra.GIVE_RATE]
+            result[at + CompliantState.GIVE] = extras[at + CompliantState.GIVE_RATE]
             if i in self.pressed:
-                result[at + Extra.GIVE_RATE] = inputs.mobilities[i] * normal[i]
-            result[at + Extra.IMPULSE] = normal[i]
+                result[at + CompliantState.GIVE_RATE] = inputs.mobilities[i] * normal[i]
+            result[at + CompliantState.IMPULSE] = normal[i]
         return result
 
     def energy(self, gaps: Real) -> float:

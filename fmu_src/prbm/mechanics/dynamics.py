@@ -19,7 +19,7 @@ import numpy as np
 from ..mechanism.parts import value
 from . import constraints, forces
 from .arrays import Complex, Real
-from .compliant_stops import CompliantStops, Extra, Pressure
+from .compliant_stops import CompliantState, CompliantStops, Pressure
 from .contact_state import ContactMode, ContactState
 from .inputs import Inputs
 from .kinetics import kinetic_energy, mass_accelerations
@@ -380,14 +380,14 @@ class Equations:
         """
         walls = np.array([wall.motion(t)[0] for wall in self.inputs.walls]).T
         result: Real = self.system.gap_rows.values(e) + walls
-        self.compliant.add_gives(extras, result, Extra.GIVE)
+        self.compliant.add_gives(extras, result, CompliantState.GIVE)
         return result
 
     def gap_rates(self, t: float | Real, e: Complex, v: Real, extras: Real | None = None) -> Real:
         """Return the rates of all gaps [m/s]; arguments may be stacks, as for :meth:`gaps`."""
         walls = np.array([wall.motion(t)[1] for wall in self.inputs.walls]).T
         result: Real = self.system.gap_rows.rates(e, v) + walls
-        self.compliant.add_gives(extras, result, Extra.GIVE_RATE)
+        self.compliant.add_gives(extras, result, CompliantState.GIVE_RATE)
         return result
 
     def gap_accelerations(
@@ -527,10 +527,10 @@ def add_compliant_rates(
     if pressure is None:
         return
     for i, force, loss in zip(equations.pressed, pressure.force, pressure.loss, strict=True):
-        give_rate = extras[own.index(i, Extra.GIVE_RATE)]
+        give_rate = extras[own.index(i, CompliantState.GIVE_RATE)]
         result[2 * n] += loss
         result[2 * n + 1] -= force * (inputs.walls[i].motion(t)[1] + give_rate)
-        result[2 * n + 2 + own.index(i, Extra.LOSS)] = loss
+        result[2 * n + 2 + own.index(i, CompliantState.LOSS)] = loss
 
 
 def base_reaction(equations: Equations, q: Real, v: Real, a: Real) -> tuple[complex, float]:

@@ -6,6 +6,7 @@ file has its old or its new content, a full disk is reported without a traceback
 succeeds.
 """
 
+import importlib.util
 import json
 import os
 import shutil
@@ -19,7 +20,7 @@ from typing import Any
 
 import prbm
 from c_importer import compile_c, host_fmu
-from prbm.kernel.compiler import ENGINE, HOST, libraries
+from prbm.kernel.compiler import ENGINE, HOST, browser_module, libraries
 from shared import once
 
 from .report import Part
@@ -48,8 +49,34 @@ def environment(**changes: str | None) -> dict[str, str]:
     return {name: value for name, value in result.items() if value is not None}
 
 
+ZIG = """
+import shutil, sys
+assert "wasm32" in sys.argv[sys.argv.index("-target") + 1], sys.argv
+shutil.copy(__file__.replace("__main__.py", "module.wasm"), sys.argv[sys.argv.index("-o") + 1])
+"""
+"""A program instead of ziglang that copies the module of live pages."""
+
+
+def _compilers(folder: Path) -> dict[str, str]:
+    """Return variables that name compilers that copy compiled libraries: they take no time."""
+    return {"CC": _compiler(folder), "PYTHONPATH": os.pathsep.join([_zig(folder), str(SOURCES)])}
+
+
+def _zig(folder: Path) -> str:
+    """Return a folder of modules with a package instead of ziglang, if that is installed."""
+    modules = folder / "modules"
+    modules.mkdir()
+    if importlib.util.find_spec("ziglang"):
+        package = modules / "ziglang"
+        package.mkdir()
+        (package / "__init__.py").touch()
+        (package / "__main__.py").write_text(ZIG, encoding="utf-8")
+        (package / "module.wasm").write_bytes(browser_module())
+    return str(modules)
+
+
 def _compiler(folder: Path) -> str:
-    """Return a compiler that copies compiled libraries: it takes no time."""
+    """Return a compiler that copies the libraries for this machine."""
     with zipfile.ZipFile(host_fmu("PRBDM", 2)) as archive:
         name = next(n for n in archive.namelist() if n.endswith(".so"))
         (folder / "kernel.so").write_bytes(archive.read(name))
@@ -93,7 +120,7 @@ def searched(command: str, points: int) -> dict[str, Any]:
         done = subprocess.run(
             [sys.executable, WORKER, file], capture_output=True, text=True, check=False,
             timeout=SECONDS_MAX,
-            env=environment(LD_PRELOAD=job["fault"], CC=_compiler(base), **cache),
+            env=environment(LD_PRELOAD=job["fault"], **_compilers(base), **cache),
         )  # fmt: skip
     if done.returncode:
         return {"faults": 0, "failures": [f"{command}: {done.stderr[-1000:]}"]}
@@ -115,7 +142,7 @@ def two_writers() -> list[str]:
     """Run the same exports at once into one folder, with one empty cache."""
     with tempfile.TemporaryDirectory(prefix="prbm_faults_") as name:
         out = Path(name) / "out"
-        env = environment(CC=_compiler(Path(name)), XDG_CACHE_HOME=str(Path(name) / "cache"))
+        env = environment(**_compilers(Path(name)), XDG_CACHE_HOME=str(Path(name) / "cache"))
         processes = [
             subprocess.Popen(
                 [sys.executable, "-m", BUILD, *NATIVE, "--out", str(out)], env=env,
@@ -147,12 +174,14 @@ def without_rights(case: str) -> list[str]:
         out.mkdir()
         home.mkdir(mode=0o555)
         changes: dict[str, str | None] = {
-            "XDG_CACHE_HOME": None, "MPLCONFIGDIR": None, "CC": _compiler(base),
+            "XDG_CACHE_HOME": None, "MPLCONFIGDIR": None,
             "HOME": str(home if case == "read-only home" else base / "none"),
         }  # fmt: skip
         if case == "no compiler":
             (base / "bin").mkdir()
             changes |= {"PATH": str(base / "bin"), "CC": None, "XDG_CACHE_HOME": str(base / "no")}
+        else:
+            changes |= _compilers(base)
         simulated = command(
             SIMULATE, ["simulate", "PRBDM", "--stop-time", "0.01", "--out", str(out)], before,
             **changes,

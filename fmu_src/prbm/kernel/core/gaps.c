@@ -1,7 +1,7 @@
 /* Gaps of the stops, their rates and their accelerations: as in mechanics/dynamics.py. */
 #include "core/gaps.h"
 
-PRBM double give_of(const Equations *eq, int i, const double *extra, Extra which) {
+PRBM double give_of(const Equations *eq, int i, const double *extra, CompliantState which) {
     if (extra == NULL) {
         return 0.0;
     }
