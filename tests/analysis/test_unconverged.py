@@ -41,17 +41,6 @@ def test_a_jump_of_the_holding_force_through_zero_is_not_a_rest_position(monkeyp
         equilibria.rest_positions(system, [0.0, 5e-3])
 
 
-def test_a_snap_through_that_is_not_found_is_rejected(monkeypatch):
-    def short(function, bounds, method, options):
-        return minimize(function, bounds=bounds, method=method, options=options | {"maxiter": 2})
-
-    minimize = equilibria.minimize_scalar
-    monkeypatch.setattr(equilibria, "minimize_scalar", short)
-    system = bistable()
-    with pytest.raises(EquilibriumError, match="the largest holding force between 0 and"):
-        equilibria.snap(system, 0.0, system.values["strut.rise"])
-
-
 def test_a_valley_whose_fits_do_not_converge_is_rejected(monkeypatch):
     free = [Free("K_theta1", 1.0, 9.0), Free("K_theta2", 1.0, 9.0)]
     free = [Free(f"flexure.{one.name}", one.lower, one.upper) for one in free]

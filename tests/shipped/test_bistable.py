@@ -58,10 +58,13 @@ def test_snap_force_is_the_extremum_of_the_closed_form() -> None:
     minimum = minimize_scalar(
         lambda d: -force(d), bounds=(0, RISE), method="bounded", options=options
     )
-    d, largest = snap(SYSTEM, 0.0, RISE)
+    found = snap(SYSTEM, 0.0, RISE)
+    assert found is not None
+    d, largest = found
     assert largest == pytest.approx(-minimum.fun, rel=1e-12)
     assert d == pytest.approx(minimum.x, abs=1e-7)  # The extremum is flat.
-    back = snap(SYSTEM, RISE, 2 * RISE)
+    back = snap(SYSTEM, 2 * RISE, RISE)
+    assert back is not None
     assert back[1] == pytest.approx(-largest, rel=1e-9)
 
 

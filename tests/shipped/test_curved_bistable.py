@@ -8,9 +8,12 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import root
 
+from kernel_simulation import KernelSimulation
+from prbm.analysis.holding import curve
+from prbm.files.mechanism_file import load
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.statics import equilibrium
-from support import mechanism
+from support import ROOT, mechanism
 
 BISTABLE = mechanism("CurvedBistable")
 RISE = 3.2e-3
@@ -103,3 +106,48 @@ def test_tall_beams_need_the_order_5():
         excess.append(max(found) / peak - 1.0)
     assert 0.05 < excess[0] < 0.095
     assert abs(excess[1]) < 2e-3
+
+
+@pytest.mark.slow
+def test_a_force_that_grows_snaps_the_mechanism_where_its_shape_becomes_unstable():
+    """Under 0.5 % less than the force the shuttle stays, under 0.5 % more it snaps.
+
+    A moment breaks the symmetry: the beams buckle before the force has its largest value.
+    """
+    system = of_order(3, **{"pom.density": BISTABLE.values()["pom.density"]})
+    held = curve(system, np.linspace(-0.2e-3, 6.5e-3, 21))
+    near, middle, far = (rest.displacement for rest in held.rests)
+    (place, force), back = held.snaps
+    assert near < place < middle < back[0] < far
+    assert force < 0.97 * max(point.force for point in held.points)
+    for share, snaps in ((0.995, False), (1.005, True)):
+        sim = KernelSimulation(
+            BISTABLE, {"gravity.y": 0.0, "release.velocity": 0.0, "damping.beta": 5e-4}
+        )
+        snapped = False
+        for k in range(1, 201):
+            load = share * force * min(1.0, k / 50)
+            sim.set({"force.y": -load, "force.moment": 1e-5})
+            sim.advance(2e-3 * k)
+            snapped = sim.outputs()["shuttle.y"] < -1.5 * place
+            if snapped:
+                break
+        assert snapped is snaps
+
+
+def test_a_double_curved_beam_buckles_at_the_force_of_shallow_arches():
+    """Theory of shallow arches gives 743.2 EI h/l^3 for each of two beams [1].
+
+    The model with four half beams has a first crossing at 734 to 737, at 0.153 to 0.154 h.
+
+    [1] J. Qiu, J. H. Lang, A. H. Slocum, J. Microelectromech. Syst. 13 (2004) 137.
+    """
+    double = load(ROOT / "tests" / "cases" / "qiu10.toml")
+    held = curve(assemble(double, double.values()), np.linspace(-5e-6, 0.13e-3, 28))
+    EI, h, span = 169e9 * 0.49e-3 * 6e-6**3 / 12, 60e-6, 3e-3
+    (place, force), *_ = held.snaps
+    assert 734 < force / 2 / (EI * h / span**3) < 737.5
+    assert 0.153 < place / h < 0.155
+    # Beyond, the shapes that are followed have no neighbour; those before are kept.
+    assert "cannot be reached" in str(held.ended)
+    assert [rest.stable for rest in held.rests] == [True, False]

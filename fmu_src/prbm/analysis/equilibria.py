@@ -1,7 +1,7 @@
 """Holding force over the displacement of a held body, and its rest positions.
 
-The displacement is given, not the force.  The curve then continues through the extrema of the
-force, where a mechanism under a given load snaps through.
+The displacement is given, not the force.  The curve then continues beyond the shapes at which a
+mechanism under a given load snaps.
 """
 
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import bisect, brentq
 
 from ..base.errors import EquilibriumError
 from ..mechanics.arrays import Real
@@ -18,6 +18,8 @@ from ..mechanics.statics import Equilibrium, equilibrium
 from ..mechanics.system import System
 
 DISPLACEMENT_RTOL = 1e-12  # Of the size: tolerance of the displacement of a rest position.
+SNAP_INTERVALS = 32  # Between rest positions, in which the loss of stability is searched.
+SNAP_RTOL = 1e-8  # Of the size: tolerance of the displacement of a snap-through.
 REST_FORCE_RTOL = 1e-6  # Of the forces at the ends of the interval: accepted as zero.
 
 
@@ -116,36 +118,50 @@ def _zero_force(system: System, low: float, high: float, largest: float) -> floa
     return float(place)
 
 
-def snap(system: System, low: float, high: float) -> tuple[float, float]:
-    """Return the holding force of largest magnitude between two rest positions.
+def snap(system: System, start: float, end: float) -> tuple[float, float] | None:
+    """Return where a mechanism that a growing force moves from a stable rest position snaps.
 
-    Under a growing load, the mechanism snaps through when the load reaches this force.
+    The holding force is replaced by a dead load of the same size.  The mechanism snaps where the
+    shape becomes unstable under this load: at an extremum of the force, or before it where the
+    mechanism buckles out of the shapes that are followed.
 
     Parameters
     ----------
     system : System
         The mechanism.
-    low, high : float
-        Displacements of neighbouring rest positions [m], or rotations [rad].
+    start : float
+        Displacement of a stable rest position [m], or its rotation [rad].
+    end : float
+        Displacement of the next rest position, on either side.
 
     Returns
     -------
-    displacement, force : float
-        Displacement [m] and holding force [N], or rotation [rad] and holding moment [N m].
+    (displacement, force) or None
+        Displacement [m] and force [N], or rotation [rad] and moment [N m]; None if all shapes
+        between the rest positions are stable.
 
     Raises
     ------
     EquilibriumError
-        If no static shape with one of the displacements is found, or the search does not converge.
+        If no static shape with one of the displacements is found.
     """
-    found = minimize_scalar(
-        lambda d: -abs(holding_force(system, d)), bounds=(low, high), method="bounded",
-        options={"xatol": 1e-9 * system.length},
-    )  # fmt: skip
-    if not found.success:
-        unit = "rad" if system.mechanism.release.turns else "m"
-        raise EquilibriumError(
-            f"the largest holding force between {low:g} and {high:g} {unit} was not found: "
-            f"{found.message} Narrow the range of displacements"
+    before = start
+    for after in np.linspace(start, end, SNAP_INTERVALS + 1)[1:]:
+        if _stability(system, float(after)) < 0.0:
+            break
+        before = float(after)
+    else:
+        return None
+    # Bisection hardly comes near the root itself, where the equations of the shape are singular.
+    place = float(
+        bisect(
+            lambda d: _stability(system, d), before, float(after), xtol=SNAP_RTOL * system.length
         )
-    return float(found.x), holding_force(system, float(found.x))
+    )
+    return place, holding_force(system, place)
+
+
+def _stability(system: System, displacement: float) -> float:
+    """Return the lowest f |f| of a held shape under its force as a dead load [Hz^2]."""
+    lowest = float(modes(system, equilibrium(system, displacement)).frequency[0])
+    return lowest * abs(lowest)

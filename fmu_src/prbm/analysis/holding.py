@@ -9,7 +9,6 @@ displacement d the holding force is F(d) and the position of the point z(d).  Th
 where ``across`` is the error of a straight-line guide.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -20,11 +19,14 @@ from ..base.errors import EquilibriumError
 from ..base.progress import Progress
 from ..mechanics.arrays import Real
 from ..mechanics.modal import modes
-from ..mechanics.statics import Equilibrium, equilibrium, free_displacement, held_by_loops
+from ..mechanics.statics import (
+    Equilibrium,
+    equilibrium,
+    free_displacement,
+    holding_stiffness,
+)
 from ..mechanics.system import System, unit
-from .equilibria import RestPosition, holding_force, rest_positions, snap
-
-DIFFERENCE_STEP = 1e-5  # Step of the stiffness, as a share of the size, or of one radian.
+from .equilibria import RestPosition, rest_positions, snap
 
 
 @dataclass(frozen=True)
@@ -64,21 +66,9 @@ def _described(system: System, displacement: float, shape: Equilibrium) -> Held:
     frame, e = system.released, system.directions(shape.q)
     moved = unit(release.direction).conjugate() * complex(frame.c + frame.A @ e - frame.drawn)
     return Held(
-        displacement, shape.force, _stiffness(system, displacement), moved.imag,
+        displacement, shape.force, holding_stiffness(system, shape), moved.imag,
         float(shape.q[frame.j]), float(modes(system, shape).frequency[0]),
     )  # fmt: skip
-
-
-def _stiffness(system: System, displacement: float) -> float:
-    """Return the derivative of the holding force by the displacement [N/m]."""
-    step = DIFFERENCE_STEP * (1.0 if system.mechanism.release.turns else system.length)
-    try:
-        behind, ahead = (holding_force(system, displacement + k * step) for k in (-1, 1))
-    except EquilibriumError:
-        if not held_by_loops(system):
-            raise
-        return math.nan
-    return (ahead - behind) / (2 * step)
 
 
 def held(system: System, displacement: float) -> Held:
@@ -114,13 +104,16 @@ class Curve:
     rests : tuple of RestPosition
         Rest positions, in the order of the displacements.
     snaps : tuple of (float, float)
-        Displacement [m] and holding force [N] of largest magnitude between each pair of
-        neighbouring rest positions.  Under a growing load the mechanism snaps through there.
+        Displacement [m] and holding force [N] at which a growing load that moves the mechanism
+        from a stable rest position towards a neighbouring one makes it snap.
+    ended : str or None
+        Why the curve ends before the last displacement; None: it does not.
     """
 
     points: tuple[Held, ...]
     rests: tuple[RestPosition, ...]
     snaps: tuple[tuple[float, float], ...]
+    ended: str | None = None
 
 
 def curve(
@@ -141,14 +134,28 @@ def curve(
     Raises
     ------
     EquilibriumError
-        If no static shape with one of the displacements is found, or a search for a rest position
-        or a snap-through fails.
+        If no static shape with one of the first two displacements is found, or the search for a
+        rest position fails.
     """
-    points = []
+    points: list[Held] = []
+    ended = None
     for x in displacements:
-        points.append(held(system, float(x)))
+        try:
+            points.append(held(system, float(x)))
+        except EquilibriumError as error:
+            if len(points) < 2:
+                raise
+            ended = str(error)
+            break
         if progress is not None:
             progress(len(points) / len(displacements))
-    found = rest_positions(system, displacements, np.array([point.force for point in points]))
-    between = (snap(system, a.displacement, b.displacement) for a, b in pairwise(found))
-    return Curve(tuple(points), tuple(found), tuple(between))
+    found = rest_positions(
+        system, displacements[: len(points)], np.array([point.force for point in points])
+    )
+    snaps = [
+        snap(system, start.displacement, end.displacement)
+        for pair in pairwise(found)
+        for start, end in (pair, pair[::-1])
+        if start.stable
+    ]
+    return Curve(tuple(points), tuple(found), tuple(x for x in snaps if x is not None), ended)

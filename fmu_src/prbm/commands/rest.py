@@ -65,7 +65,12 @@ def _range(
     every = -(-options.points // 11)
     _print(head, curve.points[::every], system)
     if every > 1:
-        print(f"every {every}th of {options.points} points; write all with --out DIR")
+        print(f"every {every}th of {len(curve.points)} points; write all with --out DIR")
+    if curve.ended:
+        print(
+            f"the curve ends at {unit.factor * curve.points[-1].displacement:.6g} {unit.shown}: "
+            f"{curve.ended}"
+        )
     for rest in curve.rests:
         _print_rest(rest.displacement, rest.stable, system)
     if not curve.rests:

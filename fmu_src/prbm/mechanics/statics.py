@@ -438,6 +438,38 @@ def _on_pivot(system: System, name: str) -> bool:
     )
 
 
+def holding_stiffness(system: System, shape: Equilibrium) -> float:
+    """Return the derivative of the holding force by the displacement at a shape.
+
+    Parameters
+    ----------
+    system : System
+        The mechanism.
+    shape : Equilibrium
+        Shape with this holding force.
+
+    Returns
+    -------
+    float
+        Stiffness [N/m]; [N m/rad] if the release is by an angle; NaN where the loops or a body
+        without stiffness leave it undetermined.
+    """
+    n, turns = system.n, system.mechanism.release.turns
+    unit = system.length if turns else 1.0
+    B = np.vstack([system.loops, system.holding_row(shape.q)])
+    lam = np.append(shape.lam, shape.force / unit)
+    e = system.directions(shape.q)
+    rows = system.gradient(B, e)
+    K_t = tangent_stiffness(system.K, shape.load, B, lam, e, system.arm, system.Phi)
+    right = np.zeros(n + len(B))
+    right[-1] = unit
+    try:
+        change = constraints.solve(constraints.saddle(K_t, rows, rows), right, n, system.length)
+    except SimulationError:
+        return math.nan
+    return -unit * float(change[-1])
+
+
 def _left_by_loops(system: System, e: Complex, rows: Real) -> float:
     """Return the largest entry of rows (k, n) without their components along the loops' rows."""
     loops = system.loop_rows.jacobian(e)
