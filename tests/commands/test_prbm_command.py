@@ -190,6 +190,39 @@ def test_rest_positions_and_snap_through_of_the_bistable_mechanism_are_symmetric
     assert forces[3] == pytest.approx(-forces[4], rel=1e-9)
 
 
+def test_small_loads_on_a_loaded_body_have_its_compliance_and_stiffness(capsys):
+    """The stiffness along the release is that of the table of held shapes."""
+    line = "equilibrium CurvedBistable --load force.y=-5N --stiffness shuttle --out ."
+    assert run(line) == cli.OK
+    matrices, shape = table("CurvedBistable-stiffness.csv"), table("CurvedBistable-equilibrium.csv")
+    rows = np.array([matrices[x] for x in ("x", "y", "angle")], float).T
+    C, K = rows[:3], rows[3:]
+    assert matrices["matrix"] == 3 * ["compliance"] + 3 * ["stiffness"]
+    np.testing.assert_allclose(K @ C, np.eye(3), atol=1e-9)
+    stiffness = float(shape["stiffness [N/m]"][0])
+    assert 1.0 / C[1, 1] == pytest.approx(stiffness, rel=1e-9)
+    places = table("CurvedBistable-positions.csv")
+    assert float(places["y [m]"][0]) == pytest.approx(-float(shape["displacement [m]"][0]))
+    assert "small loads on shuttle at its centre of mass" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("--load force.z=1", "the loads are force.x, force.y, force.moment"),
+        ("--load force.y", "give name=value"),
+        ("--stiffness foo", "the bodies are shuttle"),
+        ("--at shuttle.top", "give both"),
+        ("--stiffness shuttle --at shuttle.foo", "--at refers to the point 'shuttle.foo'"),
+        ("--stiffness shuttle --at ground.upper_left", "give a point of shuttle"),
+        ("--load force.y=1 --from 0mm --to 1mm", "exclude --from and --to"),
+    ],
+)
+def test_wrong_loads_and_bodies_are_named(line, message, capsys):
+    assert run(f"equilibrium CurvedBistable {line}") != cli.OK
+    assert message in capsys.readouterr().err
+
+
 def test_written_simulation_obeys_the_impact_law_and_keeps_the_energy(capsys):
     """Rebound over approach speed is the restitution; the energy loss is in proportion to v^2."""
     line = "simulate PRBDM --set stop.restitution=0.5 --stop-time 150ms --step 1ms --out new/place"

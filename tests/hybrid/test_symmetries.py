@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from kernel_simulation import KernelSimulation
+from moved_drawings import moved
 from prbm.mechanism.description import Mechanism
 from random_mechanisms import seeded
 
@@ -14,50 +15,6 @@ SHIFT = 0.37 - 0.21j
 END = 4e-3  # s; later impacts amplify differences of the coordinates in the error control.
 TOLERANCE = 1e-11
 COMPARED = ("gap", "gap_rate", "force", "point.mobility", "impact_count", "approach_speed")
-
-
-def moved(given: Mechanism, place, *, turn: float = 0.0, sign: float = 1.0) -> Mechanism:
-    """Return a mechanism whose points are moved by ``place``, with a turn [deg] and a sign."""
-
-    def point(z):
-        if z is None:
-            return None
-        new = place(complex(*z))
-        return (new.real, new.imag)
-
-    def direction(part, **changes):
-        return replace(
-            part, point=point(part.point), direction=sign * part.direction + turn, **changes
-        )
-
-    along = place(complex(*given.gravity)) - place(0j)
-    return replace(
-        given,
-        ground={name: point(z) for name, z in given.ground.items()},
-        bodies=tuple(
-            replace(
-                body,
-                centre=point(body.centre),
-                points={name: point(z) for name, z in body.points.items()},
-            )
-            for body in given.bodies
-        ),
-        flexure_types=tuple(
-            replace(
-                kind,
-                curvature=None if kind.curvature is None else sign * kind.curvature,
-                rise=None if kind.rise is None else sign * kind.rise,
-            )
-            for kind in given.flexure_types
-        ),
-        stops=tuple(direction(stop, offset=sign * stop.offset) for stop in given.stops),
-        frictions=tuple(
-            direction(rub, normal_stiffness=sign * rub.normal_stiffness) for rub in given.frictions
-        ),
-        forces=tuple(replace(force, point=point(force.point)) for force in given.forces),
-        release=direction(given.release),
-        gravity=(along.real, along.imag),
-    )
 
 
 def turned(given: Mechanism) -> Mechanism:

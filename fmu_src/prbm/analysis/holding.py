@@ -22,7 +22,6 @@ from ..mechanics.modal import modes
 from ..mechanics.statics import (
     Equilibrium,
     equilibrium,
-    free_displacement,
     holding_stiffness,
 )
 from ..mechanics.system import System, unit
@@ -60,8 +59,18 @@ class Held:
     frequency: float
 
 
-def _described(system: System, displacement: float, shape: Equilibrium) -> Held:
-    """Return a held shape with its stiffness and frequency."""
+def described(system: System, displacement: float, shape: Equilibrium) -> Held:
+    """Return a held shape with its stiffness and frequency.
+
+    Parameters
+    ----------
+    system : System
+        The mechanism.
+    displacement : float
+        Displacement of the released point [m], or rotation of its body [rad].
+    shape : Equilibrium
+        The shape.
+    """
     release = system.mechanism.release
     frame, e = system.released, system.directions(shape.q)
     moved = unit(release.direction).conjugate() * complex(frame.c + frame.A @ e - frame.drawn)
@@ -79,18 +88,7 @@ def held(system: System, displacement: float) -> Held:
     EquilibriumError
         If no static shape with this displacement is found.
     """
-    return _described(system, displacement, equilibrium(system, displacement))
-
-
-def free(system: System) -> Held:
-    """Return the shape at rest under gravity without stops or holding force.
-
-    Raises
-    ------
-    EquilibriumError
-        If no static shape is found.
-    """
-    return _described(system, free_displacement(system), equilibrium(system))
+    return described(system, displacement, equilibrium(system, displacement))
 
 
 @dataclass(frozen=True)

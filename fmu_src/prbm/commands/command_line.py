@@ -191,12 +191,17 @@ def _equilibrium(commands: Commands) -> None:
             "prbm equilibrium PRBDM2R",
             "prbm equilibrium PRBDM2R --held -10 -5 5 10 mm",
             "prbm equilibrium Bistable --from -2mm --to 26mm --out curve",
+            "prbm equilibrium CurvedBistable --load force.y=-5N --stiffness shuttle",
         ),
     )  # fmt: skip
     mechanism_argument(parser)
     add = parser.add_argument
     text = "displacements [m] or angles [rad] at which the body is held"
     add("--held", nargs="+", metavar="X", help=text)
+    text = "forces [N] and moments [N m], such as force.y=-5N"
+    add("--load", nargs="+", metavar="NAME=X", help=text)
+    add("--stiffness", metavar="BODY", help="print the compliance and stiffness matrix of a body")
+    add("--at", metavar="BODY.POINT", help="point of --stiffness (default: the centre of mass)")
     add("--from", dest="start", metavar="A", help="first displacement of a force curve [m]")
     add("--to", dest="end", metavar="B", help="last displacement of the force curve [m]")
     add(

@@ -3,21 +3,30 @@
 import argparse
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ..analysis import holding
 from ..base.progress import reporter
 from ..files.settings import UserMistake, quantities, quantity
-from ..mechanics.statics import immobile
-from ..mechanics.system import System
+from ..mechanics.assembly import assemble
+from ..mechanics.body_compliance import RIGID_RTOL, compliance_matrix, stiffness_matrix
+from ..mechanics.inputs import LOADS
+from ..mechanics.statics import Equilibrium, equilibrium, immobile
+from ..mechanics.system import FIXED, BodyFrame, System
 from ..mechanism.description import Mechanism
+from ..mechanism.parts import Probe
 from ..plots.holding import holding_figure
 from ..runs.released import released_label
 from .output import Output, aligned
-from .systems import HeldUnit, assembled, check_held, held_scale, held_unit, rounded
+from .systems import ZERO_RTOL, HeldUnit, assembled, check_held, held_scale, held_unit, rounded
 
 POINTS_MAX = 100_000
+MATRIX_UNITS = {  # Heads of the columns and of the rows.
+    "compliance": (("1 N along x", "1 N along y", "1 N m"), ("x [m]", "y [m]", "angle [rad]")),
+    "stiffness": (("1 m along x", "1 m along y", "1 rad"), ("x [N]", "y [N]", "moment [N m]")),
+}
 
 
 def rest_positions(options: argparse.Namespace) -> None:
@@ -29,23 +38,121 @@ def rest_positions(options: argparse.Namespace) -> None:
         raise UserMistake("--from and --to: give both ends of the range")
     if ranged != (None, None) and options.held:
         raise UserMistake("--held excludes --from and --to: give one or the other")
+    if ranged != (None, None) and (options.load or options.stiffness):
+        raise UserMistake("--load and --stiffness exclude --from and --to: give one or the other")
+    if options.at and not options.stiffness:
+        raise UserMistake("--at is the point of --stiffness BODY: give both")
     unit = held_unit(mechanism)
     head = f"{mechanism.name}: {unit.amount} of {_held(mechanism)}, from straight; " + (
         "gravity acts" if system.gravity else "no gravity acts"
     )
     if ranged != (None, None):
         _range(options, mechanism, system, output, head)
-    elif options.held:
-        displacements = quantities(options.held, unit.si, "--held")
-        points = [holding.held(system, check_held(x, system, "--held")) for x in displacements]
-        _print(head, points, system)
-        output.table(f"{mechanism.name}-equilibrium.csv", _csv_head(unit), _rows(points))
     else:
-        rest = holding.free(system)
-        _print(head, [rest], system)
-        _print_rest(rest.displacement, rest.frequency > 0.0, system)
-        output.table(f"{mechanism.name}-equilibrium.csv", _csv_head(unit), _rows([rest]))
+        _shapes(options, mechanism, system, output, head)
     output.write()
+
+
+def _shapes(
+    options: argparse.Namespace, mechanism: Mechanism, system: System, output: Output, head: str
+) -> None:
+    """Print single shapes under loads, held or free, with the places of all bodies and probes."""
+    unit, loads = held_unit(mechanism), _loads(options, mechanism)
+    held = [
+        check_held(x, system, "--held")
+        for x in (quantities(options.held, unit.si, "--held") if options.held else ())
+    ]
+    shapes = [equilibrium(system, x, loads) for x in held] or [equilibrium(system, None, loads)]
+    amounts = held or [system.amount(shapes[0].q)]
+    points = [holding.described(system, x, shape) for x, shape in zip(amounts, shapes, strict=True)]
+    _print(head + "".join(f"; {name} = {x:g}" for name, x in loads.items()), points, system)
+    if not held:
+        _print_rest(points[0].displacement, points[0].frequency > 0.0, system)
+    output.table(f"{mechanism.name}-equilibrium.csv", _csv_head(unit), _rows(points))
+    places = [
+        [point.displacement, *place]
+        for point, shape in zip(points, shapes, strict=True)
+        for place in _places(system, shape)
+    ]
+    output.table(
+        f"{mechanism.name}-positions.csv",
+        [f"{unit.amount} [{unit.si}]", "name", "x [m]", "y [m]", "angle [rad]"], places,
+    )  # fmt: skip
+    if options.stiffness:
+        _stiffness(options, mechanism, system, shapes, output)
+
+
+def _loads(options: argparse.Namespace, mechanism: Mechanism) -> dict[str, float]:
+    """Return the loads of the option --load [N], [N m]."""
+    units = {
+        f"{force.name}.{component}": si
+        for force in mechanism.forces
+        for component, si in LOADS.items()
+    }
+    loads = {}
+    for text in options.load or ():
+        name, equals, number = text.partition("=")
+        if not equals or name not in units:
+            known = ", ".join(units) or "none: the mechanism has no [[forces]]"
+            raise UserMistake(f"--load {text}: give name=value; the loads are {known}")
+        loads[name] = quantity(number, units[name], f"--load {name}")
+    return loads
+
+
+def _places(system: System, shape: Equilibrium) -> list[list[object]]:
+    """Return name, displacement from the straight shape [m] and rotation [rad] of each point."""
+    e = system.directions(shape.q)
+    rows: list[list[object]] = []
+    for frame in (*system.bodies.values(), *system.probes):
+        moved = complex(frame.c + frame.A @ e - frame.drawn)
+        turned = float(shape.q[frame.j] - system.q0[frame.j]) if frame.j != FIXED else 0.0
+        rows.append([frame.name, moved.real, moved.imag, turned])
+    return rows
+
+
+def _stiffness(
+    options: argparse.Namespace, mechanism: Mechanism, system: System,
+    shapes: Sequence[Equilibrium], output: Output,
+) -> None:  # fmt: skip
+    """Print the compliance and the stiffness matrix of a body, and write them as a table."""
+    name, held = options.stiffness, bool(options.held)
+    if name not in system.bodies:
+        bodies = ", ".join(system.bodies)
+        raise UserMistake(f"--stiffness {name}: there is no such body; the bodies are {bodies}")
+    frame = _point(options, mechanism, system)
+    rows: list[list[object]] = []
+    for shape in shapes:
+        C = compliance_matrix(system, shape, frame, held)
+        K = stiffness_matrix(C, system.length)
+        print(
+            f"\nsmall loads on {name} at {options.at or 'its centre of mass'}"
+            + (f", {_held(mechanism)} held" if held else "")
+        )
+        for title, matrix in (("compliance", C), ("stiffness", K)):
+            if matrix is None:
+                print("no stiffness matrix: the body is rigid in a direction")
+                continue
+            columns, names = MATRIX_UNITS[title]
+            size = np.sqrt(np.abs(np.outer(matrix.diagonal(), matrix.diagonal())).max())
+            cells = [
+                [what, *(rounded(float(x), RIGID_RTOL * size / ZERO_RTOL, ".5g") for x in row)]
+                for what, row in zip(names, matrix, strict=True)
+            ]
+            print(aligned([title, *columns], cells))
+            rows += [[system.amount(shape.q), title, *map(float, row)] for row in matrix]
+    unit = held_unit(mechanism)
+    head = [f"{unit.amount} [{unit.si}]", "matrix", "x", "y", "angle"]
+    output.table(f"{mechanism.name}-stiffness.csv", head, rows)
+
+
+def _point(options: argparse.Namespace, mechanism: Mechanism, system: System) -> BodyFrame:
+    """Return the point of a body at which small loads act."""
+    if options.at is None:
+        return system.bodies[options.stiffness]
+    if not options.at.startswith(f"{options.stiffness}."):
+        raise UserMistake(f"--at {options.at}: give a point of {options.stiffness}, body.point")
+    probed = replace(mechanism, probes=(Probe("--at", options.at),))
+    return assemble(probed, system.values).probes[0]
 
 
 def _range(

@@ -454,20 +454,29 @@ def holding_stiffness(system: System, shape: Equilibrium) -> float:
         Stiffness [N/m]; [N m/rad] if the release is by an angle; NaN where the loops or a body
         without stiffness leave it undetermined.
     """
-    n, turns = system.n, system.mechanism.release.turns
-    unit = system.length if turns else 1.0
-    B = np.vstack([system.loops, system.holding_row(shape.q)])
-    lam = np.append(shape.lam, shape.force / unit)
-    e = system.directions(shape.q)
-    rows = system.gradient(B, e)
-    K_t = tangent_stiffness(system.K, shape.load, B, lam, e, system.arm, system.Phi)
-    right = np.zeros(n + len(B))
+    unit = system.length if system.mechanism.release.turns else 1.0
+    kkt = balance_matrix(system, shape, held=True)
+    right = np.zeros(len(kkt))
     right[-1] = unit
     try:
-        change = constraints.solve(constraints.saddle(K_t, rows, rows), right, n, system.length)
+        change = constraints.solve(kkt, right, system.n, system.length)
     except SimulationError:
         return math.nan
     return -unit * float(change[-1])
+
+
+def balance_matrix(system: System, shape: Equilibrium, held: bool) -> Real:
+    """Return the linear balance [[K_t, rows^T], [rows, 0]] of small loads on a static shape.
+
+    The rows are those of the loops and, if the released body is held, that of its displacement.
+    """
+    unit = system.length if system.mechanism.release.turns else 1.0
+    B = np.vstack([system.loops, system.holding_row(shape.q)])
+    lam = np.append(shape.lam, shape.force / unit)
+    e = system.directions(shape.q)
+    K_t = tangent_stiffness(system.K, shape.load, B, lam, e, system.arm, system.Phi)
+    rows = system.gradient(B if held else system.loops, e)
+    return constraints.saddle(K_t, rows, rows)
 
 
 def _left_by_loops(system: System, e: Complex, rows: Real) -> float:

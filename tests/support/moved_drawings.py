@@ -1,0 +1,49 @@
+"""Drawings of mechanisms that are turned, mirrored or shifted."""
+
+from dataclasses import replace
+
+from prbm.mechanism.description import Mechanism
+
+
+def moved(given: Mechanism, place, *, turn: float = 0.0, sign: float = 1.0) -> Mechanism:
+    """Return a mechanism whose points are moved by ``place``, with a turn [deg] and a sign."""
+
+    def point(z):
+        if z is None:
+            return None
+        new = place(complex(*z))
+        return (new.real, new.imag)
+
+    def direction(part, **changes):
+        return replace(
+            part, point=point(part.point), direction=sign * part.direction + turn, **changes
+        )
+
+    along = place(complex(*given.gravity)) - place(0j)
+    return replace(
+        given,
+        ground={name: point(z) for name, z in given.ground.items()},
+        bodies=tuple(
+            replace(
+                body,
+                centre=point(body.centre),
+                points={name: point(z) for name, z in body.points.items()},
+            )
+            for body in given.bodies
+        ),
+        flexure_types=tuple(
+            replace(
+                kind,
+                curvature=None if kind.curvature is None else sign * kind.curvature,
+                rise=None if kind.rise is None else sign * kind.rise,
+            )
+            for kind in given.flexure_types
+        ),
+        stops=tuple(direction(stop, offset=sign * stop.offset) for stop in given.stops),
+        frictions=tuple(
+            direction(rub, normal_stiffness=sign * rub.normal_stiffness) for rub in given.frictions
+        ),
+        forces=tuple(replace(force, point=point(force.point)) for force in given.forces),
+        release=direction(given.release),
+        gravity=(along.real, along.imag),
+    )
