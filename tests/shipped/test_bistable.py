@@ -53,6 +53,13 @@ def test_there_are_two_stable_equilibria_and_an_unstable_one_between_them() -> N
     np.testing.assert_allclose([r.displacement for r in found], [0, RISE, 2 * RISE], atol=1e-12)
 
 
+@pytest.mark.parametrize("ends", [(0.0, 2.0), (-0.5, 1.0), (0.0, 1.0)])
+def test_rest_positions_at_the_ends_of_a_range_are_found(ends) -> None:
+    found = rest_positions(SYSTEM, np.linspace(*ends, 12) * RISE)
+    places = [k * RISE for k in (0, 1, 2) if ends[0] <= k <= ends[1]]
+    np.testing.assert_allclose([r.displacement for r in found], places, atol=1e-9)
+
+
 def test_snap_force_is_the_extremum_of_the_closed_form() -> None:
     options = {"xatol": 1e-10}
     minimum = minimize_scalar(

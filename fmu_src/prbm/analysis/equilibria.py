@@ -20,6 +20,7 @@ from ..mechanics.system import System
 DISPLACEMENT_RTOL = 1e-12  # Of the size: tolerance of the displacement of a rest position.
 SNAP_INTERVALS = 32  # Between rest positions, in which the loss of stability is searched.
 SNAP_RTOL = 1e-8  # Of the size: tolerance of the displacement of a snap-through.
+ZERO_FORCE_RTOL = 1e-10  # Of the largest force: a smaller one is round-off at a rest position.
 REST_FORCE_RTOL = 1e-6  # Of the forces at the ends of the interval: accepted as zero.
 
 
@@ -73,7 +74,7 @@ def rest_positions(
         The mechanism.
     displacements : (k,)
         Increasing displacements [m].  Between neighbouring displacements the force changes its
-        sign at most once.  At the first and the last displacement it is not zero.
+        sign at most once.
     forces : (k,) or None
         Holding forces at the displacements [N]; None: they are computed.
 
@@ -85,14 +86,19 @@ def rest_positions(
     """
     if forces is None:
         forces = force_curve(system, displacements)
-    found = []
-    for (a, b), (low, high) in zip(pairwise(displacements), pairwise(forces), strict=True):
-        if (low > 0.0) != (high > 0.0):
-            place = _zero_force(system, float(a), float(b), max(abs(low), abs(high)))
-            shape = equilibrium(system, place)
-            stable = bool(modes(system, shape).frequency[0] > 0.0)
-            found.append(RestPosition(place, stable, shape))
-    return found
+    zero = ZERO_FORCE_RTOL * float(np.abs(forces).max(initial=0.0))
+    signs = [0 if abs(force) <= zero else int(np.sign(force)) for force in forces]
+    places = [float(d) for d, sign in zip(displacements, signs, strict=True) if sign == 0]
+    for k, (first, last) in enumerate(pairwise(signs)):
+        if first * last < 0:
+            largest = max(abs(float(forces[k])), abs(float(forces[k + 1])))
+            ends = float(displacements[k]), float(displacements[k + 1])
+            places.append(_zero_force(system, *ends, largest))
+    shapes = [(place, equilibrium(system, place)) for place in sorted(places)]
+    return [
+        RestPosition(place, bool(modes(system, shape).frequency[0] > 0.0), shape)
+        for place, shape in shapes
+    ]
 
 
 def _zero_force(system: System, low: float, high: float, largest: float) -> float:
