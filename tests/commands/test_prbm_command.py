@@ -215,12 +215,26 @@ def test_small_loads_on_a_loaded_body_have_its_compliance_and_stiffness(capsys):
         ("--at shuttle.top", "give both"),
         ("--stiffness shuttle --at shuttle.foo", "--at refers to the point 'shuttle.foo'"),
         ("--stiffness shuttle --at ground.upper_left", "give a point of shuttle"),
+        ("--vary force.y=1", "give both ends of the range"),
+        ("--vary force.y=1:1", "the ends of the range are equal"),
+        ("--vary force.y=0:1 --held 1mm", "--vary excludes"),
         ("--load force.y=1 --from 0mm --to 1mm", "exclude --from and --to"),
     ],
 )
 def test_wrong_loads_and_bodies_are_named(line, message, capsys):
     assert run(f"equilibrium CurvedBistable {line}") != cli.OK
     assert message in capsys.readouterr().err
+
+
+def test_a_load_that_varies_passes_limit_points_and_bifurcations(capsys):
+    line = "equilibrium CurvedBistable --set gravity.y=0 --vary force.y=0:-40N --out ."
+    assert run(line) == cli.OK
+    rows = table("CurvedBistable-load-path.csv")
+    printed = capsys.readouterr().out
+    assert [x for x in rows["event"] if x][:2] == ["bifurcation", "limit point"]
+    assert float(rows["force.y [N]"][-1]) == -40.0
+    assert "bifurcation at 1.39" in printed
+    assert "limit point at 1.74" in printed
 
 
 def test_written_simulation_obeys_the_impact_law_and_keeps_the_energy(capsys):

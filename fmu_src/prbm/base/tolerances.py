@@ -41,6 +41,7 @@ STATICS_CONSTRAINT_RTOL = 1e-13  # Of the size: residual of closed loops at an e
 STATICS_FORCE_RTOL = 1e-12  # Of the stiffest spring at one radian: residual torque.
 STATICS_ROUNDING_RTOL = 1e-13  # Of the torques that are added: residual torque of round-off.
 STATICS_STEP_ATOL = 1e-8  # rad; Newton step that ends the iteration: the error is its square.
+RIGID_RTOL = 1e-12  # Of the largest compliance of a body: a smaller one is round-off.
 RELEASE_LEVER_RTOL = 0.02  # Of the size: a body turns about a point with a shorter lever.
 RELEASE_MODE_RTOL = 1e-6  # Of the size times the largest turn: no motion of a point by a mode.
 ZERO_FREQUENCY_RTOL = 1e-7  # Of the highest frequency: a lower frequency is round-off.

@@ -192,6 +192,7 @@ def _equilibrium(commands: Commands) -> None:
             "prbm equilibrium PRBDM2R --held -10 -5 5 10 mm",
             "prbm equilibrium Bistable --from -2mm --to 26mm --out curve",
             "prbm equilibrium CurvedBistable --load force.y=-5N --stiffness shuttle",
+            "prbm equilibrium CurvedBistable --vary force.y=0:-40N --out path",
         ),
     )  # fmt: skip
     mechanism_argument(parser)
@@ -200,6 +201,8 @@ def _equilibrium(commands: Commands) -> None:
     add("--held", nargs="+", metavar="X", help=text)
     text = "forces [N] and moments [N m], such as force.y=-5N"
     add("--load", nargs="+", metavar="NAME=X", help=text)
+    text = "follow the shapes while a load varies, such as force.y=0:-20N, through limit points"
+    add("--vary", metavar="NAME=A:B", help=text)
     add("--stiffness", metavar="BODY", help="print the compliance and stiffness matrix of a body")
     add("--at", metavar="BODY.POINT", help="point of --stiffness (default: the centre of mass)")
     add("--from", dest="start", metavar="A", help="first displacement of a force curve [m]")

@@ -9,16 +9,17 @@ import numpy as np
 
 from ..analysis import holding
 from ..base.progress import reporter
+from ..base.tolerances import RIGID_RTOL
 from ..files.settings import UserMistake, quantities, quantity
 from ..mechanics.assembly import assemble
-from ..mechanics.body_compliance import RIGID_RTOL, compliance_matrix, stiffness_matrix
-from ..mechanics.inputs import LOADS
+from ..mechanics.body_compliance import compliance_matrix, stiffness_matrix
 from ..mechanics.statics import Equilibrium, equilibrium, immobile
 from ..mechanics.system import FIXED, BodyFrame, System
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import Probe
 from ..plots.holding import holding_figure
 from ..runs.released import released_label
+from .load_paths import given_load, vary
 from .output import Output, aligned
 from .systems import ZERO_RTOL, HeldUnit, assembled, check_held, held_scale, held_unit, rounded
 
@@ -33,21 +34,17 @@ def rest_positions(options: argparse.Namespace) -> None:
     """Print the rest positions, or the forces that hold the released body at displacements."""
     mechanism, _, system = assembled(options)
     output = Output(options.out)
-    ranged = (options.start, options.end)
-    if None in ranged and ranged != (None, None):
-        raise UserMistake("--from and --to: give both ends of the range")
-    if ranged != (None, None) and options.held:
-        raise UserMistake("--held excludes --from and --to: give one or the other")
-    if ranged != (None, None) and (options.load or options.stiffness):
-        raise UserMistake("--load and --stiffness exclude --from and --to: give one or the other")
-    if options.at and not options.stiffness:
-        raise UserMistake("--at is the point of --stiffness BODY: give both")
+    ranged = (options.start, options.end) != (None, None)
+    _check_options(options)
     unit = held_unit(mechanism)
     head = f"{mechanism.name}: {unit.amount} of {_held(mechanism)}, from straight; " + (
         "gravity acts" if system.gravity else "no gravity acts"
     )
-    if ranged != (None, None):
+    if ranged:
         _range(options, mechanism, system, output, head)
+    elif options.vary:
+        print(head)
+        vary(options.vary, _loads(options, mechanism), mechanism, system, output)
     else:
         _shapes(options, mechanism, system, output, head)
     output.write()
@@ -84,18 +81,10 @@ def _shapes(
 
 def _loads(options: argparse.Namespace, mechanism: Mechanism) -> dict[str, float]:
     """Return the loads of the option --load [N], [N m]."""
-    units = {
-        f"{force.name}.{component}": si
-        for force in mechanism.forces
-        for component, si in LOADS.items()
-    }
     loads = {}
     for text in options.load or ():
-        name, equals, number = text.partition("=")
-        if not equals or name not in units:
-            known = ", ".join(units) or "none: the mechanism has no [[forces]]"
-            raise UserMistake(f"--load {text}: give name=value; the loads are {known}")
-        loads[name] = quantity(number, units[name], f"--load {name}")
+        name, number, si = given_load(mechanism, "--load", text)
+        loads[name] = quantity(number, si, f"--load {name}")
     return loads
 
 
@@ -153,6 +142,21 @@ def _point(options: argparse.Namespace, mechanism: Mechanism, system: System) ->
         raise UserMistake(f"--at {options.at}: give a point of {options.stiffness}, body.point")
     probed = replace(mechanism, probes=(Probe("--at", options.at),))
     return assemble(probed, system.values).probes[0]
+
+
+def _check_options(options: argparse.Namespace) -> None:
+    """Reject options that exclude each other."""
+    ranged = (options.start, options.end)
+    if None in ranged and ranged != (None, None):
+        raise UserMistake("--from and --to: give both ends of the range")
+    if ranged != (None, None) and options.held:
+        raise UserMistake("--held excludes --from and --to: give one or the other")
+    if ranged != (None, None) and (options.load or options.stiffness):
+        raise UserMistake("--load and --stiffness exclude --from and --to: give one or the other")
+    if options.vary and (ranged != (None, None) or options.held or options.stiffness):
+        raise UserMistake("--vary excludes --held, --stiffness, --from and --to")
+    if options.at and not options.stiffness:
+        raise UserMistake("--at is the point of --stiffness BODY: give both")
 
 
 def _range(

@@ -13,13 +13,12 @@ displacement.
 import numpy as np
 
 from ..base.errors import EquilibriumError, SimulationError
+from ..base.tolerances import RIGID_RTOL
 from . import constraints
 from .arrays import Real
 from .forces import load_rows
 from .statics import Equilibrium, balance_matrix
 from .system import BodyFrame, System
-
-RIGID_RTOL = 1e-12  # Of the largest compliance: a smaller one is round-off.
 
 
 def compliance_matrix(

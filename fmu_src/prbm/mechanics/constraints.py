@@ -178,6 +178,38 @@ def solve(kkt: Real, right: Real, n: int, length: float) -> Real:
     return x
 
 
+def solve_bordered(kkt: Real, column: Real, row: Real, right: Real, n: int, length: float) -> Real:
+    """Solve [[kkt, column], [row]] x = right, regular also where a path of solutions turns back.
+
+    Parameters
+    ----------
+    kkt, n, length
+        As for :func:`scales`.
+    column : (n + r,)
+        Derivative of the equations by the parameter of the path.
+    row : (n + r + 1,)
+        Row of the step along the path, the parameter last.
+    right : (n + r + 1,)
+        Right side.
+
+    Raises
+    ------
+    SimulationError
+        If the matrix is singular, as at a bifurcation.
+    """
+    scale = np.append(scales(kkt, n, length), 1.0)
+    A = np.zeros((len(scale), len(scale)))
+    A[:-1, :-1], A[:-1, -1], A[-1] = kkt, column, row
+    A *= scale * scale[:, None]
+    wide, high = np.abs(A[-1]).max() or 1.0, np.abs(A[:-1, -1]).max() or 1.0
+    A[-1] /= wide
+    A[:, -1] /= high
+    _check_pivots(_pivots(A))
+    x: Real = scale * np.linalg.solve(A, scale * right / np.append(np.ones(len(kkt)), wide))
+    x[-1] /= high
+    return x
+
+
 def determinant_sign(kkt: Real, n: int, length: float) -> int:
     """Return the sign of the determinant of a saddle-point matrix; 0 if it is singular.
 

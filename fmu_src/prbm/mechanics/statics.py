@@ -154,7 +154,7 @@ def equilibrium(
         If slow loading reaches no static shape with this displacement and these loads, or the body
         turns about the point that is to be displaced.
     """
-    w, moment = _loads(system, loads or {})
+    w, moment = load_row(system, loads or {})
     loaded = bool(displacement) or np.any(w) or np.any(moment)
     open_by = system.loop_rows.values(system.directions(system.q0))
     closed = np.abs(open_by).max(initial=0.0) <= STATICS_CONSTRAINT_RTOL * system.length
@@ -245,8 +245,8 @@ def _determinant_sign(system: System, given: _Given, state: Real) -> int:
     return constraints.determinant_sign(kkt, system.n, system.length)
 
 
-def _loads(system: System, loads: Mapping[str, float]) -> tuple[Complex, Real]:
-    """Return the row of gravity and the given forces, and the given moments [N m]."""
+def load_row(system: System, loads: Mapping[str, float]) -> tuple[Complex, Real]:
+    """Return the spread row w of gravity and the given forces, and the given moments [N m]."""
     given = checked_loads(system.mechanism, loads)
     w, moment = field_row(system.S, system.gravity), np.zeros(system.n)
     for force, frame in zip(system.mechanism.forces, system.pushed, strict=True):

@@ -1,0 +1,265 @@
+r"""Paths of equilibria under a load that varies, through limit points, with their stability.
+
+The loads are w(s) = w_0 + s w_1 with a share s.  The shapes q, with the multipliers of the loops,
+are a curve, which is followed by prediction along its tangent and correction by Newton's method in
+the plane across it [1, 2].  Its length is measured in (q, s), angles in radians.  The curve passes
+limit points, where s turns back.
+
+Stability is that under dead loads: at a limit point one direction becomes unstable or stable, and s
+has an extremum.  At a bifurcation a direction becomes unstable where s has none; the mechanism
+then buckles to another shape, which is not followed.
+
+Sources
+-------
+.. [1] H. B. Keller, in: Applications of Bifurcation Theory, Academic Press (1977) 359.
+.. [2] E. L. Allgower, K. Georg, Numerical Continuation Methods, Springer (1990).
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.errors import EquilibriumError, SimulationError
+from ..base.tolerances import STATICS_CONSTRAINT_RTOL
+from ..mechanics import constraints
+from ..mechanics.arrays import Real
+from ..mechanics.forces import springs
+from ..mechanics.modal import modes
+from ..mechanics.statics import Equilibrium, balance_matrix, equilibrium, load_row
+from ..mechanics.system import System
+
+STEP_FIRST = 0.02  # Length of the first step, in radians or shares.
+STEP_MAX = 0.1  # Longest step.
+STEP_MIN = 1e-7  # A shorter step ends the path.
+BEND_MAX = 0.2  # rad between the tangents of neighbouring points.
+NEWTON_MAX = 8  # Iterations of a correction.
+CORRECTION_ATOL = 1e-10  # rad: last correction of a point.
+POINTS_MAX = 2000  # Of a path.
+EVENT_BISECTIONS = 30  # Of the step in which an event is located.
+
+
+@dataclass(frozen=True)
+class PathPoint:
+    """An equilibrium on the path.
+
+    Parameters
+    ----------
+    share : float
+        Share s of the change of the loads [-].
+    shape : Equilibrium
+        The shape.
+    unstable : int
+        Number of unstable directions under dead loads.
+    tangent : (n + r + 1,)
+        Derivatives of coordinates, multipliers and share by the length of the path.
+    """
+
+    share: float
+    shape: Equilibrium
+    unstable: int
+    tangent: Real
+
+
+@dataclass(frozen=True)
+class LoadPath:
+    """Equilibria under loads that vary.
+
+    Parameters
+    ----------
+    points : tuple of PathPoint
+        Points in the order of the path, limit points and bifurcations included.
+    events : tuple of (str, PathPoint)
+        ``"limit point"`` or ``"bifurcation"`` with its place.
+    ended : str or None
+        Why the path ends before the last load; None: it does not.
+    """
+
+    points: tuple[PathPoint, ...]
+    events: tuple[tuple[str, PathPoint], ...]
+    ended: str | None
+
+
+class _Curve:
+    """The equations of the shapes at the loads w(s)."""
+
+    def __init__(self, system: System, first: Mapping[str, float], last: Mapping[str, float]):
+        self.system = system
+        w, moment = load_row(system, first)
+        w_last, moment_last = load_row(system, last)
+        self.loads, self.moments = (w, w_last - w), (moment, moment_last - moment)
+
+    def shape(self, state: Real) -> Equilibrium:
+        n = self.system.n
+        return Equilibrium(state[:n], state[n:-1], 0.0, self.loads[0] + state[-1] * self.loads[1])
+
+    def solve(self, state: Real, normal: Real, step: Real, balanced: bool = False) -> Real:
+        """Solve the linearised equations for a change of the state with normal^T change = step.
+
+        With ``balanced``, the state is an equilibrium, and the change is along the tangent.
+        """
+        system, shape = self.system, self.shape(state)
+        n, e = system.n, system.directions(shape.q)
+        kkt = balance_matrix(system, shape, held=False)
+        by_share = system.Phi.pull((self.loads[1] * e).real) + self.moments[1]
+        loads = system.Phi.pull((shape.load * e).real) + self.moments[0]
+        torque = springs(system.K, shape.q - system.q0) + loads + state[-1] * self.moments[1]
+        torque = torque + shape.lam @ kkt[n:, :n]
+        open_by = system.loop_rows.values(e)
+        column = np.concatenate([-by_share, np.zeros(len(open_by))])
+        right = np.concatenate([0.0 * torque if balanced else torque, -open_by, step])
+        x = constraints.solve_bordered(kkt, column, normal, right, n, system.length)
+        x[n:-1] *= -1.0
+        return x
+
+    def correct(self, guess: Real, normal: Real) -> Real | None:
+        """Return the equilibrium in the plane through a guess; None without convergence."""
+        state, size = guess.copy(), math.inf
+        n = self.system.n
+        for _ in range(NEWTON_MAX):
+            across = np.array([normal @ (guess - state)])
+            try:
+                change = self.solve(state, normal, across)
+            except SimulationError:
+                return None
+            last, size = size, float(np.abs(change[:n]).max())
+            if not size < 2.0 * last:
+                return None
+            state = state + change
+            if size <= CORRECTION_ATOL and self.closed(state):
+                return state
+        return None
+
+    def closed(self, state: Real) -> bool:
+        open_by = self.system.loop_rows.values(self.system.directions(state[: self.system.n]))
+        limit = 10.0 * STATICS_CONSTRAINT_RTOL * self.system.length
+        return float(np.abs(open_by).max(initial=0.0)) <= limit
+
+    def point(self, state: Real, along: Real) -> PathPoint:
+        """Return a point with its tangent in the sense of another one."""
+        t = self.solve(state, self.weighted(along), np.ones(1), balanced=True)
+        t = t / math.sqrt(float(self.weighted(t) @ t))
+        shape = self.shape(state)
+        unstable = int(np.count_nonzero(modes(self.system, shape).frequency < 0.0))
+        return PathPoint(float(state[-1]), shape, unstable, t)
+
+    def weighted(self, t: Real) -> Real:
+        """Return the row of the scalar product with a tangent: multipliers have no weight."""
+        result = t.copy()
+        result[self.system.n : -1] = 0.0
+        return result
+
+    def step(self, start: PathPoint, length: float) -> PathPoint | None:
+        """Return the point at a length along the tangent of another one."""
+        guess = _state(start) + length * start.tangent
+        state = self.correct(guess, self.weighted(start.tangent))
+        try:
+            return None if state is None else self.point(state, start.tangent)
+        except SimulationError:
+            return None
+
+
+def _state(point: PathPoint) -> Real:
+    return np.concatenate([point.shape.q, point.shape.lam, [point.share]])
+
+
+def load_path(system: System, first: Mapping[str, float], last: Mapping[str, float]) -> LoadPath:
+    """Follow the equilibria while the loads change from the first to the last ones.
+
+    Parameters
+    ----------
+    system : System
+        The mechanism.
+    first, last : mapping
+        Forces [N] and moments [N m] by name; those that are not given are zero.
+
+    Raises
+    ------
+    EquilibriumError
+        If no shape under the first loads is found, or a motion of it has no stiffness.
+    ParameterError
+        If a load is unknown, or not a finite number.
+    """
+    curve, begin = _Curve(system, first, last), equilibrium(system, None, first)
+    state = np.concatenate([begin.q, begin.lam, [0.0]])
+    along = np.zeros(len(state))
+    along[-1] = 1.0
+    try:
+        points = [curve.point(state, along)]
+    except SimulationError:
+        raise EquilibriumError(
+            "the shape under the first loads does not determine the path: a motion has no "
+            "stiffness there; begin with other loads, or clamp a flexure that is pinned"
+        ) from None
+    events: list[tuple[str, PathPoint]] = []
+    length, ended = STEP_FIRST, None
+    while points[-1].share < 1.0 and ended is None:
+        start = points[-1]
+        found = curve.step(start, length)
+        bend = math.inf if found is None else _bend(curve, start, found)
+        if found is None or bend > BEND_MAX:
+            length *= 0.5
+            ended = f"no equilibrium was found beyond a step of {STEP_MIN:g}"
+            ended = ended if length < STEP_MIN else None
+            continue
+        if found.share >= 1.0:
+            found = _at_share(curve, start, found)
+        for event in _events(curve, start, found, length):
+            events.append(event)
+            points.append(event[1])
+        points.append(found)
+        length = min(STEP_MAX, length * min(2.0, 0.7 * BEND_MAX / max(bend, 1e-9)))
+        if len(points) >= POINTS_MAX:
+            ended = f"the path has {POINTS_MAX} points without reaching the last loads"
+    return LoadPath(tuple(points), tuple(events), ended)
+
+
+def _bend(curve: _Curve, start: PathPoint, end: PathPoint) -> float:
+    """Return the angle between the tangents of two points [rad]."""
+    cosine = float(curve.weighted(start.tangent) @ end.tangent)
+    return math.acos(min(1.0, max(-1.0, cosine)))
+
+
+def _at_share(curve: _Curve, start: PathPoint, end: PathPoint) -> PathPoint:
+    """Return the point at s = 1 between two points, or the last one if it is not found."""
+    part = (1.0 - start.share) / (end.share - start.share)
+    guess = _state(start) + part * (_state(end) - _state(start))
+    guess[-1] = 1.0
+    normal = np.zeros(len(guess))
+    normal[-1] = 1.0
+    state = curve.correct(guess, normal)
+    return end if state is None else curve.point(state, start.tangent)
+
+
+def _events(
+    curve: _Curve, start: PathPoint, end: PathPoint, length: float
+) -> list[tuple[str, PathPoint]]:
+    """Return the limit point and the bifurcations within a step."""
+    turned = start.tangent[-1] * end.tangent[-1] < 0.0
+    found = []
+    if turned:
+        first_sign = start.tangent[-1] > 0.0
+        place = _located(curve, start, length, lambda p: (p.tangent[-1] > 0.0) == first_sign)
+        found.append(("limit point", place or end))
+    if abs(end.unstable - start.unstable) != int(turned):
+        place = _located(curve, start, length, lambda p: p.unstable == start.unstable)
+        found.append(("bifurcation", place or end))
+    return found
+
+
+def _located(
+    curve: _Curve, start: PathPoint, length: float, before: Callable[[PathPoint], bool]
+) -> PathPoint | None:
+    """Return the last point of a step before an event, by bisection of the step."""
+    low, high, place = 0.0, length, None
+    for _ in range(EVENT_BISECTIONS):
+        middle = 0.5 * (low + high)
+        point = curve.step(start, middle)
+        if point is None:  # At a bifurcation the equations are singular.
+            break
+        if before(point):
+            low, place = middle, point
+        else:
+            high = middle
+    return place

@@ -1,0 +1,95 @@
+"""Shapes under a load that varies: the option --vary of ``prbm equilibrium``."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..analysis.load_path import LoadPath, load_path
+from ..files.settings import UserMistake, quantity
+from ..mechanics.inputs import LOADS
+from ..mechanics.system import System
+from ..mechanism.description import Mechanism
+from ..plots.load_path import load_path_figure
+from .output import Output, aligned
+from .systems import held_scale, held_unit, rounded
+
+ROWS_SHOWN = 12
+
+
+def load_units(mechanism: Mechanism) -> dict[str, str]:
+    """Return the units of the loads by name."""
+    return {
+        f"{force.name}.{component}": si
+        for force in mechanism.forces
+        for component, si in LOADS.items()
+    }
+
+
+def given_load(mechanism: Mechanism, option: str, text: str) -> tuple[str, str, str]:
+    """Return name, value and unit of a load that an option gives as name=value.
+
+    Raises
+    ------
+    UserMistake
+        If there is no such load.
+    """
+    name, equals, number = text.partition("=")
+    units = load_units(mechanism)
+    if not equals or name not in units:
+        known = ", ".join(units) or "none: the mechanism has no [[forces]]"
+        raise UserMistake(f"{option} {text}: give name=value; the loads are {known}")
+    return name, number, units[name]
+
+
+def vary(
+    text: str, loads: Mapping[str, float], mechanism: Mechanism, system: System, output: Output
+) -> None:
+    """Print, write and draw the shapes while a load varies, with limit points and bifurcations."""
+    name, ends, si = given_load(mechanism, "--vary", text)
+    first, colon, last = ends.partition(":")
+    if not colon:
+        raise UserMistake(f"--vary {text}: give both ends of the range, such as {name}=0:-20{si}")
+    low, high = (quantity(x, si, f"--vary {name}") for x in (first, last))
+    if low == high:
+        raise UserMistake(f"--vary {text}: the ends of the range are equal")
+    path = load_path(system, {**loads, name: low}, {**loads, name: high})
+    amounts = np.array([system.amount(point.shape.q) for point in path.points])
+    varied = np.array([low + point.share * (high - low) for point in path.points])
+    unit = held_unit(mechanism)
+    _print(path, amounts, varied, f"{name} [{si}]", system)
+    kinds = {id(point): kind for kind, point in path.events}
+    output.table(
+        f"{mechanism.name}-load-path.csv",
+        [f"{unit.amount} [{unit.si}]", f"{name} [{si}]", "unstable directions", "event"],
+        [[float(x), float(load), point.unstable, kinds.get(id(point), "")]
+         for x, load, point in zip(amounts, varied, path.points, strict=True)],
+    )  # fmt: skip
+    label, turns = f"{name} [{si.replace('.', ' ')}]", mechanism.release.turns
+    output.figure(
+        f"{mechanism.name}-load-path.png",
+        lambda: load_path_figure(path, amounts, varied, label, mechanism.title, turns),
+    )
+
+
+def _print(
+    path: LoadPath, amounts: np.ndarray, varied: np.ndarray, label: str, system: System
+) -> None:
+    """Print a part of the points, and all events."""
+    unit = held_unit(system.mechanism)
+    scale, largest = unit.factor * held_scale(system), float(np.abs(varied).max())
+    count = len(path.points)
+    every = -(-count // ROWS_SHOWN)
+    chosen = sorted({*range(0, count, every), count - 1})
+    rows = [
+        [rounded(unit.factor * amounts[k], scale, ".5g"), rounded(varied[k], largest),
+         str(path.points[k].unstable)]
+        for k in chosen
+    ]  # fmt: skip
+    print(aligned([f"at [{unit.shown}]", label, "unstable directions"], rows))
+    print(f"{len(chosen)} of {count} points; write all with --out DIR")
+    for kind, point in path.events:
+        k = next(i for i, one in enumerate(path.points) if one is point)
+        at = rounded(unit.factor * amounts[k], scale)
+        print(f"{kind} at {at} {unit.shown}, under {varied[k]:.5g} {label.partition('[')[2][:-1]}")
+    if path.ended:
+        print(f"the path ends: {path.ended}")

@@ -1,0 +1,110 @@
+"""Paths of equilibria under loads that vary."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from prbm.analysis.load_path import load_path
+from prbm.base.errors import EquilibriumError
+from prbm.files.mechanism_file import load
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.forces import elastic_energy
+from prbm.mechanics.statics import holding_stiffness
+from prbm.mechanism.parts import Force
+from support import ROOT, mechanism
+
+CASES = ROOT / "tests" / "cases"
+
+
+def pushed(given, **values):
+    """Return the system of a mechanism with a force on its released body."""
+    body = given.release.body
+    return assemble(
+        replace(given, forces=(Force("push", body),)),
+        replace(given, forces=(Force("push", body),)).values(values),
+    )
+
+
+def amounts(system, path):
+    return np.array([system.amount(point.shape.q) for point in path.points])
+
+
+def test_the_limit_points_of_a_truss_are_those_of_its_closed_form():
+    """Four struts with the energy EA L s^2 / 2, s = ln(l / L), carry dU/dd."""
+    system = pushed(mechanism("Bistable"), **{"gravity.x": 0.0, "gravity.y": 0.0})
+    V = system.values
+    span, rise = V["strut.span"], V["strut.rise"]
+    EA = V["polyurethane.youngs_modulus"] * V["strut.thickness"] * V["strut.width"]
+    length = math.hypot(span, rise)
+
+    def carried(d):
+        now = np.hypot(span, rise - d)
+        return -4 * EA * length * np.log(now / length) * (rise - d) / now**2
+
+    path = load_path(system, {}, {"push.y": -30.0})
+    assert path.ended is None
+    d, force = amounts(system, path), np.array([30.0 * point.share for point in path.points])
+    np.testing.assert_allclose(force, carried(d), atol=1e-7)
+    grid = carried(np.linspace(0.0, 2 * rise, 200_001))
+    events = [(kind, 30.0 * point.share) for kind, point in path.events if kind == "limit point"]
+    assert [kind for kind, _ in events] == 2 * ["limit point"]
+    np.testing.assert_allclose([x for _, x in events], [grid.max(), grid.min()], rtol=1e-6)
+    stable = np.array([point.unstable == 0 for point in path.points])
+    assert stable[0]
+    assert stable[-1]
+    assert not stable.all()
+
+
+def test_the_energy_along_a_path_is_the_work_of_the_load():
+    """DU = P du, also where the load falls and the displacement turns back."""
+    system = assemble(load(CASES / "lee.toml"), load(CASES / "lee.toml").values())
+    path = load_path(system, {}, {"P.y": -25e3})
+    (frame,) = system.pushed
+    y = np.array(
+        [(frame.c + frame.A @ system.directions(point.shape.q)).imag for point in path.points]
+    )
+    P = np.array([-25e3 * point.share for point in path.points])
+    U = np.array([elastic_energy(system.K, point.shape.q - system.q0) for point in path.points])
+    work = np.cumsum(0.5 * (P[1:] + P[:-1]) * np.diff(y))
+    assert np.abs(U[1:] - work).max() < 2e-3 * U.max()
+    (kind, first), *_ = path.events
+    assert kind == "limit point"
+    assert -25e3 * first.share == pytest.approx(-18.55e3, rel=1e-3)  # Finite elements.
+    assert system.amount(first.shape.q) == pytest.approx(0.487, abs=1e-3)
+
+
+@pytest.mark.parametrize(("order", "error"), [(3, 3e-4), (5, 1e-6)])
+def test_a_symmetric_column_bifurcates_at_the_load_of_euler(order, error):
+    """Two clamped and guided leaves buckle sideways under pi^2 EI / L^2 each."""
+    frame = load(CASES / "buckle.toml")
+    leaves = tuple(replace(kind, order=order) for kind in frame.flexure_types)
+    straight = replace(frame, flexure_types=leaves)
+    system = pushed(straight, **{"gravity.x": 0.0, "gravity.y": 0.0})
+    critical = 2 * math.pi**2 * 2e11 * 8e-3 * 2e-4**3 / 12 / 0.05**2
+    path = load_path(system, {}, {"push.y": -1.5 * critical})
+    assert np.abs(amounts(system, path)).max() < 1e-9
+    (kind, point), *_ = path.events
+    assert kind == "bifurcation"
+    assert point.share == pytest.approx(1 / 1.5, rel=error)
+
+
+def test_the_slope_of_a_path_is_the_stiffness():
+    system = pushed(mechanism("CurvedBistable"), **{"gravity.y": 0.0})
+    path = load_path(system, {}, {"push.y": -15.0})
+    for point in path.points[::3]:
+        t, n = point.tangent, system.n
+        along = float(system.gradient(system.release, system.directions(point.shape.q)) @ t[:n])
+        assert 15.0 * t[-1] / along == pytest.approx(
+            holding_stiffness(system, point.shape), rel=1e-7
+        )
+
+
+def test_a_path_that_begins_without_stiffness_is_refused():
+    arm = mechanism("Cantilever")
+    (leaf,) = arm.flexures
+    hinged = replace(arm, flexures=(replace(leaf, ends=("pin", "pin")),))
+    system = pushed(hinged, **{"gravity.x": 0.0, "gravity.y": 0.0})
+    with pytest.raises(EquilibriumError, match="no stiffness"):
+        load_path(system, {}, {"push.y": 1.0})
