@@ -14,6 +14,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .analysis.static_shape import equilibrium as equilibrium
     from .base.errors import EquilibriumError as EquilibriumError
     from .base.errors import MechanismError as MechanismError
     from .base.errors import ParameterError as ParameterError
@@ -40,6 +41,7 @@ __all__ = [
     "SimulationError",
     "UnknownColumnError",
     "__version__",
+    "equilibrium",
     "load",
     "simulate",
     "study",
@@ -57,6 +59,7 @@ _MODULES = {
     "SimulationError": ("base.errors", "SimulationError"),
     "UnknownColumnError": ("runs.result", "UnknownColumnError"),
     "__version__": ("base.version", "__version__"),
+    "equilibrium": ("analysis.static_shape", "equilibrium"),
     "load": ("files.mechanism_file", "load"),
     "simulate": ("plots.shown", "simulate"),
     "study": ("sweeps.study", "study"),

@@ -22,6 +22,7 @@ PUBLIC = [
     "SimulationError",
     "UnknownColumnError",
     "__version__",
+    "equilibrium",
     "load",
     "simulate",
     "study",

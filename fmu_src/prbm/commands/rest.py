@@ -3,20 +3,18 @@
 import argparse
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from ..analysis import holding
+from ..analysis.static_shape import StaticShape
 from ..base.progress import reporter
 from ..base.tolerances import RIGID_RTOL
 from ..files.settings import UserMistake, quantities, quantity
-from ..mechanics.assembly import assemble
-from ..mechanics.body_compliance import compliance_matrix, stiffness_matrix
-from ..mechanics.statics import Equilibrium, equilibrium, immobile
-from ..mechanics.system import FIXED, BodyFrame, System
+from ..mechanics.body_compliance import stiffness_matrix
+from ..mechanics.statics import equilibrium, immobile
+from ..mechanics.system import System
 from ..mechanism.description import Mechanism
-from ..mechanism.parts import Probe
 from ..plots.holding import holding_figure
 from ..runs.released import released_label
 from .load_paths import given_load, vary
@@ -55,21 +53,26 @@ def _shapes(
 ) -> None:
     """Print single shapes under loads, held or free, with the places of all bodies and probes."""
     unit, loads = held_unit(mechanism), _loads(options, mechanism)
-    held = [
+    held: list[float | None] = [
         check_held(x, system, "--held")
         for x in (quantities(options.held, unit.si, "--held") if options.held else ())
     ]
-    shapes = [equilibrium(system, x, loads) for x in held] or [equilibrium(system, None, loads)]
-    amounts = held or [system.amount(shapes[0].q)]
-    points = [holding.described(system, x, shape) for x, shape in zip(amounts, shapes, strict=True)]
+    shapes = [
+        StaticShape(system, equilibrium(system, x, loads), x is not None, loads)
+        for x in held or [None]
+    ]
+    points = [
+        holding.described(system, shape.displacement if x is None else x, shape.shape)
+        for x, shape in zip(held or [None], shapes, strict=True)
+    ]
     _print(head + "".join(f"; {name} = {x:g}" for name, x in loads.items()), points, system)
     if not held:
         _print_rest(points[0].displacement, points[0].frequency > 0.0, system)
     output.table(f"{mechanism.name}-equilibrium.csv", _csv_head(unit), _rows(points))
     places = [
-        [point.displacement, *place]
+        [point.displacement, name, *place]
         for point, shape in zip(points, shapes, strict=True)
-        for place in _places(system, shape)
+        for name, place in shape.positions.items()
     ]
     output.table(
         f"{mechanism.name}-positions.csv",
@@ -88,34 +91,19 @@ def _loads(options: argparse.Namespace, mechanism: Mechanism) -> dict[str, float
     return loads
 
 
-def _places(system: System, shape: Equilibrium) -> list[list[object]]:
-    """Return name, displacement from the straight shape [m] and rotation [rad] of each point."""
-    e = system.directions(shape.q)
-    rows: list[list[object]] = []
-    for frame in (*system.bodies.values(), *system.probes):
-        moved = complex(frame.c + frame.A @ e - frame.drawn)
-        turned = float(shape.q[frame.j] - system.q0[frame.j]) if frame.j != FIXED else 0.0
-        rows.append([frame.name, moved.real, moved.imag, turned])
-    return rows
-
-
 def _stiffness(
     options: argparse.Namespace, mechanism: Mechanism, system: System,
-    shapes: Sequence[Equilibrium], output: Output,
+    shapes: Sequence[StaticShape], output: Output,
 ) -> None:  # fmt: skip
     """Print the compliance and the stiffness matrix of a body, and write them as a table."""
-    name, held = options.stiffness, bool(options.held)
-    if name not in system.bodies:
-        bodies = ", ".join(system.bodies)
-        raise UserMistake(f"--stiffness {name}: there is no such body; the bodies are {bodies}")
-    frame = _point(options, mechanism, system)
+    name = options.stiffness
     rows: list[list[object]] = []
     for shape in shapes:
-        C = compliance_matrix(system, shape, frame, held)
+        C = shape.compliance(name, options.at)
         K = stiffness_matrix(C, system.length)
         print(
             f"\nsmall loads on {name} at {options.at or 'its centre of mass'}"
-            + (f", {_held(mechanism)} held" if held else "")
+            + (f", {_held(mechanism)} held" if shape.held else "")
         )
         for title, matrix in (("compliance", C), ("stiffness", K)):
             if matrix is None:
@@ -128,20 +116,10 @@ def _stiffness(
                 for what, row in zip(names, matrix, strict=True)
             ]
             print(aligned([title, *columns], cells))
-            rows += [[system.amount(shape.q), title, *map(float, row)] for row in matrix]
+            rows += [[shape.displacement, title, *map(float, row)] for row in matrix]
     unit = held_unit(mechanism)
     head = [f"{unit.amount} [{unit.si}]", "matrix", "x", "y", "angle"]
     output.table(f"{mechanism.name}-stiffness.csv", head, rows)
-
-
-def _point(options: argparse.Namespace, mechanism: Mechanism, system: System) -> BodyFrame:
-    """Return the point of a body at which small loads act."""
-    if options.at is None:
-        return system.bodies[options.stiffness]
-    if not options.at.startswith(f"{options.stiffness}."):
-        raise UserMistake(f"--at {options.at}: give a point of {options.stiffness}, body.point")
-    probed = replace(mechanism, probes=(Probe("--at", options.at),))
-    return assemble(probed, system.values).probes[0]
 
 
 def _check_options(options: argparse.Namespace) -> None:

@@ -1,0 +1,162 @@
+"""Static shapes of a mechanism under loads, free or held, with all that is asked about them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+from ..base.errors import ParameterError
+from ..mechanics import statics
+from ..mechanics.arrays import Real
+from ..mechanics.assembly import assemble
+from ..mechanics.body_compliance import compliance_matrix
+from ..mechanics.modal import Modes, modes
+from ..mechanics.statics import Equilibrium, holding_stiffness
+from ..mechanics.stress import Stress, static_stresses
+from ..mechanics.system import BodyFrame, System
+from ..mechanism.description import Mechanism
+from ..mechanism.parts import Probe
+
+
+class Place(NamedTuple):
+    """Displacement of a point from the straight shape [m], and rotation of its body [rad]."""
+
+    x: float
+    y: float
+    angle: float
+
+
+@dataclass(frozen=True)
+class StaticShape:
+    """A static shape under loads.
+
+    Parameters
+    ----------
+    system : System
+        The assembled mechanism.
+    shape : Equilibrium
+        Coordinates and forces.
+    held : bool
+        Whether the released body is held at its displacement.
+    loads : mapping
+        Forces [N] and moments [N m] by name.
+    """
+
+    system: System
+    shape: Equilibrium
+    held: bool
+    loads: Mapping[str, float]
+
+    @property
+    def displacement(self) -> float:
+        """Displacement of the released point along its direction [m]; rotation [rad]."""
+        return self.system.amount(self.shape.q)
+
+    @property
+    def force(self) -> float:
+        """Holding force [N], or moment [N m] if the release is by an angle; 0 if free."""
+        return self.shape.force
+
+    @cached_property
+    def stiffness(self) -> float:
+        """Derivative of the holding force by the displacement [N/m], [N m/rad]."""
+        return holding_stiffness(self.system, self.shape)
+
+    @cached_property
+    def modes(self) -> Modes:
+        """Modes about the shape, with all loads and the holding force as dead loads."""
+        return modes(self.system, self.shape)
+
+    @property
+    def stable(self) -> bool:
+        """Whether the shape is stable under dead loads."""
+        return bool(self.modes.frequency[0] > 0.0)
+
+    @cached_property
+    def positions(self) -> dict[str, Place]:
+        """Displacements and rotations of all bodies (at their centres of mass) and probes."""
+        system, e = self.system, self.system.directions(self.shape.q)
+        return {
+            frame.name: self._place(complex(frame.c + frame.A @ e - frame.drawn), frame.j)
+            for frame in (*system.bodies.values(), *system.probes)
+        }
+
+    def _place(self, moved: complex, j: int) -> Place:
+        turned = float(self.shape.q[j] - self.system.q0[j]) if j >= 0 else 0.0
+        return Place(moved.real, moved.imag, turned)
+
+    @cached_property
+    def stress(self) -> dict[str, Stress]:
+        """Bending and normal stress of each flexure by name; see ``docs/strength.md``."""
+        return static_stresses(self.system, self.shape, self.loads)
+
+    def compliance(self, body: str, at: str | None = None) -> Real:
+        """Return the compliance matrix of a body, (3, 3): x [m], y [m], angle [rad] by N, N, N m.
+
+        Parameters
+        ----------
+        body : str
+            Name of the body.
+        at : str or None
+            Point of the body at which the loads act, ``body.point``; None: the centre of mass.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such body, or the point is none of its points.
+        EquilibriumError
+            If a motion of the mechanism has no stiffness.
+        """
+        return compliance_matrix(self.system, self.shape, self._frame(body, at), self.held)
+
+    def _frame(self, body: str, at: str | None) -> BodyFrame:
+        system = self.system
+        if body not in system.bodies:
+            bodies = ", ".join(system.bodies)
+            raise ParameterError(f"there is no body {body}; the bodies are {bodies}")
+        if at is None:
+            return system.bodies[body]
+        if not at.startswith(f"{body}."):
+            raise ParameterError(f"{at} is no point of {body}; give {body}.point")
+        probed = replace(system.mechanism, probes=(Probe("the load", at),))
+        return assemble(probed, system.values).probes[0]
+
+
+def equilibrium(
+    mechanism: Mechanism,
+    values: Mapping[str, float] | None = None,
+    *,
+    loads: Mapping[str, float] | None = None,
+    held: float | None = None,
+) -> StaticShape:
+    """Return the static shape of a mechanism under gravity and loads, without stops.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The mechanism, as :func:`prbm.load` returns it.
+    values : mapping or None
+        Values of parameters by name, in SI units; None: the defaults.
+    loads : mapping or None
+        Forces [N] and moments [N m] by the names of the inputs, such as ``force.y``.
+    held : float or None
+        Displacement at which the released body is held, along the direction of the release [m];
+        its rotation [rad] if the release is by an angle.  None: it is free.
+
+    Raises
+    ------
+    ParameterError
+        If a parameter or a load is unknown or out of its bounds.
+    EquilibriumError
+        If no static shape is found.
+
+    Examples
+    --------
+    >>> import prbm
+    >>> shape = prbm.equilibrium(prbm.load("CurvedBistable"), loads={"force.y": -5.0})
+    >>> shape.stable, round(1e3 * shape.positions["shuttle"].y, 3)
+    (True, -0.263)
+    """
+    system = assemble(mechanism, mechanism.values(dict(values or {})))
+    shape = statics.equilibrium(system, held, loads)
+    return StaticShape(system, shape, held is not None, dict(loads or {}))
