@@ -36,7 +36,7 @@ def test_the_linters_are_those_of_all_checks():
         .replace("ruff format --check", "ruff format")
     )
     linters = [line for line in LINES[2:] if not line.startswith("python ")]
-    assert len(linters) == 5
+    assert len(linters) == 6
     assert {f"check {line}" for line in linters} <= set(checks.splitlines())
 
 
