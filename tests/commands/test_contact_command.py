@@ -1,12 +1,15 @@
 """``prbm contact``."""
 
+import csv
 import shlex
 import tomllib
+from pathlib import Path
 
 import pytest
 
 import prbm
 from point_mass import point_mass
+from prbm.analysis.contact_hit import first_hit
 from prbm.commands import command_line as cli
 from prbm.files.settings import stiffness
 from support import SUPPORT
@@ -76,3 +79,31 @@ def test_units_of_the_stiffness_do_not_change_the_hit(exponent, one, other, caps
 def test_mistakes_are_rejected(options, words, capsys):
     assert cli.main(shlex.split(f"contact {options}")) == cli.MISTAKE
     assert words in capsys.readouterr().err
+
+
+def test_each_hit_of_a_compliant_stop_has_force_indentation_and_duration(tmp_path, monkeypatch):
+    """The hits are those of a point mass, whose force is proportional to its speed."""
+    monkeypatch.chdir(tmp_path)
+    first, name, rest = ACCELEROMETER.read_text("utf-8").partition('name = "bump_right"')
+    keys = 'law = "compliant"\nstiffness = "20 kN/m"\nexponent = 1\nrestitution = 0.5'
+    rest = rest.replace("restitution = 0.5", keys, 1).replace("4 um", "0.5 um")
+    Path("one.toml").write_text(first + name + rest, encoding="utf-8")
+    line = 'simulate one.toml --set release.displacement="-0.4 um" --out . --stop-time 0.2ms'
+    line += ' --set release.velocity="0.1 m/s"'
+    assert cli.main(shlex.split(line)) == cli.OK
+    with open("Accelerometer-impacts.csv", encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    hits = [row for row in rows if row["stop"] == "bump_right"]
+    rigid = [row for row in rows if row["stop"] == "bump_left"]
+    assert len(hits) > 1
+    assert rigid
+    for row in hits:
+        hit = first_hit(2e4, 1.0, 0.5, 9.3e-9, float(row["approach speed [m/s]"]))
+        for head, expected in (
+            ("peak force [N]", hit.force),
+            ("indentation [m]", hit.indentation),
+            ("contact duration [s]", hit.duration),
+        ):
+            assert float(row[head]) == pytest.approx(expected, rel=0.02)
+    heads = ("peak force [N]", "indentation [m]", "contact duration [s]")
+    assert {row[head] for row in rigid for head in heads} == {""}
