@@ -117,6 +117,14 @@ def test_the_headline_states_whether_the_motion_has_settled(mechanisms, stop_tim
     assert re.search(words, line)
 
 
+def test_a_vibration_beside_a_body_at_rest_is_explained(mechanisms):
+    result = simulate(mechanisms["FoldedSuspension"], stop_time=1.0)
+    lines = headline(result, result.mechanism, result.start_values)
+    assert [line for line in lines if line.startswith("came to rest")]
+    (line,) = (line for line in lines if line.startswith("settled"))
+    assert "not yet: a body rests on its stop, but the mechanism still vibrates" in line
+
+
 def test_needed_variables_are_reported():
     assert QUANTITIES["settling"].lacking(["energy.kinetic"]) == "mode.frequency"
     assert QUANTITIES["impacts"].lacking(["stop.impact_count"]) == ""

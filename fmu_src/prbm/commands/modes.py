@@ -1,16 +1,17 @@
 """``prbm modes``: frequencies, and the distribution of the kinetic energy in each mode."""
 
 import argparse
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..analysis.adequacy import Impact, Shape, Vibration, notes
-from ..base.unit_text import frequency_unit
+from ..base.unit_text import frequency_unit, prefixed_unit
 from ..files.settings import UserMistake, quantity
 from ..mechanics.arrays import Complex, Real
-from ..mechanics.modal import modes
+from ..mechanics.modal import damping, modes
 from ..mechanics.statics import Equilibrium, equilibrium
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
@@ -39,13 +40,30 @@ def frequencies(options: argparse.Namespace) -> None:
     e = system.directions(shape.q)
     shares = np.array([_shares(system, e, found.shape[:, k]) for k in range(count)])
     print(_where(system, shape, at))
-    head = ["mode", "frequency", *(f"{body} {m}" for body, m in motions), "flexures"]
+    ratios, times = damping(system, found)
+    head = [
+        "mode",
+        "frequency",
+        "damping ratio",
+        "decay time",
+        *(f"{body} {m}" for body, m in motions),
+        "flexures",
+    ]
     rows = [
-        [str(k + 1), _hertz(float(found.frequency[k])), *(f"{100 * x:.1f} %" for x in shares[k])]
+        [
+            str(k + 1),
+            _hertz(float(found.frequency[k])),
+            _ratio(ratios[k]),
+            _seconds(times[k]),
+            *(f"{100 * x:.1f} %" for x in shares[k]),
+        ]
         for k in range(count)
     ]
     print(aligned(head, rows))
-    print("percentages: shares of the kinetic energy of the mode")
+    print(
+        "percentages: shares of the kinetic energy of the mode; decay time: the amplitude falls to "
+        "37 %"
+    )
     if count < len(found.frequency):
         print(
             f"{len(found.frequency) - count} higher modes are not shown; show more with --count N"
@@ -55,9 +73,16 @@ def frequencies(options: argparse.Namespace) -> None:
         print(sentence)
     output.table(
         f"{mechanism.name}-modes.csv",
-        ["mode", "frequency [Hz]",
+        ["mode", "frequency [Hz]", "damping ratio [-]", "decay time [s]",
          *(f"share of {body} {m} [-]" for body, m in motions), "share of flexures [-]"],
-        [[k + 1, float(found.frequency[k]), *map(float, shares[k])] for k in range(count)],
+        [
+            [
+                k + 1,
+                *(float(x[k]) for x in (found.frequency, ratios, times)),
+                *map(float, shares[k]),
+            ]
+            for k in range(count)
+        ],
     )  # fmt: skip
     output.figure(f"{mechanism.name}-modes.png", lambda: _figure(mechanism, values, count, at))
     output.write()
@@ -87,6 +112,18 @@ def _hertz(frequency: float) -> str:
         return "unstable"
     factor, unit = frequency_unit(frequency)
     return f"{factor * frequency:#.5g} {unit}"
+
+
+def _ratio(ratio: float) -> str:
+    return "-" if math.isnan(ratio) else f"{ratio:.3g}"
+
+
+def _seconds(time: float) -> str:
+    """Return a decay time [s] as text; a dash if the amplitude does not fall."""
+    if not math.isfinite(time):
+        return "-"
+    factor, unit = prefixed_unit(time, "s")
+    return f"{factor * time:.3g} {unit}"
 
 
 def _where(system: System, shape: Equilibrium, at: float | None) -> str:

@@ -70,6 +70,41 @@ def _modes(system: System, q: Real, B: Complex, lam: Real, w: Complex) -> Modes:
     return Modes(frequency, Z @ np.linalg.solve(L.T, y), M)
 
 
+def damping(system: System, found: Modes) -> tuple[Real, Real]:
+    """Return damping ratios [-] and decay times [s] of modes, (k,) each.
+
+    The damping is 2 zeta omega_1 M + beta K, with the parameters ``damping.zeta`` and
+    ``damping.beta``, the fundamental angular frequency omega_1 about the equilibrium under gravity
+    and the stiffness K of the springs.  Of a mode phi only phi^T C phi counts; couplings of modes
+    by beta K are neglected.  The amplitude falls to 1/e in the decay time; above the damping ratio
+    1 it is that of the slower of both motions.  Both are NaN for modes that do not vibrate, and the
+    decay time is infinite without damping.
+
+    Parameters
+    ----------
+    system : System
+        The mechanism.
+    found : Modes
+        Its modes, as :func:`modes` returns them.
+    """
+    omega_1, phi = 2 * math.pi * fundamental_frequency(system), found.shape
+    springs_only = np.einsum("ik,ij,jk->k", phi, system.K, phi)
+    rates = 2.0 * system.values["damping.zeta"] * omega_1 + (
+        system.values["damping.beta"] * springs_only
+    )
+    omega = 2 * math.pi * found.frequency
+    least = ZERO_FREQUENCY_RTOL * float(np.abs(omega).max())
+    ratios, times = np.full((2, len(omega)), math.nan)
+    for k in np.flatnonzero(omega > least):
+        ratios[k] = ratio = float(rates[k]) / (2.0 * float(omega[k]))
+        root = math.sqrt(max(ratio**2 - 1.0, 0.0))
+        # The slower motion, without the difference of two large numbers.
+        times[k] = (
+            (ratio + root) / omega[k] if ratio > 1.0 else 2.0 / rates[k] if ratio else math.inf
+        )
+    return ratios, times
+
+
 def fundamental_frequency(system: System) -> float:
     """Return the fundamental frequency about the equilibrium under gravity [Hz].
 

@@ -134,7 +134,8 @@ def headline(
                 f"{column(columns, f'{stop}.force')[-1]:.4g} N"
             )
     lines += _stress(columns, mechanism, system.length)
-    return [*lines, _settled(columns, span)] if moving else lines
+    rests = any(rest_time(columns, stop.name) is not None for stop in mechanism.stops)
+    return [*lines, _settled(columns, span, rests)] if moving else lines
 
 
 def _stress(columns: Columns, mechanism: Mechanism, size: float) -> list[str]:
@@ -184,11 +185,16 @@ def stress_text(flexure: str, peak: float, strength: float | None, at: str = "")
     return f"stress in {flexure:10} {1e-6 * peak:.4g} MPa{at}{factor}"
 
 
-def _settled(columns: Columns, span: float) -> str:
-    """Return the line about the end of the motion."""
+def _settled(columns: Columns, span: float, rests: bool) -> str:
+    """Return the line about the end of the motion; ``rests``: a body rests on a stop."""
     for name in (KINETIC, FREQUENCY):
         column(columns, name)  # Raises an error if it is missing.
     when = settling(columns)
+    if math.isnan(when) and rests:
+        return (
+            "settled              not yet: a body rests on its stop, but the mechanism still "
+            "vibrates; prbm modes prints decay times"
+        )
     if math.isnan(when):
         return "settled              not yet, or too late to be certain: simulate longer"
     share = f"{100 * SETTLED_ENERGY_RTOL:g} %"
