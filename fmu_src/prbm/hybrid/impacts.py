@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.errors import SimulationError
-from ..base.tolerances import IMPACT_COUNT_MAX, REACTION_RANK_RTOL, SHORTEST_FLIGHT_RTOL
+from ..base.tolerances import IMPACT_COUNT_MAX, REACTION_RANK_RTOL, VANISHED_BOUNCE_RTOL
 from ..mechanics import contact, forces
 from ..mechanics.arrays import Real
 from ..mechanics.modal import fundamental_at, simulated_restitution
@@ -117,8 +117,8 @@ def _captured(
     """Return whether a stop that is struck slowly comes to rest.
 
     A stop comes to rest if it would be pressed after an impact without restitution, and its speed
-    is below ``rest_speed`` or the next flight would be shorter than ``SHORTEST_FLIGHT_RTOL`` of the
-    period.  A stop whose speed is round-off always comes to rest.
+    is below ``rest_speed`` or the next bounce would be lower than ``VANISHED_BOUNCE_RTOL`` of the
+    size.  A stop whose speed is round-off always comes to rest.
     """
     scales = configuration.scales
     if speed <= scales.zero_speed:
@@ -134,7 +134,7 @@ def _captured(
     evaluation = equations.at(front.time, landed.y)
     force = float(equations.stop_forces(evaluation.lam)[stop])
     pressing = force * landed.at.mobility(landed.at.gaps[[stop]])
-    return 2.0 * speed < pressing * SHORTEST_FLIGHT_RTOL * scales.time
+    return speed**2 < 2.0 * pressing * VANISHED_BOUNCE_RTOL * scales.length
 
 
 # --- impulses ---------------------------------------------------------------------------------

@@ -292,9 +292,9 @@ static bool impact_impulses(Simulation *sim, const double *q, const double *v, H
 
 /* --- captures --------------------------------------------------------------------------------- */
 
-/* Whether a resting stop is pressed so strongly that a bounce would be shorter than
- * SHORTEST_FLIGHT_RTOL of the period, or lower than the simulation mode resolves.  Such bounces
- * might never decay, because an impact detected late adds as much energy as it dissipates. */
+/* Whether a resting stop is pressed so strongly that a bounce would be lower than
+ * VANISHED_BOUNCE_RTOL of the size, or than the simulation mode resolves.  Such bounces might never
+ * decay, because an impact detected late adds as much energy as it dissipates. */
 static bool bounce_vanishes(Simulation *sim, int stop, const HoldingSet *resting, const double *q,
                             const double *v, double speed, bool *result, Problem *problem) {
     const System *system = system_of(sim);
@@ -312,10 +312,8 @@ static bool bounce_vanishes(Simulation *sim, int stop, const HoldingSet *resting
         return false;
     }
     double pressing = stop_force(holding, tried->lam, stop) * free;
-    double lowest = sim->state.mode.lowest_bounce * system->length;
-    double period = sim->configuration.scales.time;
-    *result = 2.0 * speed < pressing * SHORTEST_FLIGHT_RTOL * period ||
-              speed * speed < 2.0 * pressing * lowest;
+    double lowest = greater(VANISHED_BOUNCE_RTOL, sim->state.mode.lowest_bounce) * system->length;
+    *result = speed * speed < 2.0 * pressing * lowest;
     return true;
 }
 
