@@ -474,3 +474,10 @@ def test_a_table_may_begin_with_a_jump():
     assert after(table, 0.0) == 1.0
     with pytest.raises(ParameterError, match="two equal ones are a jump"):
         Table((0.0, 0.0, 0.0), (0.0, 1.0, 2.0))
+
+
+@pytest.mark.parametrize("source", ["step(1 mN.s, 0 s)", 1e-3, "pulse(1 mN.s, 2 ms)"])
+def test_an_impulse_at_the_start_is_rejected(guide, source):
+    """It acts by its increases, of which there is none at the start."""
+    with pytest.raises(ParameterError, match=r"impulse\.x = 0\.001 N\.s at t = 0 s has no effect"):
+        simulate(guide, inputs={"force.impulse.x": source}, stop_time=0.01)

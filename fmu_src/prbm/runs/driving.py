@@ -85,6 +85,8 @@ class Driver:
         for name, signal in signals.items():
             if kinds[name] == "displacement":
                 _check_continuity(name, signal, start)
+            elif kinds[name] == IMPULSE:
+                _check_start(name, signal, start)
 
     def values(self, t: float) -> dict[str, float]:
         """Return the values of the signals from time t [s] on."""
@@ -199,3 +201,15 @@ def _check_continuity(name: str, signal: Signal, start: float) -> None:
                 f"the signal of {name} jumps from {left:.6g} m to {right:.6g} m at t = {t:.6g} s: "
                 "a wall cannot jump; give a ramp, such as the rows of a CSV file"
             )
+
+
+def _check_start(name: str, signal: Signal, start: float) -> None:
+    """Reject an impulse that is not zero at the start [s]."""
+    value = after(signal, start)
+    if value:
+        unit = LOADS[name.rpartition(".")[2]]
+        raise ParameterError(
+            f"{name} = {value:.6g} {unit}.s at t = {start:g} s has no effect, because an impulse "
+            "acts by its increases after the start: let it increase later, as in "
+            f"step({value:.6g} {unit}.s, 1 ms), or give the released body a velocity"
+        )
