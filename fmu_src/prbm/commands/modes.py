@@ -52,7 +52,7 @@ def frequencies(options: argparse.Namespace) -> None:
     rows = [
         [
             str(k + 1),
-            _hertz(float(found.frequency[k])),
+            _hertz(float(found.frequency[k]), found.rounding),
             _ratio(ratios[k]),
             _seconds(times[k]),
             *(f"{100 * x:.1f} %" for x in shares[k]),
@@ -107,9 +107,10 @@ def _shares(system: System, e: Complex, phi: Real) -> list[float]:
     return [*shares, max(0.0, 1.0 - sum(shares))]  # The modal masses are 1.
 
 
-def _hertz(frequency: float) -> str:
-    if frequency <= 0.0:
-        return "unstable"
+def _hertz(frequency: float, rounding: float) -> str:
+    """Return a frequency [Hz] as text, or a word; smaller ones than ``rounding`` are round-off."""
+    if frequency <= rounding:
+        return "free" if frequency >= -rounding else "unstable"
     factor, unit = frequency_unit(frequency)
     return f"{factor * frequency:#.5g} {unit}"
 

@@ -32,6 +32,11 @@ class Modes:
     shape: Real
     M: Real
 
+    @property
+    def rounding(self) -> float:
+        """Frequency below which a frequency is round-off: the mode is free [Hz]."""
+        return ZERO_FREQUENCY_RTOL * float(np.abs(self.frequency).max())
+
 
 def modes(system: System, shape: Equilibrium) -> Modes:
     """Return the modes about a static shape.
@@ -93,9 +98,8 @@ def damping(system: System, found: Modes) -> tuple[Real, Real]:
         system.values["damping.beta"] * springs_only
     )
     omega = 2 * math.pi * found.frequency
-    least = ZERO_FREQUENCY_RTOL * float(np.abs(omega).max())
     ratios, times = np.full((2, len(omega)), math.nan)
-    for k in np.flatnonzero(omega > least):
+    for k in np.flatnonzero(found.frequency > found.rounding):
         ratios[k] = ratio = float(rates[k]) / (2.0 * float(omega[k]))
         root = math.sqrt(max(ratio**2 - 1.0, 0.0))
         # The slower motion, without the difference of two large numbers.
@@ -110,9 +114,9 @@ def fundamental_frequency(system: System) -> float:
 
     It is zero if that equilibrium is unstable, or if a motion deforms no spring.
     """
-    frequency = modes(system, equilibrium(system)).frequency
-    lowest = float(frequency[0])
-    return lowest if lowest > ZERO_FREQUENCY_RTOL * float(np.abs(frequency).max()) else 0.0
+    found = modes(system, equilibrium(system))
+    lowest = float(found.frequency[0])
+    return lowest if lowest > found.rounding else 0.0
 
 
 def slow_rates(system: System) -> tuple[float, float]:
@@ -126,8 +130,8 @@ def slow_rates(system: System) -> tuple[float, float]:
     The second is the scale of times: the same, or the lowest angular frequency if it is larger and
     the mechanism is not unstable.
     """
-    frequency = modes(system, equilibrium(system)).frequency
-    least = ZERO_FREQUENCY_RTOL * float(np.abs(frequency).max())
+    found = modes(system, equilibrium(system))
+    frequency, least = found.frequency, found.rounding
     if frequency[0] < -least:
         return (-2 * math.pi * float(frequency[0]),) * 2
     speed = abs(value(system.mechanism.release, "velocity", system.values))

@@ -5,7 +5,8 @@ from collections.abc import Mapping
 
 from ..base.unit_text import frequency_unit, length_unit, prefixed_unit, time_unit
 from ..mechanics.assembly import assemble
-from ..mechanics.statics import free_displacement
+from ..mechanics.modal import modes
+from ..mechanics.statics import equilibrium, free_displacement
 from ..mechanics.stress import stressed
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
@@ -208,6 +209,9 @@ def _free(columns: Columns, system: System) -> list[str]:
     """Return the lines about the equilibrium without stops."""
     frequency = column(columns, FREQUENCY)[0]
     if frequency == 0.0:
+        found = modes(system, equilibrium(system))
+        if found.frequency[0] >= -found.rounding:
+            return ["fundamental          none: without stops, a motion deforms no flexure"]
         weight = " under gravity" if system.gravity else ""
         return [f"fundamental          none: without stops, the equilibrium{weight} is unstable"]
     factor, hertz = frequency_unit(frequency)
