@@ -28,6 +28,7 @@ PROJECTION_FACTOR = 1.0  # Of the square root of the tolerance: largest change b
 STATICS_ITERATIONS_MAX = 30  # Newton steps at one load.
 STATICS_TURN_MAX = 0.5  # rad per Newton step and load step; a larger turn reaches another shape.
 STATICS_TURN_AIM = 0.45  # rad per load step, at which the control of load steps aims.
+STATICS_CLOSE_SHARE = 0.1  # Of these turns, if a path is followed closely.
 STATICS_TURN_MIN = 1e-300  # rad; any positive number, to divide by.
 STATICS_LOAD_STEP_MIN = 2**-14  # Of the load: smallest continuation step.
 STATICS_HINT_SHARE = 1 / 128  # Of the load: if less is carried, pins may turn freely.

@@ -20,6 +20,7 @@ from ..base.errors import EquilibriumError, ParameterError, SimulationError
 from ..base.tolerances import (
     RELEASE_LEVER_RTOL,
     ROW_RTOL,
+    STATICS_CLOSE_SHARE,
     STATICS_CONSTRAINT_RTOL,
     STATICS_FORCE_RTOL,
     STATICS_GROWTH_MAX,
@@ -179,10 +180,16 @@ def equilibrium(
         change = displacement - begin
         state = np.concatenate([near.q, near.lam, [near.force / unit]])
         state, done = _follow(system, lambda share: (begin + share * change, w, moment), state)
-    straight = np.concatenate([system.q0, np.zeros(r + (displacement is not None))])
-    for may_snap in (False, True):
-        if done < 1.0:
-            state, done = _follow(system, from_straight, straight, may_snap)
+    if done < 1.0:
+        straight = np.concatenate([system.q0, np.zeros(r + (displacement is not None))])
+        state, done = _follow(system, from_straight, straight)
+        signs = [
+            _determinant_sign(system, from_straight(share), shape)
+            for share, shape in ((0.0, straight), (1.0, state))
+        ]
+        if done == 1.0 and signs[0] * signs[1] < 0:
+            closely, reached = _follow(system, from_straight, straight, closely=True)
+            state = closely if reached == 1.0 else state
     if done < 1.0:
         raise EquilibriumError(_unreachable(system, displacement, bool(loads), done))
     force = unit * float(state[n + r]) if displacement is not None else 0.0
@@ -190,13 +197,13 @@ def equilibrium(
 
 
 def _follow(
-    system: System, given: Callable[[float], _Given], state: Real, may_snap: bool = False
+    system: System, given: Callable[[float], _Given], state: Real, closely: bool = False
 ) -> tuple[Real, float]:
     """Change what is given from a share of 0, with the state there, slowly towards a share of 1.
 
     The turn in a step determines the size of the next one, which does not grow after a rejected
-    step.  A step that changes the sign of the determinant may have jumped to an unstable branch
-    beside the path: unless the mechanism may snap, only a step of the smallest size may do so.
+    step.  A long step may jump to an unstable branch beside the path.  Closely, the steps turn
+    little, and only the smallest of them may change the sign of the determinant.
 
     Returns
     -------
@@ -209,7 +216,8 @@ def _follow(
     # another coordinate jumps, slow loading does not reach the shape.
     bent = sorted({*system.links, *np.flatnonzero(np.diag(system.K) > 0.0).tolist()})
     done, step, growth = 0.0, 1.0, STATICS_GROWTH_MAX
-    sign = _determinant_sign(system, given(0.0), state)
+    part = STATICS_CLOSE_SHARE if closely else 1.0
+    sign = _determinant_sign(system, given(0.0), state) if closely else 0
     while done < 1.0:
         target = min(1.0, done + step)
         # The difference of target and done may be rounded to more than the smallest step.
@@ -218,11 +226,11 @@ def _follow(
         held, w, moment = given(target)
         trial = _newton(system, held, (w, moment), state)
         if trial is not None and _holds(system, held, trial):
-            crossed = _determinant_sign(system, (held, w, moment), trial)
-            if may_snap or smallest or sign * crossed >= 0:
+            crossed = _determinant_sign(system, (held, w, moment), trial) if closely else sign
+            if smallest or sign * crossed >= 0 or not closely:
                 turn = float(np.abs((trial - state)[bent]).max(initial=0.0))
-        ratio = STATICS_TURN_AIM / max(turn, STATICS_TURN_MIN)
-        if trial is not None and turn <= STATICS_TURN_MAX:
+        ratio = part * STATICS_TURN_AIM / max(turn, STATICS_TURN_MIN)
+        if trial is not None and turn <= part * STATICS_TURN_MAX:
             state, done, sign = trial, target, crossed
             ratio, growth = min(growth, ratio), STATICS_GROWTH_MAX
         elif smallest:

@@ -300,20 +300,22 @@ static bool holds(const System *system, bool held, double amount, const double *
 
 /* Increase the load and the displacement together from the straight, unloaded shape, so that the
  * result is the equilibrium that slow loading reaches.  The turn in a load step determines the size of
- * the next one, which does not grow after a rejected step.  A step that changes the sign of the
- * determinant is only taken with the smallest size, unless the mechanism may snap: a longer one may
- * have jumped to an unstable branch beside the path.  state is (q, lam, force).  Returns the share of
- * the load that is reached. */
-static double load_slowly(const System *system, bool held, double displacement, bool may_snap,
-                          double *state, Scratch *scratch) {
+ * the next one, which does not grow after a rejected step.  A long step may jump to an unstable branch
+ * beside the path.  Closely, the steps turn little, and only the smallest of them may change the sign
+ * of the determinant.  state is (q, lam, force), first and last the signs at its ends.  Returns the
+ * share of the load that is reached. */
+static double load_slowly(const System *system, bool held, double displacement, bool closely,
+                          double *state, int *first, int *last, Scratch *scratch) {
     size_t used = scratch->used;
-    int size = system->n + system->r + held, sign, crossed;
+    int size = system->n + system->r + held, crossed;
+    double part = closely ? STATICS_CLOSE_SHARE : 1.0;
     double *trial = take(scratch, (size_t)size), done = 0.0, step = 1.0;
     double growth = STATICS_GROWTH_MAX;
     bool going = true;
     zeros(size, state);
     copy(system->n, system->q0, state);
-    loaded(system, held, displacement, 0.0, state, &sign, scratch);
+    loaded(system, held, displacement, 0.0, state, first, scratch);
+    *last = *first;
     while (done < 1.0 && going) {
         double target = lesser(1.0, done + step), turn = HUGE_VAL, ratio = STATICS_SHRINK;
         /* The difference of target and done may be rounded to more than the smallest step. */
@@ -322,14 +324,14 @@ static double load_slowly(const System *system, bool held, double displacement, 
         copy(size, state, trial);
         if (loaded(system, held, displacement, target, trial, &crossed, scratch) &&
             holds(system, held, target * displacement, trial) &&
-            (may_snap || smallest || sign * crossed >= 0)) {
+            (smallest || *last * crossed >= 0 || !closely)) {
             turn = jump(system, state, trial);
-            ratio = STATICS_TURN_AIM / greater(turn, STATICS_TURN_MIN);
+            ratio = part * STATICS_TURN_AIM / greater(turn, STATICS_TURN_MIN);
         }
-        if (turn <= STATICS_TURN_MAX) {
+        if (turn <= part * STATICS_TURN_MAX) {
             copy(size, trial, state);
             done = target;
-            sign = crossed;
+            *last = crossed;
             ratio = lesser(growth, ratio);
             growth = STATICS_GROWTH_MAX;
         } else { /* If a link jumps, slow loading does not reach this equilibrium. */
@@ -343,13 +345,19 @@ static double load_slowly(const System *system, bool held, double displacement, 
     return done;
 }
 
-/* Load the mechanism slowly; if it snaps on the way, find an equilibrium beyond the snap. */
+/* Load the mechanism slowly.  If a direction has become unstable, the search may have jumped, and the
+ * path is followed closely; if that does not reach the load, the mechanism snaps. */
 static bool load_fully(const System *system, bool held, double displacement, double *state,
                        Scratch *scratch, Problem *problem) {
-    double done = load_slowly(system, held, displacement, false, state, scratch);
-    if (done < 1.0) {
-        done = load_slowly(system, held, displacement, true, state, scratch);
+    size_t used = scratch->used;
+    int size = system->n + system->r + held, first, last;
+    double *close = take(scratch, (size_t)size);
+    double done = load_slowly(system, held, displacement, false, state, &first, &last, scratch);
+    if (done >= 1.0 && first * last < 0 &&
+        load_slowly(system, held, displacement, true, close, &first, &last, scratch) >= 1.0) {
+        copy(size, close, state);
     }
+    scratch->used = used;
     return done >= 1.0 || unreachable(system, held, displacement, done, problem);
 }
 
