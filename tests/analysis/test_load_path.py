@@ -13,6 +13,7 @@ from prbm.mechanics.assembly import assemble
 from prbm.mechanics.forces import elastic_energy
 from prbm.mechanics.statics import holding_stiffness
 from prbm.mechanism.parts import Force
+from prbm.plots.load_path import load_path_figure
 from support import ROOT, mechanism
 
 CASES = ROOT / "tests" / "cases"
@@ -108,3 +109,16 @@ def test_a_path_that_begins_without_stiffness_is_refused():
     system = pushed(hinged, **{"gravity.x": 0.0, "gravity.y": 0.0})
     with pytest.raises(EquilibriumError, match="no stiffness"):
         load_path(system, {}, {"push.y": 1.0})
+
+
+def test_the_figure_shows_events_and_unstable_shapes():
+    system = pushed(mechanism("CurvedBistable"), **{"gravity.y": 0.0})
+    path = load_path(system, {}, {"push.y": -40.0})
+    loads = np.array([-40.0 * point.share for point in path.points])
+    drawn = load_path_figure(path, amounts(system, path), loads, "push.y [N]", "Curved")
+    lines = {line.get_label(): line for line in drawn.axes[0].get_lines()}
+    for kind in ("limit point", "bifurcation"):
+        expected = [-40.0 * point.share for name, point in path.events if name == kind]
+        np.testing.assert_array_equal(lines[kind].get_ydata(), expected)
+    unstable = [point.unstable > 0 for point in path.points]
+    np.testing.assert_array_equal(np.isnan(lines["stable"].get_ydata()), unstable)

@@ -40,7 +40,7 @@ POINTS_MAX = 2000  # Of a path.
 EVENT_BISECTIONS = 30  # Of the step in which an event is located.
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PathPoint:
     """An equilibrium on the path.
 

@@ -57,11 +57,11 @@ def vary(
     varied = np.array([low + point.share * (high - low) for point in path.points])
     unit = held_unit(mechanism)
     _print(path, amounts, varied, f"{name} [{si}]", system)
-    kinds = {id(point): kind for kind, point in path.events}
+    kinds = {point: kind for kind, point in path.events}
     output.table(
         f"{mechanism.name}-load-path.csv",
         [f"{unit.amount} [{unit.si}]", f"{name} [{si}]", "unstable directions", "event"],
-        [[float(x), float(load), point.unstable, kinds.get(id(point), "")]
+        [[float(x), float(load), point.unstable, kinds.get(point, "")]
          for x, load, point in zip(amounts, varied, path.points, strict=True)],
     )  # fmt: skip
     label, turns = f"{name} [{si.replace('.', ' ')}]", mechanism.release.turns
@@ -88,7 +88,7 @@ def _print(
     print(aligned([f"at [{unit.shown}]", label, "unstable directions"], rows))
     print(f"{len(chosen)} of {count} points; write all with --out DIR")
     for kind, point in path.events:
-        k = next(i for i, one in enumerate(path.points) if one is point)
+        k = path.points.index(point)
         at = rounded(unit.factor * amounts[k], scale)
         print(f"{kind} at {at} {unit.shown}, under {varied[k]:.5g} {label.partition('[')[2][:-1]}")
     if path.ended:
