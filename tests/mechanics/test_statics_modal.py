@@ -212,7 +212,6 @@ def test_slow_loading_ends_at_the_largest_load_that_can_be_carried(monkeypatch):
             return np.full(system.n, slope * share) if share <= limit else None
 
         monkeypatch.setattr(statics, "_newton", carried)
-        monkeypatch.setattr(statics, "_determinant_sign", lambda *_: 1)
         start = np.zeros(system.n)
         _, done = statics._follow(system, lambda share: (None, None, share), start)
         assert limit - 1.001 * STATICS_LOAD_STEP_MIN <= done <= limit

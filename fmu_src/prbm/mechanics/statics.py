@@ -169,7 +169,7 @@ def equilibrium(
                 f"{_release_text(system, displacement)}: {_turning_message(system)}"
             )
     n, r = system.n, len(system.loops)
-    unit = system.length if system.mechanism.release.turns else 1.0  # The row is turn times size.
+    unit = _holding_unit(system)
 
     def from_straight(share: float) -> _Given:
         return None if displacement is None else share * displacement, share * w, share * moment
@@ -182,18 +182,29 @@ def equilibrium(
         state, done = _follow(system, lambda share: (begin + share * change, w, moment), state)
     if done < 1.0:
         straight = np.concatenate([system.q0, np.zeros(r + (displacement is not None))])
-        state, done = _follow(system, from_straight, straight)
-        signs = [
-            _determinant_sign(system, from_straight(share), shape)
-            for share, shape in ((0.0, straight), (1.0, state))
-        ]
-        if done == 1.0 and signs[0] * signs[1] < 0:
-            closely, reached = _follow(system, from_straight, straight, closely=True)
-            state = closely if reached == 1.0 else state
+        state, done = _load_fully(system, from_straight, straight)
     if done < 1.0:
         raise EquilibriumError(_unreachable(system, displacement, bool(loads), done))
     force = unit * float(state[n + r]) if displacement is not None else 0.0
     return Equilibrium(state[:n], state[n : n + r], force, w)
+
+
+def _load_fully(
+    system: System, given: Callable[[float], _Given], straight: Real
+) -> tuple[Real, float]:
+    """Load the mechanism slowly from the straight shape; the arguments are those of _follow.
+
+    If a direction has become unstable, the search may have jumped, and the path is followed
+    closely; if that does not reach the load, the mechanism snaps.
+    """
+    state, done = _follow(system, given, straight)
+    if done == 1.0:
+        ends = (given(0.0), straight), (given(1.0), state)
+        before, after = (_determinant_sign(system, *end) for end in ends)
+        if before * after < 0:
+            closely, reached = _follow(system, given, straight, closely=True)
+            state = closely if reached == 1.0 else state
+    return state, done
 
 
 def _follow(
@@ -221,23 +232,22 @@ def _follow(
     while done < 1.0:
         target = min(1.0, done + step)
         # The difference of target and done may be rounded to more than the smallest step.
-        step, turn, crossed = min(step, 1.0 - done), math.inf, sign
-        smallest = step <= STATICS_LOAD_STEP_MIN
+        step, turn, ratio = min(step, 1.0 - done), math.inf, STATICS_SHRINK
+        smallest, crossed = step <= STATICS_LOAD_STEP_MIN, 0
         held, w, moment = given(target)
         trial = _newton(system, held, (w, moment), state)
         if trial is not None and _holds(system, held, trial):
-            crossed = _determinant_sign(system, (held, w, moment), trial) if closely else sign
-            if smallest or sign * crossed >= 0 or not closely:
+            crossed = _determinant_sign(system, (held, w, moment), trial) if closely else 0
+            if smallest or sign * crossed >= 0:
                 turn = float(np.abs((trial - state)[bent]).max(initial=0.0))
-        ratio = part * STATICS_TURN_AIM / max(turn, STATICS_TURN_MIN)
+                ratio = part * STATICS_TURN_AIM / max(turn, STATICS_TURN_MIN)
         if trial is not None and turn <= part * STATICS_TURN_MAX:
             state, done, sign = trial, target, crossed
             ratio, growth = min(growth, ratio), STATICS_GROWTH_MAX
         elif smallest:
             break
         else:
-            ratio = max(STATICS_SHRINK_MIN, ratio if math.isfinite(turn) else STATICS_SHRINK)
-            growth = 1.0
+            ratio, growth = max(STATICS_SHRINK_MIN, ratio), 1.0
         step = max(STATICS_LOAD_STEP_MIN, ratio * step)
     return state, done
 
@@ -246,11 +256,21 @@ def _determinant_sign(system: System, given: _Given, state: Real) -> int:
     """Return the sign of the determinant of the balance in a state; 0 if it is singular."""
     held, w, _ = given
     B = system.loops if held is None else np.vstack([system.loops, system.holding(held)[0]])
-    e = system.directions(state[: system.n])
-    rows = system.gradient(B, e)
-    K_t = tangent_stiffness(system.K, w, B, state[system.n :], e, system.arm, system.Phi)
-    kkt = constraints.saddle(K_t, rows, rows)
+    kkt = _linear_balance(system, state[: system.n], w, B, state[system.n :])
     return constraints.determinant_sign(kkt, system.n, system.length)
+
+
+def _linear_balance(system: System, q: Real, w: Complex, B: Complex, lam: Real) -> Real:
+    """Return [[K_t, rows^T], [rows, 0]] for a row w of loads and constraints B with multipliers."""
+    e = system.directions(q)
+    rows = system.gradient(B, e)
+    K_t = tangent_stiffness(system.K, w, B, lam, e, system.arm, system.Phi)
+    return constraints.saddle(K_t, rows, rows)
+
+
+def _holding_unit(system: System) -> float:
+    """Return the holding force or moment of the multiplier one: an angle's row has the size."""
+    return system.length if system.mechanism.release.turns else 1.0
 
 
 def load_row(system: System, loads: Mapping[str, float]) -> tuple[Complex, Real]:
@@ -462,7 +482,7 @@ def holding_stiffness(system: System, shape: Equilibrium) -> float:
         Stiffness [N/m]; [N m/rad] if the release is by an angle; NaN where the loops or a body
         without stiffness leave it undetermined.
     """
-    unit = system.length if system.mechanism.release.turns else 1.0
+    unit = _holding_unit(system)
     kkt = balance_matrix(system, shape, held=True)
     right = np.zeros(len(kkt))
     right[-1] = unit
@@ -478,13 +498,10 @@ def balance_matrix(system: System, shape: Equilibrium, held: bool) -> Real:
 
     The rows are those of the loops and, if the released body is held, that of its displacement.
     """
-    unit = system.length if system.mechanism.release.turns else 1.0
     B = np.vstack([system.loops, system.holding_row(shape.q)])
-    lam = np.append(shape.lam, shape.force / unit)
-    e = system.directions(shape.q)
-    K_t = tangent_stiffness(system.K, shape.load, B, lam, e, system.arm, system.Phi)
-    rows = system.gradient(B if held else system.loops, e)
-    return constraints.saddle(K_t, rows, rows)
+    lam = np.append(shape.lam, shape.force / _holding_unit(system))
+    kkt = _linear_balance(system, shape.q, shape.load, B, lam)
+    return kkt if held else kkt[:-1, :-1]
 
 
 def _left_by_loops(system: System, e: Complex, rows: Real) -> float:

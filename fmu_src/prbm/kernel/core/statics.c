@@ -173,28 +173,9 @@ static bool balance_out(const Balance *balance, double *state, Scratch *scratch)
     return done || (balanced && !going);
 }
 
-/* Return the sign of the determinant of the balance in a state; 0 if it is singular. */
-static int determinant_sign_at(const Balance *balance, const double *state, Scratch *scratch) {
-    const System *system = balance->system;
-    size_t used = scratch->used;
-    int n = system->n, r = balance->rows.count, size = n + r;
-    Complex *e = take_complex(scratch, 1, system->d);
-    double *K_t = take_matrix(scratch, n, n), *kkt = take_matrix(scratch, size, size);
-    double *rows = take_matrix(scratch, r, n);
-    directions(system, state, e);
-    jacobian(&balance->rows, e, rows);
-    tangent_stiffness(system, r, balance->w, balance->rows.B, state + n, e, K_t);
-    saddle(n, r, K_t, rows, rows, kkt);
-    int sign = determinant_sign(n, r, kkt, system->length, scratch);
-    scratch->used = used;
-    return sign;
-}
-
-/* Find the equilibrium at a fraction of gravity and, if held, of the displacement.  At the fraction
- * 0 the state is the equilibrium.  sign is that of the determinant there. */
-static bool loaded(const System *system, bool held, double displacement, double fraction,
-                   double *state, int *sign, Scratch *scratch) {
-    size_t used = scratch->used;
+/* Return the balance at a fraction of gravity and, if held, of the displacement. */
+static Balance balance_at(const System *system, bool held, double displacement, double fraction,
+                          Scratch *scratch) {
     int d = system->d, r = system->r;
     Complex *B = take_complex(scratch, r + 1, d);
     double *c = take(scratch, (size_t)r + 1);
@@ -202,10 +183,35 @@ static bool loaded(const System *system, bool held, double displacement, double 
     stack_holding(system, fraction * displacement, B, c);
     field_row(d, system->S, scaled(fraction, system->gravity), balance.w);
     spread(system, 1, balance.w, balance.w);
-    bool balanced = fraction == 0.0 || balance_out(&balance, state, scratch);
-    *sign = balanced ? determinant_sign_at(&balance, state, scratch) : 0;
+    return balance;
+}
+
+/* Find the equilibrium at a fraction of the load, from a state that is overwritten. */
+static bool loaded(const System *system, bool held, double displacement, double fraction,
+                   double *state, Scratch *scratch) {
+    size_t used = scratch->used;
+    Balance balance = balance_at(system, held, displacement, fraction, scratch);
+    bool balanced = balance_out(&balance, state, scratch);
     scratch->used = used;
     return balanced;
+}
+
+/* Return the sign of the determinant at an equilibrium at a fraction of the load; 0 if singular. */
+static int sign_at(const System *system, bool held, double displacement, double fraction,
+                   const double *state, Scratch *scratch) {
+    size_t used = scratch->used;
+    Balance balance = balance_at(system, held, displacement, fraction, scratch);
+    int n = system->n, r = balance.rows.count, size = n + r;
+    Complex *e = take_complex(scratch, 1, system->d);
+    double *K_t = take_matrix(scratch, n, n), *kkt = take_matrix(scratch, size, size);
+    double *rows = take_matrix(scratch, r, n);
+    directions(system, state, e);
+    jacobian(&balance.rows, e, rows);
+    tangent_stiffness(system, r, balance.w, balance.rows.B, state + n, e, K_t);
+    saddle(n, r, K_t, rows, rows, kkt);
+    int sign = determinant_sign(n, r, kkt, system->length, scratch);
+    scratch->used = used;
+    return sign;
 }
 
 /* Return the largest change of a coordinate between two states [rad].  Bodies without springs are
@@ -298,40 +304,46 @@ static bool holds(const System *system, bool held, double amount, const double *
            fabs(state[j] - system->q0[j] - amount) < STATICS_TURN_MAX;
 }
 
+/* Set the state (q, lam, force) of the straight, unloaded shape. */
+static void straighten(const System *system, bool held, double *state) {
+    zeros(system->n + system->r + held, state);
+    copy(system->n, system->q0, state);
+}
+
 /* Increase the load and the displacement together from the straight, unloaded shape, so that the
  * result is the equilibrium that slow loading reaches.  The turn in a load step determines the size of
  * the next one, which does not grow after a rejected step.  A long step may jump to an unstable branch
  * beside the path.  Closely, the steps turn little, and only the smallest of them may change the sign
- * of the determinant.  state is (q, lam, force), first and last the signs at its ends.  Returns the
- * share of the load that is reached. */
+ * of the determinant.  Returns the share of the load that is reached, with its state. */
 static double load_slowly(const System *system, bool held, double displacement, bool closely,
-                          double *state, int *first, int *last, Scratch *scratch) {
+                          double *state, Scratch *scratch) {
     size_t used = scratch->used;
-    int size = system->n + system->r + held, crossed;
+    int size = system->n + system->r + held;
     double part = closely ? STATICS_CLOSE_SHARE : 1.0;
     double *trial = take(scratch, (size_t)size), done = 0.0, step = 1.0;
     double growth = STATICS_GROWTH_MAX;
     bool going = true;
-    zeros(size, state);
-    copy(system->n, system->q0, state);
-    loaded(system, held, displacement, 0.0, state, first, scratch);
-    *last = *first;
+    straighten(system, held, state);
+    int sign = closely ? sign_at(system, held, displacement, 0.0, state, scratch) : 0;
     while (done < 1.0 && going) {
         double target = lesser(1.0, done + step), turn = HUGE_VAL, ratio = STATICS_SHRINK;
+        int crossed = 0;
         /* The difference of target and done may be rounded to more than the smallest step. */
         step = lesser(step, 1.0 - done);
         bool smallest = step <= STATICS_LOAD_STEP_MIN;
         copy(size, state, trial);
-        if (loaded(system, held, displacement, target, trial, &crossed, scratch) &&
-            holds(system, held, target * displacement, trial) &&
-            (smallest || *last * crossed >= 0 || !closely)) {
-            turn = jump(system, state, trial);
-            ratio = part * STATICS_TURN_AIM / greater(turn, STATICS_TURN_MIN);
+        if (loaded(system, held, displacement, target, trial, scratch) &&
+            holds(system, held, target * displacement, trial)) {
+            crossed = closely ? sign_at(system, held, displacement, target, trial, scratch) : 0;
+            if (smallest || sign * crossed >= 0) {
+                turn = jump(system, state, trial);
+                ratio = part * STATICS_TURN_AIM / greater(turn, STATICS_TURN_MIN);
+            }
         }
         if (turn <= part * STATICS_TURN_MAX) {
             copy(size, trial, state);
             done = target;
-            *last = crossed;
+            sign = crossed;
             ratio = lesser(growth, ratio);
             growth = STATICS_GROWTH_MAX;
         } else { /* If a link jumps, slow loading does not reach this equilibrium. */
@@ -349,16 +361,22 @@ static double load_slowly(const System *system, bool held, double displacement, 
  * path is followed closely; if that does not reach the load, the mechanism snaps. */
 static bool load_fully(const System *system, bool held, double displacement, double *state,
                        Scratch *scratch, Problem *problem) {
+    double done = load_slowly(system, held, displacement, false, state, scratch);
+    if (!(done >= 1.0)) {
+        return unreachable(system, held, displacement, done, problem);
+    }
     size_t used = scratch->used;
-    int size = system->n + system->r + held, first, last;
+    int size = system->n + system->r + held;
     double *close = take(scratch, (size_t)size);
-    double done = load_slowly(system, held, displacement, false, state, &first, &last, scratch);
-    if (done >= 1.0 && first * last < 0 &&
-        load_slowly(system, held, displacement, true, close, &first, &last, scratch) >= 1.0) {
+    straighten(system, held, close);
+    int before = sign_at(system, held, displacement, 0.0, close, scratch);
+    int after = sign_at(system, held, displacement, 1.0, state, scratch);
+    if (before * after < 0 &&
+        load_slowly(system, held, displacement, true, close, scratch) >= 1.0) {
         copy(size, close, state);
     }
     scratch->used = used;
-    return done >= 1.0 || unreachable(system, held, displacement, done, problem);
+    return true;
 }
 
 /* Return whether the loops are closed in the shape as drawn. */
@@ -377,8 +395,7 @@ PRBM bool equilibrium(const System *system, bool held, double displacement, Equi
     size_t used = scratch->used;
     int n = system->n, r = system->r;
     double *state = take(scratch, (size_t)n + (size_t)r + 1);
-    zeros(n + r + 1, state);
-    copy(n, system->q0, state);
+    straighten(system, true, state);
     bool straight = !heavy(system) && !(held && displacement != 0.0) && drawn_closed(system, scratch);
     bool found = straight || ((!held || displaceable(system, displacement, scratch, problem)) &&
                               load_fully(system, held, displacement, state, scratch, problem));
