@@ -94,36 +94,44 @@ class _Curve:
         n = self.system.n
         return Equilibrium(state[:n], state[n:-1], 0.0, self.loads[0] + state[-1] * self.loads[1])
 
-    def solve(self, state: Real, normal: Real, step: Real, balanced: bool = False) -> Real:
-        """Solve the linearised equations for a change of the state with normal^T change = step.
+    def equations(self, state: Real) -> tuple[Real, Real, Real]:
+        """Return the matrix of small changes, the column of the share, and the residual.
 
-        With ``balanced``, the state is an equilibrium, and the change is along the tangent.
+        The residual has the torques [N m] and the negative open distances of the loops [m].
         """
         system, shape = self.system, self.shape(state)
         n, e = system.n, system.directions(shape.q)
         kkt = balance_matrix(system, shape, held=False)
-        by_share = system.Phi.pull((self.loads[1] * e).real) + self.moments[1]
-        loads = system.Phi.pull((shape.load * e).real) + self.moments[0]
-        torque = springs(system.K, shape.q - system.q0) + loads + state[-1] * self.moments[1]
-        torque = torque + shape.lam @ kkt[n:, :n]
+        loads, by_share = (
+            system.Phi.pull((w * e).real) + moment
+            for w, moment in (
+                (shape.load, self.moments[0] + state[-1] * self.moments[1]),
+                (self.loads[1], self.moments[1]),
+            )
+        )
+        torque = springs(system.K, shape.q - system.q0) + loads + shape.lam @ kkt[n:, :n]
         open_by = system.loop_rows.values(e)
         column = np.concatenate([-by_share, np.zeros(len(open_by))])
-        right = np.concatenate([0.0 * torque if balanced else torque, -open_by, step])
-        x = constraints.solve_bordered(kkt, column, normal, right, n, system.length)
+        return kkt, column, np.concatenate([torque, -open_by])
+
+    def solve(self, kkt: Real, column: Real, normal: Real, right: Real) -> Real:
+        """Solve the linear equations for the change of a state, whose last row is ``normal``."""
+        n = self.system.n
+        x = constraints.solve_bordered(kkt, column, normal, right, n, self.system.length)
         x[n:-1] *= -1.0
         return x
 
     def correct(self, guess: Real, normal: Real) -> Real | None:
         """Return the equilibrium in the plane through a guess; None without convergence."""
         state, size = guess.copy(), math.inf
-        n = self.system.n
         for _ in range(NEWTON_MAX):
-            across = np.array([normal @ (guess - state)])
+            kkt, column, residual = self.equations(state)
+            right = np.append(residual, normal @ (guess - state))
             try:
-                change = self.solve(state, normal, across)
+                change = self.solve(kkt, column, normal, right)
             except SimulationError:
                 return None
-            last, size = size, float(np.abs(change[:n]).max())
+            last, size = size, float(np.abs(change[: self.system.n]).max())
             if not size < 2.0 * last:
                 return None
             state = state + change
@@ -138,7 +146,9 @@ class _Curve:
 
     def point(self, state: Real, along: Real) -> PathPoint:
         """Return a point with its tangent in the sense of another one."""
-        t = self.solve(state, self.weighted(along), np.ones(1), balanced=True)
+        kkt, column, residual = self.equations(state)
+        right = np.append(np.zeros_like(residual), 1.0)
+        t = self.solve(kkt, column, self.weighted(along), right)
         t = t / math.sqrt(float(self.weighted(t) @ t))
         shape = self.shape(state)
         unstable = int(np.count_nonzero(modes(self.system, shape).frequency < 0.0))
