@@ -6,7 +6,7 @@ import numpy as np
 
 from ..analysis.load_path import LoadPath, load_path
 from ..files.settings import UserMistake, quantity
-from ..mechanics.inputs import LOADS
+from ..mechanics.inputs import load_units
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from ..plots.load_path import load_path_figure
@@ -14,15 +14,6 @@ from .output import Output, aligned
 from .systems import held_scale, held_unit, rounded
 
 ROWS_SHOWN = 12
-
-
-def load_units(mechanism: Mechanism) -> dict[str, str]:
-    """Return the units of the loads by name."""
-    return {
-        f"{force.name}.{component}": si
-        for force in mechanism.forces
-        for component, si in LOADS.items()
-    }
 
 
 def given_load(mechanism: Mechanism, option: str, text: str) -> tuple[str, str, str]:

@@ -161,13 +161,18 @@ def input_units(mechanism: Mechanism) -> dict[str, str]:
     """Return the inputs in the order of the interface, with their units."""
     stops = mechanism.stops
     groups = {
-        "forces": {f"{f.name}.{k}": unit for f in mechanism.forces for k, unit in LOADS.items()},
+        "forces": load_units(mechanism),
         "walls": {f"{s.name}.{k}": unit for s in stops for k, unit in WALL_INPUTS.items()},
         "impulses": _impulse_units(mechanism),
         "mobilities": {f"{s.name}.{MOBILITY}": "1/kg" for s in stops},
         "base": {f"base.acceleration.{axis}": "m/s2" for axis in BASE_AXES},
     }
     return {name: unit for group in INPUT_GROUPS for name, unit in groups[group].items()}
+
+
+def load_units(mechanism: Mechanism) -> dict[str, str]:
+    """Return the names of all forces and moments, with their units."""
+    return {f"{f.name}.{k}": unit for f in mechanism.forces for k, unit in LOADS.items()}
 
 
 def input_names(mechanism: Mechanism) -> tuple[str, ...]:
@@ -196,7 +201,7 @@ def checked_loads(mechanism: Mechanism, loads: Mapping[str, float]) -> dict[str,
     ParameterError
         If a load is unknown, or not a finite number.
     """
-    known = {f"{f.name}.{component}": 0.0 for f in mechanism.forces for component in LOADS}
+    known = dict.fromkeys(load_units(mechanism), 0.0)
     for name, x in loads.items():
         if name not in known:
             raise ParameterError(unknown(name, known))
