@@ -55,6 +55,29 @@ def frequency_text(frequency: float, digits: int = 4) -> str:
     return f"{factor * frequency:.{digits}g} {name}"
 
 
+def mode_text(frequency: float, rounding: float = 0.0, digits: int = 4) -> str:
+    """Return the frequency [Hz] of a mode with its unit and all digits, or a word.
+
+    Parameters
+    ----------
+    frequency : float
+        The frequency; negative if the mode is unstable.
+    rounding : float
+        Frequency below which it is round-off: the mode is free.
+    digits : int
+        Number of digits.
+
+    Examples
+    --------
+    >>> mode_text(4.89), mode_text(92086.3), mode_text(-2.0), mode_text(1e-9, 1e-6)
+    ('4.890 Hz', '92.09 kHz', 'unstable', 'free')
+    """
+    if frequency <= rounding:
+        return "free" if frequency >= -rounding else "unstable"
+    factor, name = frequency_unit(frequency)
+    return f"{factor * frequency:#.{digits}g} {name}".replace(". ", " ")
+
+
 def prefixed_unit(largest: float, unit: str) -> tuple[float, str]:
     """Return factor and name of the display unit of a quantity whose SI unit is ``unit``.
 

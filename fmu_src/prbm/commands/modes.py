@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..analysis.adequacy import Impact, Shape, Vibration, notes
-from ..base.unit_text import frequency_unit, prefixed_unit
+from ..base.unit_text import mode_text, prefixed_unit
 from ..files.settings import UserMistake, quantity
 from ..mechanics.arrays import Complex, Real
 from ..mechanics.modal import damping, modes
@@ -52,7 +52,7 @@ def frequencies(options: argparse.Namespace) -> None:
     rows = [
         [
             str(k + 1),
-            _hertz(float(found.frequency[k]), found.rounding),
+            mode_text(float(found.frequency[k]), found.rounding, 5),
             _ratio(ratios[k]),
             _seconds(times[k]),
             *(f"{100 * x:.1f} %" for x in shares[k]),
@@ -105,14 +105,6 @@ def _shares(system: System, e: Complex, phi: Real) -> list[float]:
         m, J = (value(body, name, system.values) for name in ("mass", "inertia"))
         shares += [m * velocity.real**2, m * velocity.imag**2, J * float(phi[frame.j]) ** 2]
     return [*shares, max(0.0, 1.0 - sum(shares))]  # The modal masses are 1.
-
-
-def _hertz(frequency: float, rounding: float) -> str:
-    """Return a frequency [Hz] as text, or a word; smaller ones than ``rounding`` are round-off."""
-    if frequency <= rounding:
-        return "free" if frequency >= -rounding else "unstable"
-    factor, unit = frequency_unit(frequency)
-    return f"{factor * frequency:#.5g} {unit}"
 
 
 def _ratio(ratio: float) -> str:

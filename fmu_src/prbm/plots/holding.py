@@ -25,9 +25,7 @@ def holding_figure(curve: Curve, title: str, turns: bool = False) -> Figure:
     displacements at which the mechanism snaps through under a force.
     """
     x = np.array([point.displacement for point in curve.points])
-    factor, name = length_unit(float(np.abs(x).max()) or 1.0)
-    if turns:
-        factor, name = 180 / math.pi, "deg"
+    factor, label = amount_axis(x, turns)
     drawn = Figure((8.0, 6.6), dpi=120, layout="constrained")
     every: list[Axes] = list(
         drawn.subplots(3, 1, sharex=True, gridspec_kw={"height_ratios": [2, 1, 1]})
@@ -38,11 +36,19 @@ def holding_figure(curve: Curve, title: str, turns: bool = False) -> Figure:
     _draw_across(across, curve, factor)
     _draw_frequency(frequency, curve, factor)
     _shade_unstable(every, factor * x, _frequencies(curve))
-    frequency.set_xlabel(f"{'rotation' if turns else 'displacement'} [{name}]")
+    frequency.set_xlabel(label)
     for axes in every:
         plain(axes)
     drawn.align_ylabels(every)
     return drawn
+
+
+def amount_axis(amounts: Real, turns: bool) -> tuple[float, str]:
+    """Return the factor of displacements [m] or rotations [rad], and the label of their axis."""
+    if turns:
+        return 180 / math.pi, "rotation [deg]"
+    factor, name = length_unit(float(np.abs(amounts).max()) or 1.0)
+    return factor, f"displacement [{name}]"
 
 
 def _frequencies(curve: Curve) -> Real:

@@ -1,14 +1,12 @@
 """Figure of the displacement under a load that varies, with its stability."""
 
-import math
-
 import numpy as np
 from matplotlib.figure import Figure
 
 from ..analysis.load_path import LoadPath
-from ..base.unit_text import length_unit
 from ..drawing.style import IMPACT, PAST, REST, own_style
 from ..mechanics.arrays import Real
+from .holding import amount_axis
 from .scene import plain
 
 
@@ -33,9 +31,7 @@ def load_path_figure(
     turns : bool
         Whether the amounts are rotations.
     """
-    factor, name = length_unit(float(np.abs(amounts).max()) or 1.0)
-    if turns:
-        factor, name = 180 / math.pi, "deg"
+    factor, along = amount_axis(amounts, turns)
     drawn = Figure((8.0, 4.6), dpi=120, layout="constrained")
     axes = drawn.subplots()
     stable = np.array([point.unstable == 0 for point in path.points])
@@ -47,7 +43,7 @@ def load_path_figure(
         if at:
             axes.plot(factor * amounts[at], loads[at], marker, color=color, ls="", label=kind)
     axes.axhline(0.0, color="#808080", linewidth=0.8)
-    axes.set_xlabel(f"{'rotation' if turns else 'displacement'} [{name}]")
+    axes.set_xlabel(along)
     axes.set_ylabel(label)
     axes.set_title(title, fontsize=11, loc="left")
     axes.legend(fontsize=9, frameon=False)

@@ -14,7 +14,7 @@ from matplotlib.patheffects import withStroke
 
 from ..base.errors import ParameterError, PrbmError
 from ..base.tolerances import RELEASE_PENETRATION_RTOL
-from ..base.unit_text import frequency_unit, length_unit
+from ..base.unit_text import length_unit, mode_text
 from ..drawing.shapes import Shapes, corners
 from ..drawing.style import (
     BODY,
@@ -145,22 +145,8 @@ def _draw_modes(
         drawing = Drawing(axes, shapes)
         drawing.ghost(E)
         drawing.shape(moved(shapes, E, found, k))
-        axes.set_title(_frequency(float(found.frequency[k]), found.rounding), fontsize=9)
+        axes.set_title(mode_text(float(found.frequency[k]), found.rounding), fontsize=9)
         axes.axis("off")
-
-
-def _frequency(frequency: float, rounding: float = 0.0) -> str:
-    """Return a frequency [Hz] with its unit; ``free`` if it is round-off, ``unstable`` if negative.
-
-    Examples
-    --------
-    >>> _frequency(4.8899), _frequency(92086.3), _frequency(-2.0), _frequency(1e-9, 1e-6)
-    ('4.890 Hz', '92.09 kHz', 'unstable', 'free')
-    """
-    if frequency <= rounding:
-        return "free" if frequency >= -rounding else "unstable"
-    factor, unit = frequency_unit(frequency)
-    return f"{frequency * factor:#.4g} {unit}".replace(". ", " ")
 
 
 def moved(shapes: Shapes, E: Complex, found: Modes, k: int) -> Complex:
