@@ -186,8 +186,11 @@ def structured(rows: Iterable[Mapping[str, float | int | bool | str | bytes]]) -
     """
     table = list(rows)
     columns = {name: [row[name] for row in table] for name in table[0]}
-    types = np.dtype([(name, _column_type(values)) for name, values in columns.items()])
-    return np.array([tuple(row.values()) for row in table], types)
+    return np.array([tuple(row.values()) for row in table], _table_type(columns))
+
+
+def _table_type(columns: Mapping[str, list[Any]]) -> np.dtype[Any]:
+    return np.dtype([(name, _column_type(values)) for name, values in columns.items()])
 
 
 def _column_type(values: list[Any]) -> Any:
@@ -206,8 +209,7 @@ def _column_type(values: list[Any]) -> Any:
 
 def row_type(row: Mapping[str, float | int | bool]) -> np.dtype[Any]:
     """Return the type of a row of values by name, with FMPy's types."""
-    kinds = {bool: np.bool_, int: np.int32}
-    return np.dtype([(name, kinds.get(type(x), np.float64)) for name, x in row.items()])
+    return _table_type({name: [x] for name, x in row.items()})
 
 
 def read_csv(path: str | Path) -> Columns:
