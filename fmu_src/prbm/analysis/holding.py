@@ -19,11 +19,7 @@ from ..base.errors import EquilibriumError
 from ..base.progress import Progress
 from ..mechanics.arrays import Real
 from ..mechanics.modal import modes
-from ..mechanics.statics import (
-    Equilibrium,
-    equilibrium,
-    holding_stiffness,
-)
+from ..mechanics.statics import Equilibrium, equilibrium, holding_stiffness
 from ..mechanics.system import System, unit
 from .equilibria import RestPosition, rest_positions, snap
 

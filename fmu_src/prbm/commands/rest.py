@@ -32,13 +32,12 @@ def rest_positions(options: argparse.Namespace) -> None:
     """Print the rest positions, or the forces that hold the released body at displacements."""
     mechanism, _, system = assembled(options)
     output = Output(options.out)
-    ranged = (options.start, options.end) != (None, None)
     _check_options(options)
     unit = held_unit(mechanism)
     head = f"{mechanism.name}: {unit.amount} of {_held(mechanism)}, from straight; " + (
         "gravity acts" if system.gravity else "no gravity acts"
     )
-    if ranged:
+    if options.start is not None:
         _range(options, mechanism, system, output, head)
     elif options.vary:
         print(head)
@@ -53,20 +52,19 @@ def _shapes(
 ) -> None:
     """Print single shapes under loads, held or free, with the places of all bodies and probes."""
     unit, loads = held_unit(mechanism), _loads(options, mechanism)
-    held: list[float | None] = [
-        check_held(x, system, "--held")
-        for x in (quantities(options.held, unit.si, "--held") if options.held else ())
-    ]
+    held: list[float | None] = [None]
+    if options.held:
+        given = quantities(options.held, unit.si, "--held")
+        held = [check_held(x, system, "--held") for x in given]
     shapes = [
-        StaticShape(system, equilibrium(system, x, loads), x is not None, loads)
-        for x in held or [None]
+        StaticShape(system, equilibrium(system, x, loads), x is not None, loads) for x in held
     ]
     points = [
         holding.described(system, shape.displacement if x is None else x, shape.shape)
-        for x, shape in zip(held or [None], shapes, strict=True)
+        for x, shape in zip(held, shapes, strict=True)
     ]
     _print(head + "".join(f"; {name} = {x:g}" for name, x in loads.items()), points, system)
-    if not held:
+    if not options.held:
         _print_rest(points[0].displacement, points[0].frequency > 0.0, system)
     output.table(f"{mechanism.name}-equilibrium.csv", _csv_head(unit), _rows(points))
     places = [
@@ -124,14 +122,14 @@ def _stiffness(
 
 def _check_options(options: argparse.Namespace) -> None:
     """Reject options that exclude each other."""
-    ranged = (options.start, options.end)
-    if None in ranged and ranged != (None, None):
+    if (options.start is None) != (options.end is None):
         raise UserMistake("--from and --to: give both ends of the range")
-    if ranged != (None, None) and options.held:
+    ranged = options.start is not None
+    if ranged and options.held:
         raise UserMistake("--held excludes --from and --to: give one or the other")
-    if ranged != (None, None) and (options.load or options.stiffness):
+    if ranged and (options.load or options.stiffness):
         raise UserMistake("--load and --stiffness exclude --from and --to: give one or the other")
-    if options.vary and (ranged != (None, None) or options.held or options.stiffness):
+    if options.vary and (ranged or options.held or options.stiffness):
         raise UserMistake("--vary excludes --held, --stiffness, --from and --to")
     if options.at and not options.stiffness:
         raise UserMistake("--at is the point of --stiffness BODY: give both")
