@@ -151,6 +151,7 @@ STOP_TIME_RTOL = 1e-3  # Of a communication step: allowed overshoot of the stop 
 # --- model exchange ----------------------------------------------------------------------------
 NOMINAL_ANGLE_MIN = 1e-2  # rad; smallest amplitude from which nominal values of states are derived.
 NOMINAL_STRAIN_FACTOR = 0.1  # Of the energy at the start: assumed in the stiffest axial spring.
+TURN_RTOL = 1e-7  # Of the reference speed: rate after an extremum of a contact at its event.
 DRIFT_RTOL = 1e-7  # Of the size: drift of a held contact that requests an event.
 DRIFT_SPEED_FACTOR = 10.0  # Of DRIFT_RTOL: the same for speeds, which solvers keep less exactly.
 MOVING_DRIFT_FACTOR = 10.0  # Of DRIFT_RTOL: the same while the wall moves.

@@ -2,13 +2,14 @@
 
 import html
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from ..base.text import printable
 from ..base.version import GENERATION_TOOL
 from ..interface.native import NativeInterface
 from ..interface.variables import Variable
 from ..mechanics.inputs import Wall
+from ..mechanics.stress import stressed
 from ..mechanism.description import Mechanism
 from ..mechanism.flexure import BEAM, MODELS
 from ..mechanism.parts import COMPLIANT, LAWS, RIGID, FlexureType
@@ -630,6 +631,23 @@ def _exchange(interface: NativeInterface, version: int) -> str:
     )
 
 
+def _peaks(mechanism: Mechanism) -> Iterator[str]:
+    if any(stop.compliant for stop in mechanism.stops):
+        yield (
+            "<p>While a compliant stop is pressed, each maximum and minimum of its force and of "
+            "its indentation is a state event, too, of the release indicator: "
+            "<code>peak_force</code>, <code>indentation</code> and <code>contact_duration</code> "
+            "do not depend on the steps of the importer.</p>"
+        )
+    if stressed(mechanism):
+        yield (
+            "<p>In model exchange <code>peak_stress</code> is sampled: at the steps that the "
+            "importer completes and at events, with parabolas between them. For an error of 0.1 % "
+            "these steps must be at most a twentieth of the period of the fastest vibration of "
+            "the stress. Co-simulation has the peaks of its own integration steps.</p>"
+        )
+
+
 def _events(mechanism: Mechanism, interface: NativeInterface, version: int) -> str:
     if not (mechanism.stops or mechanism.frictions):
         return "<h2>Events</h2>\n<p>This mechanism has no events.</p>"
@@ -638,6 +656,7 @@ def _events(mechanism: Mechanism, interface: NativeInterface, version: int) -> s
         "rest), the release of a stop that holds, and the beginning and the end of sliding with "
         "friction. Each has an event indicator, which changes its sign at the event. Indicators "
         "are scaled to the order of 1 and are never 0 after an event.</p>",
+        *_peaks(mechanism),
         "<p>At an event, values are those <em>before</em> the event until it has been handled; in "
         "model exchange, that is the update of the discrete states in event mode. In "
         "co-simulation without event mode, impacts happen inside a step. The latched outputs "
