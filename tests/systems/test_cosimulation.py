@@ -12,6 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fmpy import simulate_fmu
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Slave
 
 from coupled import guide, integrator
 from prbm.base.errors import ParameterError
@@ -329,7 +331,7 @@ def test_a_step_of_zero_is_rejected():
 
 def test_rows_before_a_failure_are_kept():
     fmus = {"a": integrator(), "b": integrator()}
-    with pytest.raises(CouplingError, match="b: ") as caught:
+    with pytest.raises(CouplingError, match="b terminated") as caught:
         simulate(fmus, CIRCLE, 1.0, H, START | {"b.end": 10 * H}, scheme=JACOBI)
     found, (_, a, _) = caught.value.columns, circle(JACOBI)
     np.testing.assert_array_equal(found["time"], H * np.arange(11))
@@ -358,6 +360,29 @@ def test_steps_have_one_length_if_an_fmu_needs_that(uneven):
         simulate(fmus, {}, 0.3, 0.2)
     with pytest.raises(CouplingError, match=r"one needs .* use events=False"):
         simulate(fmus, {}, 0.3, 0.1, events=True)
+
+
+def test_the_end_by_an_fmu_of_fmi_2_is_the_reason():
+    """The status of the step is Discard, with the status ``fmi2Terminated``; no rows are lost."""
+    with pytest.raises(CouplingError, match=r"b terminated the simulation at 0.1 s$") as caught:
+        simulate({"b": integrator()}, {}, 1.0, 0.1, {"b.end": 0.1}, ["b.value"])
+    np.testing.assert_array_equal(caught.value.columns["time"], [0.0, 0.1])
+
+
+def test_the_reason_that_a_python_fmu_logs_is_part_of_the_message(fmus):
+    own = {"guide": fmus["PRBDM"]}
+    with pytest.raises(CouplingError, match=r"guide terminated .* at 0 s: .*stop.restitution = 2"):
+        simulate(own, {}, 0.1, 0.1, {"guide.stop.restitution": 2.0})
+
+
+def test_a_step_that_fails_is_no_end(monkeypatch):
+    def fails(own, kind):
+        raise FMICallException(function="fmi2GetBooleanStatus", status=3)
+
+    for answer in (lambda own, kind: False, fails):
+        monkeypatch.setattr(FMU2Slave, "getBooleanStatus", answer)
+        with pytest.raises(CouplingError, match=r"b: .*DoStep at 0 s returned the status 2"):
+            simulate({"b": integrator()}, {}, 1.0, 0.1, {"b.end": 0.0})
 
 
 def test_the_end_of_a_simulation_in_event_mode_is_not_ignored(monkeypatch):

@@ -178,7 +178,7 @@ def sweep_arguments(parser: ArgumentParser) -> None:
         help="folder of the results (default: %(default)s)",
     )  # fmt: skip
     add(
-        "--output", action="append", metavar="OUTPUT",
+        "--output", "--of", action="append", metavar="OUTPUT",
         help="recorded output: a variable, for its final value; 'max(shuttle.x)', or min, mean; "
         "'first(shuttle.x > 0)', the first time of a condition; 'since(stop.contact)', the time "
         "from which it holds to the end; repeatable (default: all outputs)",
