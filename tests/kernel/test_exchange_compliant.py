@@ -131,6 +131,21 @@ def test_an_extremum_is_the_sign_change_of_an_indicator():
     assert np.abs(rates[1:]).min() < 1e-6  # The largest indentation is an event.
 
 
+def test_sampled_peaks_of_the_stress_need_a_twentieth_of_the_period():
+    """The pages of FMUs with outputs of the stress name this step, and an error of 0.1 %."""
+    own = mechanism("PRBDM")
+    types = tuple(replace(kind, stress=True) for kind in own.flexure_types)
+    free = {"stop.position": 0.03, "damping.beta": 0.0, "release.displacement": -5e-3}
+    own = replace(own, flexure_types=types)
+    name = f"{own.flexures[0].name}.peak_stress"
+    period = 1.0 / Simulation(own, free).frequency
+    kernel = KernelSimulation(own, free | {"release.velocity": 0.2}, exchange=True)
+    alone = Simulation(own, free | {"release.velocity": 0.2})
+    alone.advance(1.2 * period)
+    assert [*integrate(kernel, 1.2 * period, h=period / 20)] == []
+    assert kernel.get(name) == pytest.approx(float(alone.outputs()[name]), rel=1e-3)
+
+
 @pytest.mark.parametrize("exchange", [False, True])
 def test_the_force_of_a_preload_is_a_maximum_from_the_start(exchange):
     own = point_mass(stiffness=1e5, displacement=1e-5, velocity=0.0)

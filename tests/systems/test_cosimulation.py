@@ -14,13 +14,20 @@ import pytest
 from fmpy import simulate_fmu
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
+from fmpy.model_description import Dimension
 
 from coupled import guide, integrator
 from prbm.base.errors import ParameterError
 from prbm.references.scalar_guide import ScalarGuide
 from prbm.runs.result import structured
-from prbm.systems import cosimulation
-from prbm.systems.components import CO_SIMULATION, Component, CouplingError, start_value
+from prbm.systems import components, cosimulation
+from prbm.systems.components import (
+    CO_SIMULATION,
+    Component,
+    CouplingError,
+    described,
+    start_value,
+)
 from prbm.systems.cosimulation import GAUSS_SEIDEL, JACOBI, System, simulate
 from reference_fmus import table
 from support import mechanism, possible
@@ -373,6 +380,39 @@ def test_the_reason_that_a_python_fmu_logs_is_part_of_the_message(fmus):
     own = {"guide": fmus["PRBDM"]}
     with pytest.raises(CouplingError, match=r"guide terminated .* at 0 s: .*stop.restitution = 2"):
         simulate(own, {}, 0.1, 0.1, {"guide.stop.restitution": 2.0})
+
+
+@pytest.mark.parametrize(
+    ("wires", "values", "record"),
+    [
+        ({}, {}, ["guide.shuttle.x"]),
+        ({"guide.force.y": "guide.shuttle.x"}, {}, []),
+        ({"guide.force.x": "guide.shuttle.y"}, {}, []),
+        ({}, {"guide.force.x": 0.1}, []),
+    ],
+)
+def test_arrays_are_refused_before_the_run(wires, values, record, monkeypatch):
+    def with_arrays(name, fmu):
+        description = described(name, fmu)
+        for v in description.modelVariables:
+            if v.name in ("shuttle.x", "force.x"):
+                v.dimensions = [Dimension("3", None)]
+        return description
+
+    monkeypatch.setattr(components, "described", with_arrays)
+    with pytest.raises(CouplingError, match=r"guide\.(shuttle|force)\.x is an array"):
+        simulate({"guide": guide(3)}, wires, 0.1, 0.1, values, record)
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_missing_resources_are_named(fmi, tmp_path):
+    path = tmp_path / "bare.fmu"
+    with zipfile.ZipFile(guide(fmi)) as source, zipfile.ZipFile(path, "w") as copy:
+        for name in source.namelist():
+            if not name.startswith("resources/"):
+                copy.writestr(name, source.read(name))
+    with pytest.raises(CouplingError, match=r"a: instantiate failed .*including its folder reso"):
+        simulate({"a": path}, {}, 0.1, 0.1)
 
 
 def test_a_step_that_fails_is_no_end(monkeypatch):

@@ -264,12 +264,10 @@ def _use(mechanism: Mechanism, experiment: Experiment) -> str:
         "the FMU (on Linux for instance with <code>LD_PRELOAD=libpython3.11.so</code>).</p>\n"
         f"<p>The folder <code>{FOLDER}</code> has the start values as a parameter set (SSV).</p>\n"
         "<p>Path: unpack the FMU to a folder whose path has only letters and digits of ASCII, "
-        "spaces and <code>. _ - ~</code>. The wrapper library pythonfmu (0.7.0, the newest "
-        "version) does not decode other percent-encoded characters and crashes the host with a "
-        "segmentation fault, before any Python of this FMU runs. FMPy unpacks to the folder of "
-        "temporary files; if that path has other characters, set the environment variable "
-        "<code>TMPDIR</code> (Linux) or <code>TMP</code> (Windows), or use the native FMU of this "
-        "mechanism, which reads all paths.</p>\n"
+        "spaces and <code>. _ - ~</code>. The wrapper library pythonfmu does not decode other "
+        "characters and crashes the host. FMPy unpacks to the folder of temporary files; if that "
+        "path has other characters, set <code>TMPDIR</code> (Linux) or <code>TMP</code> (Windows), "
+        "or use the native FMU of this mechanism, which reads all paths.</p>\n"
         "<p>Errors:</p>\n<ul>\n"
         "<li>An invalid value, parameter set or step is rejected. The reason is logged, and every "
         "<code>doStep</code> returns <code>fmi2Discard</code> until the value is corrected.</li>\n"
@@ -279,9 +277,9 @@ def _use(mechanism: Mechanism, experiment: Experiment) -> str:
         "<li>Getting a variable with the function of another type, or a value reference that is "
         "not in the model description, logs an error and returns NaN, 0 or false. The simulation "
         "continues.</li>\n"
-        "<li>In these cases, and if a saved state is damaged, the status of the call itself is "
-        "<code>fmi2OK</code>: pythonfmu knows no other one. It does not compare the GUID of "
-        "<code>fmi2Instantiate</code> either. The native FMU returns <code>fmi2Error</code>.</li>\n"
+        "<li>In these cases, and if a saved state is damaged, the call itself returns "
+        "<code>fmi2OK</code>, and any GUID is accepted: pythonfmu permits no other status. The "
+        "native FMU returns <code>fmi2Error</code>.</li>\n"
         "<li>FMPy ends the simulation early at <code>fmi2Discard</code>. The reasons of rejected "
         "steps are therefore also printed to the standard error stream.</li>\n"
         "<li>The wrapper forwards log messages, those of impacts included, only if the importer "
@@ -639,17 +637,15 @@ def _exchange(interface: NativeInterface, version: int) -> str:
 def _peaks(mechanism: Mechanism) -> Iterator[str]:
     if any(stop.compliant for stop in mechanism.stops):
         yield (
-            "<p>While a compliant stop is pressed, each maximum and minimum of its force and of "
-            "its indentation is a state event, too, of the release indicator: "
-            "<code>peak_force</code>, <code>indentation</code> and <code>contact_duration</code> "
-            "do not depend on the steps of the importer.</p>"
+            "<p>While a compliant stop is pressed, each extremum of its force and indentation is a "
+            "state event (release indicator): <code>peak_force</code>, <code>indentation</code> "
+            "and <code>contact_duration</code> do not depend on the importer's steps.</p>"
         )
     if stressed(mechanism):
         yield (
-            "<p>In model exchange <code>peak_stress</code> is sampled: at the steps that the "
-            "importer completes and at events, with parabolas between them. For an error of 0.1 % "
-            "these steps must be at most a twentieth of the period of the fastest vibration of "
-            "the stress. Co-simulation has the peaks of its own integration steps.</p>"
+            "<p>In model exchange <code>peak_stress</code> is sampled at the steps that the "
+            "importer completes and at events. For an error of 0.1 % these steps must be at most a "
+            "twentieth of the period of the fastest vibration of the stress.</p>"
         )
 
 
