@@ -263,6 +263,14 @@ def set_argument(parser: ArgumentParser, meaning: str = "value of a parameter") 
     )  # fmt: skip
 
 
+def load_argument(parser: ArgumentParser) -> None:
+    """Add --load."""
+    parser.add_argument(
+        "--load", nargs="+", metavar="NAME=X",
+        help="dead loads, forces [N] and moments [N m], such as force.y=-5N (default: none)",
+    )  # fmt: skip
+
+
 def parameters_argument(parser: ArgumentParser) -> None:
     """Add --parameters."""
     parser.add_argument(

@@ -27,6 +27,7 @@ from .arguments import (
     engine_argument,
     examples,
     input_argument,
+    load_argument,
     mechanism_argument,
     out_argument,
     parameters_argument,
@@ -137,8 +138,12 @@ def _parameters(commands: Commands) -> None:
 def _modes(commands: Commands) -> None:
     parser = add_command(
         commands, "modes", "modes:frequencies",
-        "natural frequencies and modes, about the equilibrium under gravity or a held shape",
-        examples("prbm modes PRBDM2R", "prbm modes PRBDM2R --held -10mm --out modes"),
+        "natural frequencies and modes, about the equilibrium under gravity and loads, or held",
+        examples(
+            "prbm modes PRBDM2R",
+            "prbm modes PRBDM2R --held -10mm --out modes",
+            "prbm modes CurvedBistable --load force.y=-5N",
+        ),
     )  # fmt: skip
     mechanism_argument(parser)
     parser.add_argument(
@@ -149,6 +154,7 @@ def _modes(commands: Commands) -> None:
         help="displacement [m] at which the released body is held, or angle [rad] if it is "
         "released by an angle (default: not held)",
     )  # fmt: skip
+    load_argument(parser)
     set_argument(parser)
     out_argument(parser)
 
@@ -199,8 +205,7 @@ def _equilibrium(commands: Commands) -> None:
     add = parser.add_argument
     text = "displacements [m] or angles [rad] at which the body is held"
     add("--held", nargs="+", metavar="X", help=text)
-    text = "forces [N] and moments [N m], such as force.y=-5N"
-    add("--load", nargs="+", metavar="NAME=X", help=text)
+    load_argument(parser)
     text = "follow the shapes while a load varies, such as force.y=0:-20N, through limit points"
     add("--vary", metavar="NAME=A:B", help=text)
     add("--stiffness", metavar="BODY", help="print the compliance and stiffness matrix of a body")

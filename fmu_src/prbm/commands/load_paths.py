@@ -1,6 +1,6 @@
 """Shapes under a load that varies: the option --vary of ``prbm equilibrium``."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -30,6 +30,26 @@ def given_load(mechanism: Mechanism, option: str, text: str) -> tuple[str, str, 
         known = ", ".join(units) or "none: the mechanism has no [[forces]]"
         raise UserMistake(f"{option} {text}: give name=value; the loads are {known}")
     return name, number, units[name]
+
+
+def given_loads(mechanism: Mechanism, texts: Sequence[str] | None) -> dict[str, float]:
+    """Return the loads of the option --load [N], [N m].
+
+    Raises
+    ------
+    UserMistake
+        If there is no such load, or its value is not a quantity of its unit.
+    """
+    loads = {}
+    for text in texts or ():
+        name, number, si = given_load(mechanism, "--load", text)
+        loads[name] = quantity(number, si, f"--load {name}")
+    return loads
+
+
+def load_text(loads: Mapping[str, float]) -> str:
+    """Return loads as the continuation of a description; empty without loads."""
+    return "".join(f"; {name} = {x:g}" for name, x in loads.items())
 
 
 def vary(

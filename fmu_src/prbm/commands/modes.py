@@ -17,6 +17,7 @@ from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import value
 from ..runs.released import released_label
+from .load_paths import given_loads, load_text
 from .output import Output, aligned
 from .systems import assembled, check_held, held_scale, held_unit, rounded
 
@@ -33,13 +34,14 @@ def frequencies(options: argparse.Namespace) -> None:
     at, held = None, held_unit(mechanism)
     if options.held is not None:
         at = check_held(quantity(options.held, held.si, "--held"), system, "--held")
-    shape = equilibrium(system, at)
+    loads = given_loads(mechanism, options.load)
+    shape = equilibrium(system, at, loads)
     found = modes(system, shape)
     count = min(options.count, len(found.frequency))
     motions = [(body.name, m) for body in mechanism.bodies for m in ("x", "y", "turning")]
     e = system.directions(shape.q)
     shares = np.array([_shares(system, e, found.shape[:, k]) for k in range(count)])
-    print(_where(system, shape, at))
+    print(_where(system, shape, at, loads))
     ratios, times = damping(system, found)
     head = [
         "mode",
@@ -68,7 +70,9 @@ def frequencies(options: argparse.Namespace) -> None:
         print(
             f"{len(found.frequency) - count} higher modes are not shown; show more with --count N"
         )
-    shapes: list[Shape] = [Vibration(at), *map(Impact, range(len(mechanism.stops)))]
+    shapes: list[Shape] = [Vibration(at, tuple(loads.items()))]
+    if not loads:
+        shapes += map(Impact, range(len(mechanism.stops)))
     for sentence in notes(mechanism, values, shapes):
         print(sentence)
     output.table(
@@ -84,16 +88,19 @@ def frequencies(options: argparse.Namespace) -> None:
             for k in range(count)
         ],
     )  # fmt: skip
-    output.figure(f"{mechanism.name}-modes.png", lambda: _figure(mechanism, values, count, at))
+    output.figure(
+        f"{mechanism.name}-modes.png", lambda: _figure(mechanism, values, count, at, loads)
+    )
     output.write()
 
 
 def _figure(
-    mechanism: Mechanism, values: Mapping[str, float], count: int, at: float | None
-) -> "Figure":
+    mechanism: Mechanism, values: Mapping[str, float], count: int, at: float | None,
+    loads: Mapping[str, float],
+) -> "Figure":  # fmt: skip
     from ..plots.picture import MODES_MAX, picture  # imported here: it takes a second
 
-    return picture(mechanism, values, min(count, MODES_MAX), at)
+    return picture(mechanism, values, min(count, MODES_MAX), at, loads)
 
 
 def _shares(system: System, e: Complex, phi: Real) -> list[float]:
@@ -119,7 +126,7 @@ def _seconds(time: float) -> str:
     return f"{factor * time:.3g} {unit}"
 
 
-def _where(system: System, shape: Equilibrium, at: float | None) -> str:
+def _where(system: System, shape: Equilibrium, at: float | None, loads: Mapping[str, float]) -> str:
     """Return a description of the shape about which the mechanism vibrates."""
     name, release = system.mechanism.name, system.mechanism.release
     held, moved = held_unit(system.mechanism), released_label(release)
@@ -129,8 +136,8 @@ def _where(system: System, shape: Equilibrium, at: float | None) -> str:
         effort = held.si_effort.replace(".", " ")
         return (
             f"{name}, {moved} held at {held.factor * at:.6g} {held.shown} from straight"
-            f"{along} by {shape.force:.5g} {effort}"
+            f"{along} by {shape.force:.5g} {effort}{load_text(loads)}"
         )
     at_rest = "at rest under gravity" if system.gravity else "at rest without gravity"
     place = rounded(held.factor * system.amount(shape.q), held.factor * held_scale(system))
-    return f"{name} {at_rest}, {moved} {place} {held.shown} from straight{along}"
+    return f"{name} {at_rest}, {moved} {place} {held.shown} from straight{along}{load_text(loads)}"
