@@ -27,6 +27,7 @@ from .arguments import (
     engine_argument,
     examples,
     input_argument,
+    linear_arguments,
     load_argument,
     mechanism_argument,
     out_argument,
@@ -84,6 +85,7 @@ def parser() -> argparse.ArgumentParser:
     _parameters(commands)
     _modes(commands)
     _equilibrium(commands)
+    _linearize(commands)
     _simulate(commands)
     _stress(commands)
     _shock(commands)
@@ -216,6 +218,23 @@ def _equilibrium(commands: Commands) -> None:
         "--points", type=int, default=41, metavar="N",
         help="number of points of the force curve (default: %(default)s)",
     )  # fmt: skip
+    set_argument(parser)
+    out_argument(parser)
+
+
+def _linearize(commands: Commands) -> None:
+    parser = add_command(
+        commands, "linearize", "linear:linear_model",
+        "linear model x' = A x + B u, y = C x + D u about a shape at rest, and frequency responses",
+        examples(
+            "prbm linearize GuideBeam",
+            "prbm linearize GuideBeam --inputs force.x --outputs shuttle.x shuttle.vx --out model",
+            "prbm linearize GuideBeam --inputs base.acceleration.x --frequencies 1:1000Hz",
+        ),
+    )  # fmt: skip
+    mechanism_argument(parser)
+    linear_arguments(parser)
+    load_argument(parser)
     set_argument(parser)
     out_argument(parser)
 

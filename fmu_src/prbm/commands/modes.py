@@ -70,11 +70,7 @@ def frequencies(options: argparse.Namespace) -> None:
         print(
             f"{len(found.frequency) - count} higher modes are not shown; show more with --count N"
         )
-    shapes: list[Shape] = [Vibration(at, tuple(loads.items()))]
-    if not loads:
-        shapes += map(Impact, range(len(mechanism.stops)))
-    for sentence in notes(mechanism, values, shapes):
-        print(sentence)
+    _print_notes(mechanism, values, at, loads)
     output.table(
         f"{mechanism.name}-modes.csv",
         ["mode", "frequency [Hz]", "damping ratio [-]", "decay time [s]",
@@ -92,6 +88,17 @@ def frequencies(options: argparse.Namespace) -> None:
         f"{mechanism.name}-modes.png", lambda: _figure(mechanism, values, count, at, loads)
     )
     output.write()
+
+
+def _print_notes(
+    mechanism: Mechanism, values: Mapping[str, float], at: float | None, loads: Mapping[str, float]
+) -> None:
+    """Print what a better model changes about the shape and, without loads, about impacts."""
+    shapes: list[Shape] = [Vibration(at, tuple(loads.items()))]
+    if not loads:
+        shapes += map(Impact, range(len(mechanism.stops)))
+    for sentence in notes(mechanism, values, shapes):
+        print(sentence)
 
 
 def _figure(
