@@ -29,11 +29,7 @@ def frequencies(options: argparse.Namespace) -> None:
     """Print frequencies and the share of each motion in the kinetic energy of a mode."""
     mechanism, values, system = assembled(options)
     output = Output(options.out)
-    if options.count < 1:
-        raise UserMistake(f"--count {options.count}: must be at least 1")
-    at, held = None, held_unit(mechanism)
-    if options.held is not None:
-        at = check_held(quantity(options.held, held.si, "--held"), system, "--held")
+    at = _checked(options, system)
     loads = given_loads(mechanism, options.load)
     shape = equilibrium(system, at, loads)
     found = modes(system, shape)
@@ -88,6 +84,16 @@ def frequencies(options: argparse.Namespace) -> None:
         f"{mechanism.name}-modes.png", lambda: _figure(mechanism, values, count, at, loads)
     )
     output.write()
+
+
+def _checked(options: argparse.Namespace, system: System) -> float | None:
+    """Return the amount of --held [m], [rad]; reject a count without modes."""
+    if options.count < 1:
+        raise UserMistake(f"--count {options.count}: must be at least 1")
+    if options.held is None:
+        return None
+    held = held_unit(system.mechanism)
+    return check_held(quantity(options.held, held.si, "--held"), system, "--held")
 
 
 def _print_notes(

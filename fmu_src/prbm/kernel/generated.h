@@ -199,7 +199,7 @@ typedef enum {
 
 /* --- prbm.interface.tables ---------------------------------------------------------------------- */
 
-enum { TABLES_VERSION = 7 };
+enum { TABLES_VERSION = 8 };
 enum { TABLES_HEAD = 16 };
 enum { COORDINATES_MAX = 512 };
 enum { DIRECTIONS_MAX = 1024 };
@@ -242,7 +242,8 @@ typedef enum {
     DIMENSION_WAIST_LENGTH = 4,
     DIMENSION_CURVATURE = 5,
     DIMENSION_RISE = 6,
-    DIMENSION_COUNT = 7,
+    DIMENSION_INITIAL_STRAIN = 7,
+    DIMENSION_COUNT = 8,
 } Dimension;
 typedef enum {
     START_DISPLACEMENT = 0,

@@ -162,6 +162,7 @@ class _Assembler(Collection):
             mechanism=mechanism,
             values=dict(self.values),
             q0=q0,
+            rest=np.array(self.rest),
             Phi=Phi,
             arm=arm,
             H=spread.conj().T @ (m[:, None] * spread),

@@ -185,7 +185,7 @@ def modes_at(system: System, q: Real) -> Modes:
     B = np.vstack([system.loops, system.holding_row(q)])
     rows = system.gradient(B, e)
     w = field_row(system.spread(system.S), system.gravity)
-    load = springs(system.K, q - system.q0) + system.Phi.pull((w * e).real)
+    load = springs(system.K, q - system.rest) + system.Phi.pull((w * e).real)
     right = np.concatenate([load, np.zeros(len(B))])
     kkt = constraints.saddle(M, rows, rows)
     lam = -constraints.solve(kkt, right, system.n, system.length)[system.n :]

@@ -233,7 +233,7 @@ static void pack_blocks(System *system) {
             system->own[i] = system->H[i * d + i].re + system->J[i];
         }
     }
-    pad(system->n, system->q0, system->straight);
+    pad(system->n, system->rest, system->straight);
 }
 
 /* Add the first and second moments of one mass point, for the directions that move it. */
@@ -517,6 +517,7 @@ static void clear(System *system) {
     system->p = system->spring_count = system->corner_count = 0;
     memset(system->grounded, 0, (size_t)system->even * sizeof *system->grounded);
     memset(system->q0, 0, n * sizeof *system->q0);
+    memset(system->rest, 0, n * sizeof *system->rest);
     memset(system->J, 0, d * sizeof *system->J);
     for (int k = 0; k < system->mechanism->map.count; k++) {
         system->factors[k] = 1.0; /* Beams set their own. */
@@ -534,6 +535,9 @@ static void clear(System *system) {
 static void add_arrays(System *system, Scratch *scratch) {
     const Release *release = &system->mechanism->release;
     Complex *e0 = system->e0;
+    for (int j = 0; j < system->n; j++) {
+        system->rest[j] += system->q0[j]; /* The initial strains are there already. */
+    }
     directions(system, system->q0, e0);
     for (int body = 1; body <= system->b; body++) {
         add_body(system, body, scratch);
