@@ -316,24 +316,34 @@ static const char *part_of(const Mechanism *m, int j) {
     return m->steps[i].name;
 }
 
+/* The least ratio of the inertia of a coordinate to the largest one. */
+static double least_ratio(const Mechanism *m, int j) {
+    return m->coordinates[j].body != GROUND ? INERTIA_RATIO_MIN : FLEXURE_INERTIA_RATIO_MIN;
+}
+
 static bool check_ratio(const System *system, const double *M, Problem *problem) {
+    const Mechanism *m = system->mechanism;
     int n = system->n, light = 0, heavy = 0;
+    double limit = least_ratio(m, 0);
     for (int i = 1; i < n; i++) {
-        light = M[i * n + i] < M[light * n + light] ? i : light;
+        double own = least_ratio(m, i);
         heavy = M[i * n + i] > M[heavy * n + heavy] ? i : heavy;
+        if (M[i * n + i] / own < M[light * n + light] / limit) {
+            light = i;
+            limit = own;
+        }
     }
     double least = M[light * n + light], most = M[heavy * n + heavy];
-    if (!(0.0 < least && least < INERTIA_RATIO_MIN * most)) {
+    if (!(0.0 < least && least < limit * most)) {
         return true;
     }
-    const Mechanism *m = system->mechanism;
     return fail(problem,
                 "the inertia of %s %s, %.3g kg m2, is less than %g of that of %s %s, %.3g kg m2, so "
                 "that round-off would change the motion: check the units of masses, inertias, "
                 "densities, lengths and coordinates (numbers without a unit are in SI), or make "
                 "the light part heavier",
                 m->coordinates[light].body != GROUND ? "body" : "flexure", part_of(m, light), least,
-                INERTIA_RATIO_MIN, m->coordinates[heavy].body != GROUND ? "body" : "flexure",
+                limit, m->coordinates[heavy].body != GROUND ? "body" : "flexure",
                 part_of(m, heavy), most);
 }
 
