@@ -41,7 +41,8 @@ def rest_positions(options: argparse.Namespace) -> None:
         _range(options, mechanism, system, output, head)
     elif options.vary:
         print(head)
-        vary(options.vary, given_loads(mechanism, options.load), mechanism, system, output)
+        loads = given_loads(mechanism, options.load)
+        vary(options.vary, loads, mechanism, system, output, options.branches)
     else:
         _shapes(options, mechanism, system, output, head)
     output.write()
@@ -122,6 +123,8 @@ def _check_options(options: argparse.Namespace) -> None:
         raise UserMistake("--load and --stiffness exclude --from and --to: give one or the other")
     if options.vary and (ranged or options.held or options.stiffness):
         raise UserMistake("--vary excludes --held, --stiffness, --from and --to")
+    if options.branches and not options.vary:
+        raise UserMistake("--branches are those of --vary NAME=A:B: give both")
     if options.at and not options.stiffness:
         raise UserMistake("--at is the point of --stiffness BODY: give both")
 
