@@ -16,6 +16,7 @@ from prbm.mechanics.forces import elastic_energy
 from prbm.mechanics.statics import holding_stiffness
 from prbm.mechanism.parts import Force
 from prbm.plots.load_path import load_path_figure
+from random_mechanisms import seeded
 from support import ROOT, mechanism
 
 CASES = ROOT / "tests" / "cases"
@@ -159,3 +160,15 @@ def test_a_bistable_mechanism_rests_again_where_the_load_has_gone():
     assert all(point.unstable for point in snap.points[1:])
     largest = max(-40.0 * -point.share for point in snap.points)
     assert largest == pytest.approx(17.37, abs=0.02)  # No shape of the branch carries more.
+
+
+@pytest.mark.parametrize("seed", [5, 12])
+def test_a_part_without_a_spring_of_its_own_does_not_end_the_path(seed):
+    """In these random mechanisms loops alone keep a part in place; its stiffness is round-off."""
+    guide = seeded(seed)
+    system = pushed(guide)
+    stiffness = system.K.diagonal()
+    force = 0.1 * float(np.median(stiffness[stiffness > 0.0])) / system.length
+    path = load_path(system, {}, {"push.x": force})
+    assert path.ended is None
+    assert path.points[-1].share == pytest.approx(1.0)

@@ -38,6 +38,7 @@ BEND_MAX = 0.2  # rad between the tangents of neighbouring points.
 NEWTON_MAX = 8  # Iterations of a correction.
 CORRECTION_ATOL = 1e-10  # rad: last correction of a point.
 CLOSED = "the path is closed: it has returned to its begin"
+ROUND_OFF_RTOL = 1e-15  # Of the largest stiffness: smaller ones are round-off.
 POINTS_MAX = 2000  # Of a path.
 BRANCH_DISTANCE = 0.02  # rad: of the first point of a branch from its bifurcation.
 MIRROR_RTOL = 1e-6  # Of load and energy of mirror images.
@@ -116,6 +117,8 @@ class _Curve:
         system, shape = self.system, self.shape(state)
         n, e = system.n, system.directions(shape.q)
         kkt = balance_matrix(system, shape, held=False)
+        stiff = kkt[:n, :n]  # Round-off would determine the scale of a motion without springs.
+        stiff[np.abs(stiff) < ROUND_OFF_RTOL * np.abs(stiff).max()] = 0.0
         loads, by_share = (
             system.Phi.pull((w * e).real) + moment
             for w, moment in (
