@@ -172,3 +172,29 @@ def test_a_part_without_a_spring_of_its_own_does_not_end_the_path(seed):
     path = load_path(system, {}, {"push.x": force})
     assert path.ended is None
     assert path.points[-1].share == pytest.approx(1.0)
+
+
+@pytest.mark.slow
+def test_a_nearly_symmetric_double_beam_snaps_to_a_second_stable_position():
+    """One of four half beams of Qiu's double beam is thicker by 0.2 % (Qiu, Lang, Slocum, 2004).
+
+    The path follows the bifurcated branch of the symmetric mechanism.  It snaps below the force of
+    its bifurcation, 737.3 EI h/l^3 for each beam.  A second stable position exists.
+    """
+    double = load(CASES / "qiu10.toml")
+    kinds = tuple(replace(kind, order=5) for kind in double.flexure_types)
+    thick = 6e-6 * 1.002
+    odd = next(replace(k, name="odd", thickness=thick) for k in kinds if k.name == "left")
+    flexures = tuple(replace(f, type="odd") if f.name == "f1" else f for f in double.flexures)
+    system = pushed(replace(double, flexure_types=(*kinds, odd), flexures=flexures))
+    h, unit = 60e-6, 2 * 169e9 * 0.49e-3 * 6e-6**3 / 12 * 60e-6 / 3e-3**3
+    path = load_path(system, {}, {"push.y": -800 * unit}, step=0.02)
+    assert path.ended is None
+    found = [(kind, 800 * p.share, system.amount(p.shape.q) / h) for kind, p in path.events]
+    assert [kind for kind, *_ in found] == ["limit point", "rest", "limit point", "rest"]
+    snap, _, back, second = found
+    assert 730 < snap[1] < 737.3
+    assert back[1] < 0.0
+    assert 1.9 < second[2] < 2.0
+    rests = [point.unstable for kind, point in path.events if kind == "rest"]
+    assert rests == [1, 0]

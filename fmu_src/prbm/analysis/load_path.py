@@ -47,7 +47,7 @@ MEETING_RTOL = (
 )
 BRANCHES_MAX = 8
 CLOSED_POINTS_MIN = 10  # Points of a closed path.
-EVENT_RTOL = 1e-4  # Of a step: distance of the points between which an event is interpolated.
+EVENT_RTOL = 1e-3  # Of a step: distance of the points between which an event is interpolated.
 EVENT_BISECTIONS = 30  # Of the step in which an event is located.
 
 
@@ -192,8 +192,9 @@ def _state(point: PathPoint) -> Real:
 
 
 def load_path(
-    system: System, first: Mapping[str, float], last: Mapping[str, float], branches: bool = False
-) -> LoadPath:
+    system: System, first: Mapping[str, float], last: Mapping[str, float], branches: bool = False,
+    step: float = STEP_MAX,
+) -> LoadPath:  # fmt: skip
     """Follow the equilibria while the loads change from the first to the last ones.
 
     Parameters
@@ -205,6 +206,9 @@ def load_path(
     branches : bool
         Whether to follow the branches that begin at the bifurcations, too, until their share is 1
         or -1.  Of branches that are mirror images of each other, one is followed.
+    step : float
+        Longest step, in radians or shares.  The path of a nearly symmetric mechanism turns sharply
+        near a bifurcation of the symmetric one, which a long step may jump over.
 
     Raises
     ------
@@ -224,11 +228,11 @@ def load_path(
             "the shape under the first loads does not determine the path: a motion has no "
             "stiffness there; begin with other loads, or clamp a flexure that is pinned"
         ) from None
-    path = _followed(curve, start, -math.inf)
-    return replace(path, branches=_branches(curve, path)) if branches else path
+    path = _followed(curve, start, -math.inf, step)
+    return replace(path, branches=_branches(curve, path, step)) if branches else path
 
 
-def _branches(curve: _Curve, path: LoadPath) -> tuple[LoadPath, ...]:
+def _branches(curve: _Curve, path: LoadPath, step: float) -> tuple[LoadPath, ...]:
     """Return the branches at the bifurcations of a path, without mirror images."""
     found: list[LoadPath] = []
     for event in (point for kind, point in path.events if kind == "bifurcation"):
@@ -236,15 +240,15 @@ def _branches(curve: _Curve, path: LoadPath) -> tuple[LoadPath, ...]:
         for point in _switched(curve, event):
             if not any(_alike(curve, point, other) for other in first):
                 first.append(point)
-                branch = _followed(curve, point, -1.0)
+                branch = _followed(curve, point, -1.0, step)
                 found.append(replace(branch, points=(event, *branch.points)))
     return tuple(found)
 
 
-def _followed(curve: _Curve, begin: PathPoint, share_min: float) -> LoadPath:
+def _followed(curve: _Curve, begin: PathPoint, share_min: float, step: float) -> LoadPath:
     """Follow the path from a point until the share is 1 or the least one."""
     points, events = [begin], list[tuple[str, PathPoint]]()
-    length, ended = STEP_FIRST, None
+    length, ended = min(STEP_FIRST, step), None
     while share_min < points[-1].share < 1.0 and ended is None:
         start = points[-1]
         found = curve.step(start, length)
@@ -260,7 +264,7 @@ def _followed(curve: _Curve, begin: PathPoint, share_min: float) -> LoadPath:
             events.append(event)
             points.append(event[1])
         points.append(found)
-        length = min(STEP_MAX, length * min(2.0, 0.7 * BEND_MAX / max(bend, 1e-9)))
+        length = min(step, length * min(2.0, 0.7 * BEND_MAX / max(bend, 1e-9)))
         if len(points) > CLOSED_POINTS_MIN and _returned(curve, begin, found):
             ended = CLOSED
         if len(points) >= POINTS_MAX:
