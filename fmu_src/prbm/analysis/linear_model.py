@@ -292,7 +292,7 @@ def linearize(
     >>> guide = prbm.load("PRBDM2R")
     >>> model = prbm.linearize(guide, inputs=["force.x"], outputs=["shuttle.x"])
     >>> model.A.shape, model.states[0]
-    ((6, 6), 'mode[1].amplitude')
+    ((10, 10), 'mode[1].amplitude')
     """
     system = assemble(mechanism, mechanism.values(dict(values or {})))
     given = dict(loads or {})
