@@ -11,8 +11,9 @@ import math
 # --- description -------------------------------------------------------------------------------
 JOINT_DISTANCE_RTOL = 1e-9  # Of the size: largest distance of two points that a joint connects.
 INERTIA_RATIO_MIN = (
-    1e-12  # Of the largest inertia of a coordinate: the motion of less is round-off.
+    1e-12  # Of the largest inertia of a coordinate: the motion of a body with less is round-off.
 )
+FLEXURE_INERTIA_RATIO_MIN = 1e-16  # The same for a flexure, whose springs are weak, too.
 DEPENDENT_LOOP_RTOL = 1e-9  # Of the loop Jacobian's largest entry: smaller pivots are round-off.
 STUB_RTOL = 1e-12  # Of a cantilever's length: excess of the sum of its links that is round-off.
 

@@ -263,6 +263,27 @@ def set_argument(parser: ArgumentParser, meaning: str = "value of a parameter") 
     )  # fmt: skip
 
 
+def linear_arguments(parser: ArgumentParser) -> None:
+    """Add the arguments of linear models."""
+    add = parser.add_argument
+    text = "inputs, such as force.x or base.acceleration.x (default: all forces and the base)"
+    add("--inputs", nargs="+", metavar="NAME", help=text)
+    text = "outputs, such as shuttle.x or base.force.x (default: the motion of the released body)"
+    add("--outputs", nargs="+", metavar="NAME", help=text)
+    text = "stops that the mechanism rests on (default: none)"
+    add("--resting", nargs="+", metavar="STOP", help=text)
+    text = "range of the frequency response [Hz] (default: about the lowest modes)"
+    add("--frequencies", metavar="A:B", help=text)
+
+
+def load_argument(parser: ArgumentParser) -> None:
+    """Add --load."""
+    parser.add_argument(
+        "--load", nargs="+", metavar="NAME=X",
+        help="dead loads, forces [N] and moments [N m], such as force.y=-5N (default: none)",
+    )  # fmt: skip
+
+
 def parameters_argument(parser: ArgumentParser) -> None:
     """Add --parameters."""
     parser.add_argument(

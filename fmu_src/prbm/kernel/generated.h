@@ -9,6 +9,7 @@
 
 #define JOINT_DISTANCE_RTOL 1e-09
 #define INERTIA_RATIO_MIN 1e-12
+#define FLEXURE_INERTIA_RATIO_MIN 1e-16
 #define DEPENDENT_LOOP_RTOL 1e-09
 #define STUB_RTOL 1e-12
 #define SINGULAR_RTOL 1e-12
@@ -202,7 +203,7 @@ typedef enum {
 
 /* --- prbm.interface.tables ---------------------------------------------------------------------- */
 
-enum { TABLES_VERSION = 7 };
+enum { TABLES_VERSION = 8 };
 enum { TABLES_HEAD = 16 };
 enum { COORDINATES_MAX = 512 };
 enum { DIRECTIONS_MAX = 1024 };
@@ -245,7 +246,8 @@ typedef enum {
     DIMENSION_WAIST_LENGTH = 4,
     DIMENSION_CURVATURE = 5,
     DIMENSION_RISE = 6,
-    DIMENSION_COUNT = 7,
+    DIMENSION_INITIAL_STRAIN = 7,
+    DIMENSION_COUNT = 8,
 } Dimension;
 typedef enum {
     START_DISPLACEMENT = 0,
