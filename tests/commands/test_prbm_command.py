@@ -31,8 +31,8 @@ from support import ROOT, SUPPORT
 PAGE = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")
 COMMANDS = (
     "list", "parameters", "modes", "equilibrium", "simulate", "stress", "shock", "fit",
-    "impact-map", "contact", "sweep", "study", "picture", "animate", "explore", "modelica", "ssp",
-    "validate", "measure youngs-modulus", "measure calibration",
+    "impact-map", "contact", "sweep", "study", "picture", "animate", "explore", "build", "modelica",
+    "ssp", "validate", "measure youngs-modulus", "measure calibration",
     "measure frequency", "measure restitution", "completion",
 )  # fmt: skip
 
@@ -865,7 +865,7 @@ def test_ctrl_c_ends_a_simulation_without_a_traceback():
 def test_errors_during_the_imports_are_reported_in_one_sentence(
     raised, sentence, status, monkeypatch, capsys
 ):
-    def ends() -> int:
+    def ends(_: object) -> int:
         raise raised
 
     monkeypatch.setattr(cli, "main", ends)

@@ -19,7 +19,7 @@ def blocks(text: str) -> list[str]:
 
 @pytest.fixture
 def _built(fmus, native, tmp_path, monkeypatch) -> None:
-    """Change to a folder with the FMUs of the guides, in the folders of ``prbm-build-fmu``."""
+    """Change to a folder with the FMUs of the guides, in the folders of ``prbm build``."""
     paths = {("python", name): path for name, path in fmus.items()}
     paths |= {(f"fmi{fmi}", name): path for (name, fmi), path in native.items()}
     for (folder, name), path in paths.items():

@@ -15,6 +15,7 @@ from pathlib import Path
 from ..base.errors import EquilibriumError, PrbmError, SimulationError
 from ..base.progress import CLEAR
 from ..base.version import __version__
+from ..fmu.date import date
 from ..mechanism.flexure import MODELS
 from .arguments import (
     ANIMATION_USAGE,
@@ -41,6 +42,7 @@ from .arguments import (
     study_arguments,
     sweep_arguments,
 )
+from .build_arguments import DETAILS, SUMMARY, build_arguments
 from .measure_arguments import measure_arguments
 from .program import (
     FAILED,
@@ -70,7 +72,7 @@ def parser() -> argparse.ArgumentParser:
             "prbm simulate my_mechanism.toml",
         )
         + "\n\nResults are printed; --out DIR also writes tables (CSV) and figures (PNG) into a "
-        "folder.\nprbm-build-fmu builds FMUs of the same mechanisms.",
+        "folder.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
@@ -95,6 +97,7 @@ def parser() -> argparse.ArgumentParser:
     _picture(commands)
     _animate(commands)
     _explore(commands)
+    _build(commands)
     _modelica(commands)
     _ssp(commands)
     _validate(commands)
@@ -452,6 +455,18 @@ def _explore(commands: Commands) -> None:
     parameters_argument(parser)
 
 
+def _build(commands: Commands) -> None:
+    parser = add_command(
+        commands, "build", "building:run_build", SUMMARY,
+        examples(
+            "prbm build PRBDM2R",
+            "prbm build my_mechanism.toml --flavour native --platform all",
+        ),
+        details=DETAILS,
+    )  # fmt: skip
+    build_arguments(parser)
+
+
 def _modelica(commands: Commands) -> None:
     parser = add_command(
         commands, "modelica", "modelica:write_wrapper",
@@ -563,10 +578,10 @@ def _run(words: Sequence[str]) -> int:
         return MISTAKE
     name = "prbm"
     try:
+        date()  # SciPy cannot be imported with an invalid date: numpy.f2py reads it, too.
         options = parser().parse_args(protected(words))
         name = options.prog
-        _function(options.run)(options)
-        return OK
+        return _function(options.run)(options) or OK
     except SystemExit:  # argparse has printed the help or the version
         return OK
     except ArgumentMistake as error:
@@ -596,10 +611,10 @@ def protected(words: Sequence[str]) -> list[str]:
     return [f" {word}" if NEGATIVE.match(word) else word for word in words]
 
 
-def _function(run: str) -> Callable[[argparse.Namespace], None]:
-    """Import and return the function named by module:function."""
+def _function(run: str) -> Callable[[argparse.Namespace], int | None]:
+    """Import and return the function named by module:function, which may return an exit status."""
     module, _, function = run.partition(":")
-    found: Callable[[argparse.Namespace], None] = getattr(
+    found: Callable[[argparse.Namespace], int | None] = getattr(
         importlib.import_module(f".{module}", __package__), function
     )
     return found
