@@ -36,7 +36,7 @@ def built(folder: Path, **environment: str) -> Path:
     subprocess.run(
         [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", folder / "dist"],
         cwd=ROOT, check=True, capture_output=True,
-        env=os.environ | {"HATCH_BUILD_HOOK_ENABLE_CUSTOM": "true"} | environment,
+        env=os.environ | {"PRBM_LIBRARIES": "all"} | environment,
     )  # fmt: skip
     (wheel,) = (folder / "dist").iterdir()
     return wheel
