@@ -56,6 +56,7 @@ from .program import (
 from .remedies import in_options
 
 NEGATIVE = re.compile(r"-\.?\d")
+KINDS = ("guide", "lever", "gripper", "bistable", "pivot")
 METHODS = ("algebraic", "simulated", "fitted", "elements", "closed-form", "compliant")
 
 
@@ -82,6 +83,7 @@ def parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     commands = p.add_subparsers(title="commands", metavar="COMMAND", parser_class=Parser)
     _list(commands)
+    _new(commands)
     _parameters(commands)
     _modes(commands)
     _equilibrium(commands)
@@ -117,6 +119,20 @@ def _list(commands: Commands) -> None:
         examples("prbm list"),
         details="Beams are the most accurate model of flexures (GuideBeam). PRBDM, PRBDM2R and "
         "PRBDM3R are the same guide by models with 1, 2 and 3 pivots, for comparison.",
+    )
+
+
+def _new(commands: Commands) -> None:
+    parser = add_command(
+        commands, "new", "new:write_template",
+        "write a commented mechanism file to start from",
+        examples("prbm new MyGuide", "prbm new MyPivot --kind pivot"),
+    )  # fmt: skip
+    parser.add_argument(
+        "name", metavar="NAME", help="name of the mechanism; the file is NAME.toml, a new one"
+    )
+    parser.add_argument(
+        "--kind", default=KINDS[0], choices=KINDS, help="kind of mechanism (default: %(default)s)"
     )
 
 
