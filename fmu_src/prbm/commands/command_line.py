@@ -566,10 +566,11 @@ def _completion(commands: Commands) -> None:
     parser = add_command(
         commands, "completion", "completion:print_completion",
         "print a script for tab completion of commands, options and mechanisms",
-        examples("prbm completion bash"),
-        details='In bash, eval "$(prbm completion bash)" in ~/.bashrc switches it on.',
+        examples("prbm completion bash", "prbm completion fish"),
+        details='In bash and zsh, eval "$(prbm completion bash)" in ~/.bashrc switches it on, with '
+        "zsh in ~/.zshrc; in fish, prbm completion fish | source in config.fish.",
     )  # fmt: skip
-    parser.add_argument("shell", choices=("bash",), help="the shell")
+    parser.add_argument("shell", choices=("bash", "zsh", "fish"), help="the shell")
 
 
 # --- run --------------------------------------------------------------------------------------
