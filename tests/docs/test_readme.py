@@ -6,6 +6,7 @@ import shutil
 
 import pytest
 
+from prbm.base.version import __version__
 from prbm.commands.command_line import main
 from support import ROOT
 
@@ -86,3 +87,7 @@ def test_two_commands_set_up_the_development():
     assert len(lines) == 2
     assert "build_fmu.py --simulate" in lines[0]
     assert "pytest" in lines[1]
+
+
+def test_the_named_wheel_has_the_present_version():
+    assert re.findall(r"prbm_impact-([\d.]+)-py3-none-any\.whl", README) == [__version__]
