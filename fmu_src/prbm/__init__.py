@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .analysis.static_shape import equilibrium as equilibrium
+    from .analysis.static_shape import modes as modes
     from .base.errors import EquilibriumError as EquilibriumError
     from .base.errors import MechanismError as MechanismError
     from .base.errors import ParameterError as ParameterError
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from .base.version import __version__ as __version__
     from .files.mechanism_file import load as load
     from .mechanism.description import Mechanism
+    from .mechanism.flexure import register_model as register_model
     from .plots.shown import Result, simulate
     from .runs.engine import simulation as Simulation
     from .runs.result import ResultError as ResultError
@@ -43,6 +45,8 @@ __all__ = [
     "__version__",
     "equilibrium",
     "load",
+    "modes",
+    "register_model",
     "simulate",
     "study",
 ]
@@ -61,6 +65,8 @@ _MODULES = {
     "__version__": ("base.version", "__version__"),
     "equilibrium": ("analysis.static_shape", "equilibrium"),
     "load": ("files.mechanism_file", "load"),
+    "modes": ("analysis.static_shape", "modes"),
+    "register_model": ("mechanism.flexure", "register_model"),
     "simulate": ("plots.shown", "simulate"),
     "study": ("sweeps.study", "study"),
 }

@@ -24,6 +24,8 @@ PUBLIC = [
     "__version__",
     "equilibrium",
     "load",
+    "modes",
+    "register_model",
     "simulate",
     "study",
 ]
