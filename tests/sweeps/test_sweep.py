@@ -29,7 +29,7 @@ from prbm.sweeps import sweep as sweeps
 from prbm.sweeps.outputs import Output, evaluate, parse_output, reduce
 from prbm.sweeps.results import OWN
 from prbm.sweeps.runs import Job, Runner
-from prbm.sweeps.sweep import SweepError, samples, sweep
+from prbm.sweeps.sweep import SweepError, samples, summary, sweep
 from signals import interruptible
 from support import SUPPORT
 
@@ -603,6 +603,20 @@ def test_a_missing_package_is_reported(mishap, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(SweepError, match=r"need the package distributed; install .*sweep"):
         sweep(mishap, GRID)
+
+
+def test_the_summary_names_outputs_without_values():
+    nan = float("nan")
+    found = pd.DataFrame(
+        {"row": [0, 1, 2], "settling": [nan] * 3, "gap": [1.0, nan, nan], "x": [1.0, 2.0, nan],
+         "status": ["ok", "ok", "failed"], "message": ["", "", "no"]}
+    )  # fmt: skip
+    assert summary(found, "out.csv").splitlines() == [
+        "3 runs, 1 failed: out.csv",
+        "row 2 failed: no",
+        "settling: no value in 2 of 2 complete runs; simulate longer, or check the condition",
+        "gap: no value in 1 of 2 complete runs; simulate longer, or check the condition",
+    ]
 
 
 @pytest.mark.slow
