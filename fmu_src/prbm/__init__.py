@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .analysis.linear_model import linearize as linearize
     from .analysis.static_shape import equilibrium as equilibrium
+    from .analysis.static_shape import modes as modes
     from .base.errors import EquilibriumError as EquilibriumError
     from .base.errors import MechanismError as MechanismError
     from .base.errors import ParameterError as ParameterError
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from .base.version import __version__ as __version__
     from .files.mechanism_file import load as load
     from .mechanism.description import Mechanism
+    from .mechanism.flexure import register_model as register_model
     from .plots.shown import Result, simulate
     from .runs.engine import simulation as Simulation
     from .runs.result import ResultError as ResultError
@@ -45,6 +47,8 @@ __all__ = [
     "equilibrium",
     "linearize",
     "load",
+    "modes",
+    "register_model",
     "simulate",
     "study",
 ]
@@ -64,6 +68,8 @@ _MODULES = {
     "equilibrium": ("analysis.static_shape", "equilibrium"),
     "linearize": ("analysis.linear_model", "linearize"),
     "load": ("files.mechanism_file", "load"),
+    "modes": ("analysis.static_shape", "modes"),
+    "register_model": ("mechanism.flexure", "register_model"),
     "simulate": ("plots.shown", "simulate"),
     "study": ("sweeps.study", "study"),
 }

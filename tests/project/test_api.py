@@ -25,6 +25,8 @@ PUBLIC = [
     "equilibrium",
     "linearize",
     "load",
+    "modes",
+    "register_model",
     "simulate",
     "study",
 ]
