@@ -1402,7 +1402,7 @@ def test_accelerations_and_rates_are_the_same_in_every_discrete_state(name):
         assert_same(dy[: 2 * n], expected[: 2 * n], rel)
         power = float(np.abs(M @ a_expected) @ np.abs(y[n : 2 * n]))  # Size of the summed powers.
         assert_same(dy[2 * n :], expected[2 * n :], rel, scale=power)
-        energy = kernel().kinetic_energy_of(mine.structure, mine.evaluation)
+        energy = kernel().kinetic_energy_of(mine.evaluation)
         assert_same(energy, kinetics.kinetic_energy(M, y[n : 2 * n]))
 
 

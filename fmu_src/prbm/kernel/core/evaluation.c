@@ -470,24 +470,24 @@ NOINLINE void mapped_terms(const Equations *eq, const Reference *near, Evaluatio
 
 /* --- energy ----------------------------------------------------------------------------------- */
 
-/* Return the kinetic energy v^T diag(e)^H H diag(e) v / 2 at the evaluated velocities. */
-PRBM double kinetic_energy_of(const Equations *equations, const Evaluation *evaluation) {
-    const System *system = equations->system;
-    const Complex *e = evaluation->at.e;
-    const double *own = own_inertia(system, &evaluation->at), *v = evaluation->at.turn;
+/* Return the kinetic energy v^T L D L^T v / 2 at the evaluated velocities, from the factors of M. */
+PRBM double kinetic_energy_of(const Evaluation *evaluation) {
+    const Factors *factors = &evaluation->factors;
+    const double *L = factors->L;
     double sum = 0.0;
-    for (int k = 0; k < system->block_count; k++) {
-        int start = system->blocks[k].start, end = start + system->blocks[k].size;
-        for (int i = start; i < end; i++) {
-            const Complex *H = system->H + i * system->d;
-            double row = 0.5 * own[i] * v[i];
-            for (int j = start; j < i; j++) {
-                row += product(product(conjugate(e[i]), H[j]), e[j]).re * v[j];
+    for (int k = 0; k < factors->block_count; k++) {
+        int start = factors->blocks[k].start, size = factors->blocks[k].size;
+        const double *v = evaluation->at.speed + start;
+        for (int j = 0; j < size; j++) {
+            double rate = v[j];
+            for (int i = j + 1; i < size; i++) {
+                rate += L[i * size + j] * v[i];
             }
-            sum += row * v[i];
+            sum += rate * rate / factors->inverse[start + j];
         }
+        L += size * size;
     }
-    return sum;
+    return 0.5 * sum;
 }
 
 /* --- friction --------------------------------------------------------------------------------- */

@@ -274,6 +274,46 @@ SIZED bool schur_of_size(int r, int even, Factors *factors) {
     return rows && factor_rows(r, S, L, L + r * r);
 }
 
+/* Compute count elements of a row of S, those of the row Z and of consecutive columns. */
+SIZED void schur_elements(int count, int even, const double *RESTRICT Z,
+                          const double *RESTRICT inverse, const double *RESTRICT columns,
+                          double *RESTRICT S) {
+    Lanes sum[SMALL][SUMS] = {{NO_LANES}};
+    UNROLLED_BY_LANES
+    for (int j = 0; j < even; j += LANES) {
+        Lanes share = lanes_at(inverse + j) * lanes_at(Z + j);
+        UNROLLED
+        for (int k = 0; k < count; k++) {
+            sum[k][SUM_OF(j)] += share * lanes_at(columns + k * even + j);
+        }
+    }
+    UNROLLED
+    for (int k = 0; k < count; k++) {
+        S[k] = total(sum[k]);
+    }
+}
+
+/* As schur_of_size, for any number of rows. */
+static bool schur_of_many(Factors *factors) {
+    const int r = factors->r, even = factors->even;
+    const double *Z = factors->Z, *inverse = factors->inverse;
+    double *S = factors->S, *L = S + r * r;
+    for (int i = 0; i < r; i++) {
+        const double *row = Z + i * even;
+        int k = 0;
+        for (; k + SMALL <= i + 1; k += SMALL) {
+            schur_elements(SMALL, even, row, inverse, Z + k * even, S + i * r + k);
+        }
+        for (; k <= i; k++) {
+            schur_elements(1, even, row, inverse, Z + k * even, S + i * r + k);
+        }
+        if (!(S[i * r + i] > factors->least)) {
+            return false;
+        }
+    }
+    return factor(r, S, L, L + r * r);
+}
+
 /* Return Z_i D^-1 column. */
 static double metric_product(const Factors *factors, int i, const double *column) {
     const double *row = factors->Z + i * factors->even;
@@ -284,9 +324,9 @@ static double metric_product(const Factors *factors, int i, const double *column
     return sum;
 }
 
-/* Compute S, scale it by the lengths of the rows Z, and factor it by LU: for an S that is larger
- * than SMALL, or not symmetric because a stop slides and the columns differ from the rows.  The
- * scales (r,) are stored behind S. */
+/* Compute S, scale it by the lengths of the rows Z, and factor it by LU: for an S that is not
+ * symmetric because a stop slides and the columns differ from the rows.  The scales (r,) are stored
+ * behind S. */
 static bool factor_unsymmetric(Factors *factors) {
     int even = factors->even, r = factors->r;
     double *scale = factors->S + r * r;
@@ -319,7 +359,7 @@ static void unsymmetric_multipliers(const Factors *factors, double *lam) {
 
 /* Compute and factor S for vectors of the padded length even. */
 SIZED bool schur_padded(int even, Factors *factors) {
-    factors->symmetric = factors->Z_columns == factors->Z && factors->r <= SMALL;
+    factors->symmetric = factors->Z_columns == factors->Z;
     if (!factors->symmetric) {
         return factor_unsymmetric(factors);
     }
@@ -328,7 +368,8 @@ SIZED bool schur_padded(int even, Factors *factors) {
     case 1: return schur_of_size(1, even, factors);
     case 2: return schur_of_size(2, even, factors);
     case 3: return schur_of_size(3, even, factors);
-    default: return schur_of_size(4, even, factors);
+    case 4: return schur_of_size(4, even, factors);
+    default: return schur_of_many(factors);
     }
 }
 

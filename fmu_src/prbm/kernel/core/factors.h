@@ -15,7 +15,7 @@ typedef struct {
     double *S;                  /* (r, r), and memory for its factor, or its scales */
     int *pivots;                /* (r,) */
     double least;               /* square of the shortest row Z that is not round-off */
-    bool symmetric;             /* S is symmetric and small: factor L D L^T, else LU */
+    bool symmetric;             /* S is symmetric: factor L D L^T, else LU */
 } Factors;
 
 typedef enum { BACKWARD, FORWARD } Substitution;
