@@ -165,32 +165,29 @@ static int end_of_block(int size, const bool *linked, int start) {
     return end;
 }
 
-/* Return the row of a block between start and end, counted in the block, that leaves most elements
- * zero: those of later rows in earlier columns. */
-static int row_apart(int size, const bool *linked, int start, int end) {
-    int apart = 0, most = 0;
-    for (int row = start + 1; row < end - 1; row++) {
-        int zeros = (row - start) * (end - 1 - row);
-        for (int i = row + 1; i < end; i++) {
-            for (int j = start; j < row; j++) {
-                zeros = linked[i * size + j] ? 0 : zeros;
-            }
-        }
-        apart = zeros > most ? row - start : apart;
-        most = zeros > most ? zeros : most;
-    }
-    return apart;
-}
-
 static int find_blocks(int size, const bool *linked, Block *blocks) {
     int count = 0;
     for (int start = 0; start < size;) {
         int end = end_of_block(size, linked, start);
-        Block block = {start, end - start, row_apart(size, linked, start, end)};
+        Block block = {start, end - start};
         blocks[count++] = block;
         start = end;
     }
     return count;
+}
+
+/* Find the last column that is linked with each row, counted in the block of the row. */
+static void find_last(const System *system, const bool *linked, int *last) {
+    int n = system->n;
+    for (int k = 0; k < system->mass_block_count; k++) {
+        int start = system->mass_blocks[k].start, end = start + system->mass_blocks[k].size;
+        for (int i = start; i < end; i++) {
+            last[i] = i - start;
+            for (int j = i; j < end; j++) {
+                last[i] = linked[i * n + j] || linked[j * n + i] ? j - start : last[i];
+            }
+        }
+    }
 }
 
 /* Mark the coordinates that two directions depend on. */
@@ -218,6 +215,7 @@ static void find_all_blocks(System *system, Scratch *scratch) {
     }
     system->block_count = find_blocks(system->d, linked, system->blocks);
     system->mass_block_count = find_blocks(system->n, joined, system->mass_blocks);
+    find_last(system, joined, system->last);
     scratch->used = mark;
 }
 

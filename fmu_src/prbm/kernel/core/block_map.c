@@ -80,9 +80,9 @@ static void find_mass_block(const System *system, BlockMap *block) {
     block->mass_first = offset - mass[k].start * (mass[k].size + 1);
 }
 
-/* Return the index of the mass of the coordinates a and b <= a of a block. */
+/* Return the index of the mass of the coordinates a and b <= a of a block, above the diagonal. */
 static int mass_index(const BlockMap *block, int a, int b) {
-    return block->mass_first + block->coordinate[a] * block->mass_size + block->coordinate[b];
+    return block->mass_first + block->coordinate[b] * block->mass_size + block->coordinate[a];
 }
 
 /* Whether the last direction of a block is its last coordinate, the rotation of a body. */
@@ -419,7 +419,7 @@ SIZED void pull_beam_mass(int nodes, bool body, const BlockMap *map, const doubl
             sum[(BEAM_BODY + c) / LANES] += row[c / LANES] * lanes_at(TIMES + c);
         }
     }
-    const int paired = map->together ? BEAM_PAIRED : 0;
+    const int paired = 0;
     UNROLLED
     for (int k = 0; k < BEAM_ENTRIES; k += LANES) {
         if (k < paired) {

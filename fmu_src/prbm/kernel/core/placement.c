@@ -74,6 +74,7 @@ PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memor
     result.blocks = place(memory, d, sizeof(Block));
     place_maps(&result, memory);
     result.mass_blocks = place(memory, n, sizeof(Block));
+    result.last = place(memory, n, sizeof(int));
     result.coupling = place(memory, d * d, sizeof(Complex));
     result.own = place(memory, d, sizeof(double));
     result.straight = place(memory, (size_t)result.even, sizeof(double));

@@ -51,10 +51,9 @@ typedef struct {
 } FreeBody;
 
 /* A block on the diagonal of the mass matrix, for example that of the links of a flexure that
- * closes a loop.  The rows after the row apart, counted in the block, are zero in the columns
- * before it. */
+ * closes a loop. */
 typedef struct {
-    int start, size, apart;
+    int start, size;
 } Block;
 
 /* Blocks whose code is compiled separately: beams of the order 3 between two clamps, with 5 or 6
@@ -79,7 +78,7 @@ typedef struct {
     int *coordinate;       /* (count,) in ascending order */
     double *change;        /* (count, even) changes of the directions with these coordinates */
     Parts H;               /* (size, even) below the diagonal, and zero elsewhere */
-    int mass_first, mass_size; /* The mass of the coordinates i and j <= i is at the index
+    int mass_first, mass_size; /* The mass of the coordinates i and j >= i is at the index
                                 * mass_first + i mass_size + j of the mass blocks. */
     BeamKind beam;         /* The members below are used unless it is NO_BEAM. */
     bool together;         /* Whether the coordinates are consecutive. */
@@ -135,6 +134,8 @@ typedef struct {
     BlockMap *maps;           /* of the blocks, if mapped */
     int mass_block_count;
     Block *mass_blocks;       /* of M: the same, unless mapped */
+    int *last;                /* (n,) the last columns of the rows of M that may not be zero, counted
+                               * in their blocks */
     Complex *coupling;        /* the blocks of H, one after the other */
     double *own;              /* (d,) the diagonal of the mass matrix of the directions */
     double *straight;         /* (even,) q0 */
