@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "core/assembly.h"
-#include "core/block_map.h"
+#include "core/branches.h"
 #include "core/constraints.h"
 #include "core/flexure.h"
 #include "core/flexures.h"
@@ -29,7 +29,8 @@ static bool walk_joint(System *system, const Step *step, Scratch *scratch, Probl
         on_body(system, span.far, span.z_end, &other);
         close_loop(system, &spot, &other);
     } else {
-        reach(system, span.far, &spot, span.z_end, step->first_direction);
+        reach(system, span.far, system->branch_of[span.root], &spot, span.z_end,
+              step->first_direction);
     }
     return true;
 }
@@ -37,7 +38,9 @@ static bool walk_joint(System *system, const Step *step, Scratch *scratch, Probl
 static bool walk_all(System *system, Scratch *scratch, Problem *problem) {
     const Mechanism *m = system->mechanism;
     bool ok = true;
-    system->r = 0;
+    system->r = system->branch_count = 0;
+    system->branch_memory.used = 0;
+    system->branch_of[GROUND] = FIXED;
     for (int i = 0; ok && i < m->flexure_count + m->joint_count; i++) {
         size_t mark = scratch->used;
         const Step *step = &m->steps[i];
@@ -261,7 +264,7 @@ static void add_moments(System *system, Scratch *scratch) {
     }
     find_all_blocks(system, scratch);
     pack_blocks(system);
-    set_block_maps(system, scratch);
+    set_branches(system, scratch);
 }
 
 /* Return the size of the drawn mechanism [m]: the largest distance between points of the ground and

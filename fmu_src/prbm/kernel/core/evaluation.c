@@ -2,7 +2,8 @@
  * twin of Equations.evaluate in mechanics/dynamics.py. */
 #include <string.h>
 
-#include "core/block_map.h"
+#include "core/branch_terms.h"
+#include "core/branches.h"
 #include "core/evaluation.h"
 #include "core/forces.h"
 #include "core/gaps.h"
@@ -68,7 +69,8 @@ PRBM void evaluation_place(Evaluation *evaluation, const System *system, Memory 
     result.rows = system->mapped ? place(memory, r * wide, sizeof(double)) : result.factors.Z;
     result.mass = place(memory, system->mapped ? n * n : 0, sizeof(double));
     result.shift = place(memory, system->mapped ? wide : 0, sizeof(double));
-    result.turned = place(memory, system->mapped ? wide : 0, sizeof(double));
+    result.roots = place(memory, root_count(system), sizeof(Complex));
+    result.moments = place(memory, system->mapped ? n : 0, sizeof(Complex));
     zero_placed(memory, begin);
     *evaluation = result;
 }
@@ -166,7 +168,7 @@ SIZED void find_loads(int even, const Equations *eq, Evaluation *result) {
 
 /* Return Im(w^2) = -2 theta' s' of an arm that stretches.  The equations without these terms give
  * the angular acceleration minus Im(w^2).  If the coordinates are the directions, add_coriolis adds
- * Im(w^2) to the solution; otherwise pull_shift adds its loads to the right side. */
+ * Im(w^2) to the solution; otherwise couple adds its loads to the right side. */
 static double coriolis(const System *system, const double *turn, int stretch_direction) {
     return -2.0 * turn[arm_of(system, stretch_direction)] * turn[stretch_direction];
 }
@@ -422,10 +424,7 @@ static void pull_blocks(const Equations *eq, Evaluation *result) {
     if (system->stretch_count > 0) {
         find_shift(system, &result->at, result->shift);
     }
-    zeros(system->n * system->n, result->mass);
-    for (int k = 0; k < system->block_count; k++) {
-        add_block_terms(system, &system->maps[k], own, eq->r, result);
-    }
+    branch_terms(system, own, eq->r, result);
 }
 
 /* Compute directions, loads and rows. */

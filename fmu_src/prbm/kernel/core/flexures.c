@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "core/beam.h"
+#include "core/branches.h"
 #include "core/flexure.h"
 #include "core/flexures.h"
 #include "core/free_body.h"
@@ -96,6 +97,7 @@ static bool walk_links(System *system, const Step *step, Scratch *scratch, Probl
         next = lay_link(system, direction, pieces.lengths[i], pieces.axial[i - 1],
                         is_stretch(system, next + 1), next);
     }
+    int branch = add_branch(system, system->branch_of[span.root], step->first_direction, next, &spot);
     int last_one = owners[pieces.n + 1] = step->closes ? system->origins[span.far].j : next;
     for (int i = 0; i <= pieces.n; i++) {
         /* In the drawing the angle of a body is 0, that of a link its direction. */
@@ -116,7 +118,7 @@ static bool walk_links(System *system, const Step *step, Scratch *scratch, Probl
         close_loop(system, &spot, &spare);
         copy_place(system->d, &spot, &spare); /* The last stub is part of the far body. */
     } else {
-        reach(system, span.far, &spot, minus(span.z_end, last), last_one);
+        reach(system, span.far, branch, &spot, minus(span.z_end, last), last_one);
     }
     add_rod(system, pieces.rods[pieces.n + 1], &spot, last_one, last, &spare);
     extend(&spot, last_one, last);
@@ -198,6 +200,28 @@ static void add_section(System *system, const Place *spot, int arm, double mass,
     }
 }
 
+/* Add the panels of a beam, from its near end, as branches; return the last one. */
+static int add_panels(System *system, const Step *step, const Beam *beam, int stride,
+                      const Place *root, Complex direction, Scratch *scratch) {
+    Place spot = new_place(system, scratch);
+    Complex *lengths = take_complex(scratch, beam->nodes, 1);
+    int branch = system->branch_of[span_of(system, step).root];
+    int first = step->backwards ? beam->nodes : 0;
+    for (int k = 0; k < beam->panel_count; k++) {
+        int panel = step->backwards ? beam->panel_count - 1 - k : k;
+        int count = beam->panels[panel].nodes;
+        int start = step->backwards ? first - count : first;
+        for (int i = 0; i < beam->nodes; i++) {
+            lengths[i] = i < first ? beam->whole[i] : complex_of(0.0, 0.0);
+        }
+        beam_place(system, step, beam, stride, root, direction, lengths, &spot);
+        int j = step->first_direction + start * stride;
+        branch = add_branch(system, branch, j, j + count * stride, &spot);
+        first = step->backwards ? start : start + count;
+    }
+    return branch;
+}
+
 /* Place the masses and the far end of a beam; return its direction as drawn. */
 static Complex place_beam(System *system, const Step *step, const Beam *beam,
                           const FlexureType *kind, Scratch *scratch) {
@@ -220,6 +244,7 @@ static Complex place_beam(System *system, const Step *step, const Beam *beam,
         rank_points(free_body, system, i);
         add_corner(system, &spot);
     }
+    int branch = add_panels(system, step, beam, stride, &root, direction, scratch);
     Complex *none = take_complex(scratch, nodes, 1);
     zeros(2 * nodes, (double *)none);
     beam_place(system, step, beam, stride, &root, direction,
@@ -228,7 +253,8 @@ static Complex place_beam(System *system, const Step *step, const Beam *beam,
         on_body(system, span.far, span.z_end, &root);
         close_loop(system, &spot, &root);
     } else {
-        reach(system, span.far, &spot, span.z_end, step->first_direction + nodes * stride);
+        reach(system, span.far, branch, &spot, span.z_end,
+              step->first_direction + nodes * stride);
     }
     return direction;
 }
