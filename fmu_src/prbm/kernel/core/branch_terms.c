@@ -22,52 +22,50 @@
 
 /* --- directions and derivatives --------------------------------------------------------------- */
 
-/* Compute the directions out of the coordinates x. */
-SIZED void map_branch(int size, const Branch *branch, const double *RESTRICT x,
-                      double *RESTRICT out) {
+/* Compute the directions theta of the coordinates x, and their rates from the rates v. */
+SIZED void map_branch(int size, int count, const Branch *branch, const double *x,
+                      const double *v, double *theta, double *turn) {
     const int even = even_length(size);
     UNROLLED
     for (int i = 0; i < size; i += LANES) {
-        Lanes sum = NO_LANES;
-        for (int c = 0; c < branch->count; c++) {
-            sum += x[branch->coordinate[c]] * aligned_lanes(branch->change + c * even + i);
+        Lanes angle = NO_LANES, rate = NO_LANES;
+        const double *change = branch->change + i;
+        UNROLLED
+        for (int c = 0; c < count; c++) {
+            const int j = branch->coordinate[c];
+            Lanes each = aligned_lanes(change + c * even);
+            angle += x[j] * each;
+            rate += v[j] * each;
         }
         if (i + LANES <= size) {
-            set_lanes(out + branch->start + i, sum);
+            set_lanes(theta + branch->start + i, angle);
+            set_lanes(turn + branch->start + i, rate);
         } else {
-            out[branch->start + i] = LANE(sum, 0);
+            theta[branch->start + i] = LANE(angle, 0);
+            turn[branch->start + i] = LANE(rate, 0);
         }
     }
 }
 
-static void map_any(const Branch *branch, const double *x, double *out) {
-    switch (branch->size) {
-    case 1: out[branch->start] = x[branch->coordinate[0]]; break;
-    case 5: map_branch(5, branch, x, out); break;
-    case 6: map_branch(6, branch, x, out); break;
-    default: map_branch(branch->size, branch, x, out);
-    }
-}
-
-PRBM void map_directions(const System *system, const double *x, double *out) {
+PRBM void map_motion(const System *system, const double *x, const double *v, double *theta,
+                     double *turn) {
     for (int k = 0; k < system->branch_count; k++) {
-        map_any(&system->branches[k], x, out);
-    }
-}
-
-PRBM void map_motion(const System *system, Kinematics *at) {
-    for (int k = 0; k < system->branch_count; k++) {
-        map_any(&system->branches[k], at->angle, at->theta);
-        map_any(&system->branches[k], at->speed, at->turn);
+        const Branch *branch = &system->branches[k];
+        switch (branch->leaf) {
+        case 5: map_branch(5, LEAF_COORDINATES, branch, x, v, theta, turn); break;
+        case 6: map_branch(6, LEAF_COORDINATES, branch, x, v, theta, turn); break;
+        default: map_branch(branch->size, branch->count, branch, x, v, theta, turn);
+        }
     }
 }
 
 /* Add the derivatives by the directions x, pulled back to the coordinates, to out. */
-SIZED void pull_branch(int size, const Branch *branch, const double *RESTRICT x,
+SIZED void pull_branch(int size, int count, const Branch *branch, const double *RESTRICT x,
                        double *RESTRICT out) {
     const int even = even_length(size), paired = size - size % PAIR;
     x += branch->start;
-    for (int c = 0; c < branch->count; c++) {
+    UNROLLED
+    for (int c = 0; c < count; c++) {
         const double *change = branch->change + c * even;
         Lanes sum[SUMS] = {NO_LANES};
         UNROLLED
@@ -79,19 +77,17 @@ SIZED void pull_branch(int size, const Branch *branch, const double *RESTRICT x,
     }
 }
 
-static void pull_any(const Branch *branch, const double *x, double *out) {
-    switch (branch->size) {
-    case 1: out[branch->coordinate[0]] += x[branch->start]; break;
-    case 5: pull_branch(5, branch, x, out); break;
-    case 6: pull_branch(6, branch, x, out); break;
-    default: pull_branch(branch->size, branch, x, out);
-    }
-}
-
+/* Add r rows x of derivatives by the directions, pulled back to the coordinates, to out. */
 static void pull_rows(const System *system, const Branch *branch, int r, const double *x,
                       double *out) {
     for (int row = 0; row < r; row++) {
-        pull_any(branch, x + row * system->wide, out + row * system->even);
+        switch (branch->leaf) {
+        case 5: pull_branch(5, LEAF_COORDINATES, branch, x, out); break;
+        case 6: pull_branch(6, LEAF_COORDINATES, branch, x, out); break;
+        default: pull_branch(branch->size, branch->count, branch, x, out);
+        }
+        x += system->wide;
+        out += system->even;
     }
 }
 
@@ -180,7 +176,7 @@ SIZED void own_terms(int size, int count, bool real, bool stretching, const Bran
     for (int i = 0; stretching && i < size; i++) {
         result->load[start + i] += own[start + i] * result->shift[start + i];
     }
-    if (branch->identity) {
+    if (!IS_CONSTANT(size) && branch->identity) {
         add_pairs(branch, M, own + start, result->mass);
         return;
     }
@@ -192,71 +188,85 @@ SIZED void own_terms(int size, int count, bool real, bool stretching, const Bran
     pull_pairs(pairs, count, branch, M, result->mass);
 }
 
+/* Compute the vectors along the arms of a branch, turned (even,), and return the sum of their
+ * products with -i w^2. */
+static Complex turned_vectors(const System *system, const Branch *branch, Parts vectors,
+                              const Evaluation *result, Parts turned) {
+    const int even = branch->even;
+    const Parts e = parts_from(result->at.e_parts, branch->start);
+    const double *squares = result->at.squares + branch->start;
+    for (int i = 0; i < even; i += LANES) {
+        Lanes re = aligned_lanes(vectors.re + i), im = aligned_lanes(vectors.im + i);
+        Lanes e_re = lanes_at(e.re + i), e_im = lanes_at(e.im + i);
+        set_lanes(turned.re + i, re * e_re - im * e_im);
+        set_lanes(turned.im + i, re * e_im + im * e_re);
+    }
+    Complex bent = {even_dot(even, turned.im, squares), -even_dot(even, turned.re, squares)};
+    if (system->stretch_count > 0) {
+        const double *shift = result->shift + branch->start;
+        bent.re += even_dot(even, turned.re, shift);
+        bent.im += even_dot(even, turned.im, shift);
+    }
+    return bent;
+}
+
+/* Return the sum of vectors along the arms of a branch, changed by one of its coordinates. */
+static Complex changed(const Branch *branch, Parts turned, int c) {
+    const double *change = branch->change + c * branch->even;
+    return complex_of(even_dot(branch->even, turned.re, change),
+                      even_dot(branch->even, turned.im, change));
+}
+
 /* Compute the motion of the root of a branch: P and, at last, the additional column. */
 static void move_root(const System *system, const Branch *branch, Evaluation *result) {
     const Branch *carrier = &system->branches[branch->parent];
     const Complex *before = result->roots + carrier->root;
-    const double *shift = result->shift, *squares = result->at.squares;
-    Complex *P = result->roots + branch->root, *bent = &P[branch->reach];
+    Complex *P = result->roots + branch->root;
+    Complex bent = turned_vectors(system, carrier, branch->lever, result, result->turned);
     memcpy(P, before, (size_t)carrier->reach * sizeof *P);
     zeros(2 * (branch->reach - carrier->reach), (double *)(P + carrier->reach));
-    *bent = before[carrier->reach];
-    for (int i = 0; i < carrier->size; i++) {
-        int j = carrier->start + i;
-        Complex arm = product(branch->lever[i], result->at.e[j]);
-        for (int c = 0; c < carrier->count; c++) {
-            Complex *moved = &P[branch->slot[c]];
-            *moved = plus(*moved, scaled(carrier->change[c * carrier->even + i], arm));
-        }
-        *bent = plus(*bent, product(arm, complex_of(shift[j], -squares[j])));
+    P[branch->reach] = plus(before[carrier->reach], bent);
+    for (int c = 0; c < carrier->count; c++) {
+        Complex *moved = &P[branch->slot[c]];
+        *moved = plus(*moved, changed(carrier, result->turned, c));
     }
 }
 
 /* Add the terms of a branch with the motion of its root. */
 static void root_terms(const System *system, const Branch *branch, Evaluation *result) {
     const Complex *P = result->roots + branch->root, bent = P[branch->reach];
-    const double *shift = result->shift, *squares = result->at.squares;
+    Complex *V = result->moments;
+    Complex turned = turned_vectors(system, branch, branch->S, result, result->turned);
     double *mass = result->mass, *a = result->a;
-    Complex turned = {0.0, 0.0}, *V = result->moments;
-    zeros(2 * branch->count, (double *)V);
-    for (int i = 0; i < branch->size; i++) {
-        int j = branch->start + i;
-        Complex moment = product(system->S[arm_of(system, j)], result->at.e[j]);
-        for (int c = 0; c < branch->count; c++) {
-            V[c] = plus(V[c], scaled(branch->change[c * branch->even + i], moment));
-        }
-        turned = plus(turned, product(moment, complex_of(shift[j], -squares[j])));
-    }
     for (int c = 0; c < branch->count; c++) {
-        a[branch->coordinate[c]] += product(conjugate(V[c]), bent).re;
+        V[c] = changed(branch, result->turned, c);
+        a[branch->coordinate[c]] += V[c].re * bent.re + V[c].im * bent.im;
     }
     for (int k = 0; k < branch->reach; k++) {
-        Complex moved = conjugate(P[k]);
+        const Complex moved = P[k];
         const int *index = branch->coupled + k * branch->count, both = branch->both[k];
-        a[branch->path[k]] += product(moved, turned).re;
+        a[branch->path[k]] += moved.re * turned.re + moved.im * turned.im;
         for (int c = 0; c < branch->count; c++) {
-            mass[index[c]] += product(moved, V[c]).re;
+            mass[index[c]] += moved.re * V[c].re + moved.im * V[c].im;
         }
         if (both != FIXED) {
-            mass[index[both]] += product(moved, V[both]).re;
+            mass[index[both]] += moved.re * V[both].re + moved.im * V[both].im;
         }
     }
 }
 
-/* Add the terms of the pairs of directions, by code for this size if the compiler knows it. */
+/* Add the terms of the pairs of directions, by code for this branch if the compiler knows it. */
 static void add_own_terms(const System *system, const Branch *branch, const double *own,
                           Evaluation *result) {
-    enum { BEAM = 4 }; /* Coordinates of a clamped beam of the order 3. */
     const int size = branch->size, count = branch->count;
-    const bool plain = branch->real && system->stretch_count == 0 && count == BEAM;
-    switch (plain ? size : 0) {
-    case 5: own_terms(5, BEAM, true, false, branch, own, result); break;
-    case 6: own_terms(6, BEAM, true, false, branch, own, result); break;
+    switch (branch->leaf) {
+    case 5: own_terms(5, LEAF_COORDINATES, true, false, branch, own, result); break;
+    case 6: own_terms(6, LEAF_COORDINATES, true, false, branch, own, result); break;
     default:
-        if (system->stretch_count > 0) {
-            own_terms(size, count, false, true, branch, own, result);
+        if (branch->real && system->stretch_count == 0) {
+            own_terms(size, count, true, false, branch, own, result);
         } else {
-            own_terms(size, count, false, false, branch, own, result);
+            own_terms(size, count, false, system->stretch_count > 0, branch, own, result);
         }
     }
 }
@@ -276,7 +286,7 @@ PRBM void branch_terms(const System *system, const double *own, int r, Evaluatio
             root_terms(system, branch, result);
         }
         add_own_terms(system, branch, own, result);
-        pull_any(branch, result->load, result->a);
+        pull_rows(system, branch, 1, result->load, result->a);
         pull_rows(system, branch, r, result->rows, result->factors.Z);
     }
 }

@@ -4,10 +4,9 @@
 
 #include "core/evaluated.h"
 
-/* Compute the directions, or their rates, out (d,) of coordinates or rates x (n,). */
-PRBM void map_directions(const System *system, const double *x, double *out);
-/* Compute the directions and their rates from the coordinates and their rates. */
-PRBM void map_motion(const System *system, Kinematics *at);
+/* Compute the directions theta (d,) of coordinates x (n,), and their rates turn from the rates v. */
+PRBM void map_motion(const System *system, const double *x, const double *v, double *theta,
+                     double *turn);
 /* Add the derivatives by directions x (r, wide), pulled back to the coordinates, to out
  * (r, even). */
 PRBM void pull_directions(const System *system, int r, const double *x, double *out);

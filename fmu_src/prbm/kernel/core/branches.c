@@ -1,4 +1,4 @@
-/* Branches: the panels of flexures, and bodies, from the ground outwards. */
+/* Branches: flexures and bodies, from the ground outwards. */
 #include <string.h>
 
 #include "core/branches.h"
@@ -12,7 +12,7 @@ typedef struct {
     size_t branches, coordinates, entries, changes, couplings, products;
 } BranchSizes;
 
-enum { ARRAYS_PER_BRANCH = 10 };
+enum { ARRAYS_PER_BRANCH = 14 };
 
 static size_t triangle(size_t n) {
     return n * (n + 1) / 2;
@@ -49,9 +49,7 @@ static BranchSizes branch_sizes(const Mechanism *m) {
         int end = i + 1 < steps ? m->steps[i + 1].first_direction : m->direction_count;
         if (kind && kind->order > 0) {
             int stride = kind->axial ? 2 : 1, coordinates = kind->order + 2 + kind->axial;
-            for (int k = 0; k < panel_count(kind); k++) {
-                add_sizes(&sizes, stride * panel_nodes(kind, k), coordinates, true);
-            }
+            add_sizes(&sizes, stride * node_count(kind), coordinates, true);
         } else {
             add_sizes(&sizes, end - step->first_direction, end - step->first_direction, false);
         }
@@ -65,9 +63,8 @@ static size_t branch_bytes(const System *system) {
     BranchSizes most = branch_sizes(system->mechanism);
     size_t n = (size_t)system->n, d = (size_t)system->d;
     size_t integers = most.coordinates * (n + 2) + 2 * most.branches * n + most.entries;
-    size_t numbers = most.changes + 2 * most.couplings + most.products;
-    size_t levers = 2 * d + most.branches;
-    return integers * sizeof(int) + numbers * sizeof(double) + levers * sizeof(Complex) +
+    size_t numbers = most.changes + 2 * most.couplings + most.products + 4 * (d + 2 * most.branches);
+    return integers * sizeof(int) + numbers * sizeof(double) +
            most.branches * ARRAYS_PER_BRANCH * ALIGNMENT;
 }
 
@@ -87,6 +84,16 @@ PRBM void place_branches(System *system, Memory *memory) {
 
 /* --- set-up ----------------------------------------------------------------------------------- */
 
+/* Set the elements of a vector (d,) for the arms of the directions of a branch, padded. */
+static void set_parts(const System *system, const Branch *branch, const Complex *z, Parts parts) {
+    parts.re[branch->even - 1] = parts.im[branch->even - 1] = 0.0;
+    for (int i = 0; i < branch->size; i++) {
+        Complex each = z[arm_of(system, branch->start + i)];
+        parts.re[i] = each.re;
+        parts.im[i] = each.im;
+    }
+}
+
 PRBM int add_branch(System *system, int parent, int start, int end, const Place *root) {
     if (!system->mapped || start == end) {
         return parent;
@@ -98,10 +105,8 @@ PRBM int add_branch(System *system, int parent, int start, int end, const Place 
     branch->parent = parent;
     if (parent != FIXED) {
         const Branch *carrier = &system->branches[parent];
-        branch->lever = place(&system->branch_memory, (size_t)carrier->size, sizeof(Complex));
-        for (int i = 0; i < carrier->size; i++) {
-            branch->lever[i] = root->A[arm_of(system, carrier->start + i)];
-        }
+        branch->lever = place_parts(&system->branch_memory, (size_t)carrier->even);
+        set_parts(system, carrier, root->A, branch->lever);
     }
     return system->branch_count++;
 }
@@ -276,11 +281,15 @@ PRBM void set_branches(System *system, Scratch *scratch) {
         set_changes(system, branch, scratch);
         scratch->used = mark;
         set_coupling(system, branch);
+        branch->S = place_parts(&system->branch_memory, (size_t)branch->even);
+        set_parts(system, branch, system->S, branch->S);
         set_own(system, branch);
         branch->identity = is_identity(branch);
         if (!branch->identity) {
             set_all_products(system, branch);
         }
+        bool plain = branch->real && system->stretch_count == 0;
+        branch->leaf = plain && branch->count == LEAF_COORDINATES ? branch->size : 0;
         set_path(system, branch);
         branch->root = roots;
         roots += branch->reach + 1;

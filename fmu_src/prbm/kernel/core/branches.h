@@ -1,4 +1,4 @@
-/* Branches: the panels of flexures, and bodies, from the ground outwards. */
+/* Branches: flexures and bodies, from the ground outwards. */
 #ifndef PRBM_BRANCHES_H
 #define PRBM_BRANCHES_H
 

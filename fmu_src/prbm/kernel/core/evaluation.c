@@ -29,10 +29,10 @@ PRBM Kinematics place_kinematics(const System *system, Memory *memory) {
     at.speed = place(memory, even + 2, sizeof(double));
     at.theta = system->mapped ? place(memory, wide, sizeof(double)) : at.angle;
     at.turn = system->mapped ? place(memory, wide, sizeof(double)) : at.speed;
-    at.squares = place(memory, wide, sizeof(double));
+    at.squares = place(memory, wide + PAIR, sizeof(double));
     at.own = place(memory, (size_t)system->d, sizeof(double));
     at.e = place(memory, wide, sizeof(Complex));
-    at.e_parts = place_parts(memory, wide);
+    at.e_parts = place_parts(memory, wide + PAIR);
     return at;
 }
 
@@ -68,9 +68,10 @@ PRBM void evaluation_place(Evaluation *evaluation, const System *system, Memory 
     result.load = system->mapped ? place(memory, wide, sizeof(double)) : result.a;
     result.rows = system->mapped ? place(memory, r * wide, sizeof(double)) : result.factors.Z;
     result.mass = place(memory, system->mapped ? n * n : 0, sizeof(double));
-    result.shift = place(memory, system->mapped ? wide : 0, sizeof(double));
+    result.shift = place(memory, system->mapped ? wide + PAIR : 0, sizeof(double));
     result.roots = place(memory, root_count(system), sizeof(Complex));
     result.moments = place(memory, system->mapped ? n : 0, sizeof(Complex));
+    result.turned = place_parts(memory, system->mapped ? wide : 0);
     zero_placed(memory, begin);
     *evaluation = result;
 }
@@ -80,7 +81,7 @@ PRBM void evaluation_place(Evaluation *evaluation, const System *system, Memory 
 PRBM void set_reference(Reference *reference, const System *system, const double *angle) {
     int wide = system->wide;
     if (system->mapped) {
-        map_directions(system, angle, reference->theta);
+        map_motion(system, angle, angle, reference->theta, reference->theta);
     } else {
         copy(system->d, angle, reference->theta);
     }
@@ -121,7 +122,7 @@ SHARED void directions_of(int even, const System *system, const Reference *near,
 
 /* Compute the directions and the arms, if the coordinates are not the directions. */
 NOINLINE void mapped_directions(const System *system, const Reference *near, Kinematics *at) {
-    map_motion(system, at);
+    map_motion(system, at->angle, at->speed, at->theta, at->turn);
     directions_of(system->wide, system, near, at);
 }
 
@@ -441,7 +442,7 @@ NOINLINE void mapped_terms(const Equations *eq, const Reference *near, Evaluatio
     const System *system = eq->system;
     const int even = system->even, wide = system->wide;
     double *Z = result->factors.Z;
-    map_motion(system, &result->at);
+    map_motion(system, result->at.angle, result->at.speed, result->at.theta, result->at.turn);
     switch (wide) {
     case 12: direction_terms(12, eq, near, result); break;
     case 14: direction_terms(14, eq, near, result); break;

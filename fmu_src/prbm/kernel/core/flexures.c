@@ -200,28 +200,6 @@ static void add_section(System *system, const Place *spot, int arm, double mass,
     }
 }
 
-/* Add the panels of a beam, from its near end, as branches; return the last one. */
-static int add_panels(System *system, const Step *step, const Beam *beam, int stride,
-                      const Place *root, Complex direction, Scratch *scratch) {
-    Place spot = new_place(system, scratch);
-    Complex *lengths = take_complex(scratch, beam->nodes, 1);
-    int branch = system->branch_of[span_of(system, step).root];
-    int first = step->backwards ? beam->nodes : 0;
-    for (int k = 0; k < beam->panel_count; k++) {
-        int panel = step->backwards ? beam->panel_count - 1 - k : k;
-        int count = beam->panels[panel].nodes;
-        int start = step->backwards ? first - count : first;
-        for (int i = 0; i < beam->nodes; i++) {
-            lengths[i] = i < first ? beam->whole[i] : complex_of(0.0, 0.0);
-        }
-        beam_place(system, step, beam, stride, root, direction, lengths, &spot);
-        int j = step->first_direction + start * stride;
-        branch = add_branch(system, branch, j, j + count * stride, &spot);
-        first = step->backwards ? start : start + count;
-    }
-    return branch;
-}
-
 /* Place the masses and the far end of a beam; return its direction as drawn. */
 static Complex place_beam(System *system, const Step *step, const Beam *beam,
                           const FlexureType *kind, Scratch *scratch) {
@@ -244,7 +222,8 @@ static Complex place_beam(System *system, const Step *step, const Beam *beam,
         rank_points(free_body, system, i);
         add_corner(system, &spot);
     }
-    int branch = add_panels(system, step, beam, stride, &root, direction, scratch);
+    int end = step->first_direction + nodes * stride;
+    int branch = add_branch(system, system->branch_of[span.root], step->first_direction, end, &root);
     Complex *none = take_complex(scratch, nodes, 1);
     zeros(2 * nodes, (double *)none);
     beam_place(system, step, beam, stride, &root, direction,
@@ -253,8 +232,7 @@ static Complex place_beam(System *system, const Step *step, const Beam *beam,
         on_body(system, span.far, span.z_end, &root);
         close_loop(system, &spot, &root);
     } else {
-        reach(system, span.far, branch, &spot, span.z_end,
-              step->first_direction + nodes * stride);
+        reach(system, span.far, branch, &spot, span.z_end, end);
     }
     return direction;
 }

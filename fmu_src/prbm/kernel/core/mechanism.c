@@ -1,6 +1,4 @@
 /* Values of expressions and parameters, and the list of variables. */
-#include <stdlib.h>
-
 #include "core/mechanism.h"
 
 PRBM bool has_dimension(const FlexureType *kind, int dimension) {
@@ -26,17 +24,11 @@ PRBM int panel_count(const FlexureType *kind) {
     return is_hinge(kind) ? 3 : PANELS_MAX;
 }
 
-PRBM int panel_nodes(const FlexureType *kind, int panel) {
-    int middle = panel_count(kind) / 2, apart = abs(panel - middle);
-    return apart == 0 ? kind->nodes : apart == middle ? THICK_NODES : FILLET_NODES;
-}
-
 PRBM int node_count(const FlexureType *kind) {
-    int count = 0;
-    for (int k = 0; k < panel_count(kind); k++) {
-        count += panel_nodes(kind, k);
+    if (kind->profile != PROFILE_NOTCH) {
+        return kind->nodes;
     }
-    return count;
+    return kind->nodes + 2 * THICK_NODES + (is_hinge(kind) ? 0 : 2 * FILLET_NODES);
 }
 
 PRBM double evaluate(Expression quantity, const double *values) {

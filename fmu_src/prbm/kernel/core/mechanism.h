@@ -207,8 +207,6 @@ PRBM bool has_stress(const Mechanism *mechanism, int i);
 /* The panels of a notch with a waist. */
 enum { PANELS_MAX = 5 };
 PRBM int panel_count(const FlexureType *kind);
-/* Return the number of nodes in a panel of a beam. */
-PRBM int panel_nodes(const FlexureType *kind, int panel);
 /* Return the number of nodes in all panels of a beam. */
 PRBM int node_count(const FlexureType *kind);
 PRBM double evaluate(Expression quantity, const double *values); /* Twin: Affine in mechanism/. */

@@ -56,26 +56,31 @@ typedef struct {
     int start, size;
 } Block;
 
-/* A panel of a flexure, the links of a flexure, or a body: consecutive directions, behind a root on
- * another branch or on the ground. */
+/* A flexure or a body: consecutive directions, behind a root on another branch or on the ground. */
 typedef struct {
     int start, size, even; /* The directions: the first, their number, its padded length. */
     int count;             /* The number of coordinates that they depend on. */
     int *coordinate;       /* (count,) in ascending order */
     double *change;        /* (count, even) changes of the directions with these coordinates */
     Parts H;               /* (size, even) below the diagonal, and zero elsewhere */
+    Parts S;               /* (even,) first moments of mass of what moves with the directions */
     bool real, identity;   /* Whether H is real, and whether the directions are the coordinates. */
+    int leaf;              /* The number of nodes of a clamped beam of the order 3 without stretch, for
+                            * which code is compiled separately; 0: another branch. */
     int *own;              /* (count (count + 1) / 2,) indices of the masses of the coordinates */
     int pairs;             /* The padded number of pairs of directions. */
     double *products;      /* (masses, pairs) changes of each mass with that of each pair */
     int parent;            /* The branch that carries the root; FIXED: the ground. */
-    Complex *lever;        /* (size of the parent,) displacement of the root with its directions */
+    Parts lever;           /* (even of the parent,) displacement of the root with its directions */
     int reach, *path;      /* The coordinates that move the root. */
     int *slot;             /* (count of the parent,) their indices in the path */
     int *coupled;          /* (reach, count) indices of the masses of path and coordinates */
     int *both;             /* (reach,) index of the same coordinate among those of the branch */
     int root;              /* Index of the motion of the root among those of all branches. */
 } Branch;
+
+/* Coordinates of a clamped beam of the order 3. */
+enum { LEAF_COORDINATES = 4 };
 
 /* The constant arrays of a mechanism, as in the twin.  There are n coordinates, d directions, r
  * loop rows, p mass points, s stops, f friction points and b bodies.  Columns of A and of the
