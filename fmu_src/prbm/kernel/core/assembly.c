@@ -29,8 +29,7 @@ static bool walk_joint(System *system, const Step *step, Scratch *scratch, Probl
         on_body(system, span.far, span.z_end, &other);
         close_loop(system, &spot, &other);
     } else {
-        reach(system, span.far, system->branch_of[span.root], &spot, span.z_end,
-              step->first_direction);
+        reach(system, span.far, &spot, span.z_end, step->first_direction);
     }
     return true;
 }
@@ -38,12 +37,12 @@ static bool walk_joint(System *system, const Step *step, Scratch *scratch, Probl
 static bool walk_all(System *system, Scratch *scratch, Problem *problem) {
     const Mechanism *m = system->mechanism;
     bool ok = true;
-    system->r = system->branch_count = 0;
-    system->branch_memory.used = 0;
-    system->branch_of[GROUND] = FIXED;
+    system->r = 0;
+    clear_branches(system);
     for (int i = 0; ok && i < m->flexure_count + m->joint_count; i++) {
         size_t mark = scratch->used;
         const Step *step = &m->steps[i];
+        begin_branch(system, i, scratch);
         ok = step->flexure ? walk_flexure(system, step, scratch, problem)
                            : walk_joint(system, step, scratch, problem);
         scratch->used = mark;

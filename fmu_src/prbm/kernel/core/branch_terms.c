@@ -51,10 +51,12 @@ PRBM void map_motion(const System *system, const double *x, const double *v, dou
                      double *turn) {
     for (int k = 0; k < system->branch_count; k++) {
         const Branch *branch = &system->branches[k];
-        switch (branch->leaf) {
-        case 5: map_branch(5, LEAF_COORDINATES, branch, x, v, theta, turn); break;
-        case 6: map_branch(6, LEAF_COORDINATES, branch, x, v, theta, turn); break;
-        default: map_branch(branch->size, branch->count, branch, x, v, theta, turn);
+        switch (branch->code) {
+        case LEAF_5: map_branch(5, LEAF_COORDINATES, branch, x, v, theta, turn); break;
+        case LEAF_5_BODY:
+        case LEAF_6: map_branch(6, LEAF_COORDINATES, branch, x, v, theta, turn); break;
+        case LEAF_6_BODY: map_branch(7, LEAF_COORDINATES, branch, x, v, theta, turn); break;
+        case ANY_BRANCH: map_branch(branch->size, branch->count, branch, x, v, theta, turn);
         }
     }
 }
@@ -81,10 +83,12 @@ SIZED void pull_branch(int size, int count, const Branch *branch, const double *
 static void pull_rows(const System *system, const Branch *branch, int r, const double *x,
                       double *out) {
     for (int row = 0; row < r; row++) {
-        switch (branch->leaf) {
-        case 5: pull_branch(5, LEAF_COORDINATES, branch, x, out); break;
-        case 6: pull_branch(6, LEAF_COORDINATES, branch, x, out); break;
-        default: pull_branch(branch->size, branch->count, branch, x, out);
+        switch (branch->code) {
+        case LEAF_5: pull_branch(5, LEAF_COORDINATES, branch, x, out); break;
+        case LEAF_5_BODY:
+        case LEAF_6: pull_branch(6, LEAF_COORDINATES, branch, x, out); break;
+        case LEAF_6_BODY: pull_branch(7, LEAF_COORDINATES, branch, x, out); break;
+        case ANY_BRANCH: pull_branch(branch->size, branch->count, branch, x, out);
         }
         x += system->wide;
         out += system->even;
@@ -101,7 +105,7 @@ PRBM void pull_directions(const System *system, int r, const double *x, double *
 
 /* Compute the masses M of the pairs of directions of a branch, in padded rows, and add the
  * quadratic velocity terms to the loads x.  shift: Im(w^2) of the arms, if they stretch. */
-SIZED void couple(int size, bool real, bool stretching, Parts H, Parts e,
+SIZED void couple(int size, int real, bool stretching, Parts H, Parts e,
                   const double *RESTRICT squares, const double *RESTRICT shift,
                   double *RESTRICT M, double *RESTRICT x) {
     const int even = even_length(size);
@@ -118,7 +122,7 @@ SIZED void couple(int size, bool real, bool stretching, Parts H, Parts e,
                 Lanes re = own_re * e_re + own_im * e_im, im = own_re * e_im - own_im * e_re;
                 Lanes h_re = aligned_lanes(H.re + i * even + j);
                 Lanes mass = h_re * re, turned = h_re * im;
-                if (!real) {
+                if (i >= real) {
                     Lanes h_im = aligned_lanes(H.im + i * even + j);
                     mass -= h_im * im;
                     turned += h_im * re;
@@ -166,7 +170,7 @@ static void add_pairs(const Branch *branch, const double *M, const double *own, 
 }
 
 /* Add the terms of the pairs of directions of a branch. */
-SIZED void own_terms(int size, int count, bool real, bool stretching, const Branch *branch,
+SIZED void own_terms(int size, int real, int count, bool stretching, const Branch *branch,
                      const double *own, Evaluation *result) {
     const Kinematics *at = &result->at;
     const int start = branch->start;
@@ -183,8 +187,8 @@ SIZED void own_terms(int size, int count, bool real, bool stretching, const Bran
     if (stretching) {
         pad(size, own + start, M + branch->pairs - even_length(size));
     }
-    const int pairs = IS_CONSTANT(size) ? (size - size % PAIR) * (size / PAIR + size % PAIR)
-                                        : branch->pairs;
+    const int half = size / PAIR; /* Rows of the lengths 2, 2, 4, 4, and so on. */
+    const int pairs = IS_CONSTANT(size) ? PAIR * half * (half + size % PAIR) : branch->pairs;
     pull_pairs(pairs, count, branch, M, result->mass);
 }
 
@@ -258,16 +262,14 @@ static void root_terms(const System *system, const Branch *branch, Evaluation *r
 /* Add the terms of the pairs of directions, by code for this branch if the compiler knows it. */
 static void add_own_terms(const System *system, const Branch *branch, const double *own,
                           Evaluation *result) {
-    const int size = branch->size, count = branch->count;
-    switch (branch->leaf) {
-    case 5: own_terms(5, LEAF_COORDINATES, true, false, branch, own, result); break;
-    case 6: own_terms(6, LEAF_COORDINATES, true, false, branch, own, result); break;
-    default:
-        if (branch->real && system->stretch_count == 0) {
-            own_terms(size, count, true, false, branch, own, result);
-        } else {
-            own_terms(size, count, false, system->stretch_count > 0, branch, own, result);
-        }
+    switch (branch->code) {
+    case LEAF_5: own_terms(5, 5, LEAF_COORDINATES, false, branch, own, result); break;
+    case LEAF_5_BODY: own_terms(6, 5, LEAF_COORDINATES, false, branch, own, result); break;
+    case LEAF_6: own_terms(6, 6, LEAF_COORDINATES, false, branch, own, result); break;
+    case LEAF_6_BODY: own_terms(7, 6, LEAF_COORDINATES, false, branch, own, result); break;
+    case ANY_BRANCH:
+        own_terms(branch->size, branch->real, branch->count, system->stretch_count > 0, branch, own,
+                  result);
     }
 }
 

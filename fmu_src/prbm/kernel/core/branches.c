@@ -1,4 +1,4 @@
-/* Branches: flexures and bodies, from the ground outwards. */
+/* Branches: what the steps of the assembly add, from the ground outwards. */
 #include <string.h>
 
 #include "core/branches.h"
@@ -40,20 +40,20 @@ static void add_sizes(BranchSizes *sizes, int directions, int coordinates, bool 
     sizes->products += products ? triangle(count) * pair_count(directions, true) : 0;
 }
 
+/* Return the end of the directions that a step adds. */
+static int end_of_step(const Mechanism *m, int step) {
+    bool last = step + 1 == m->flexure_count + m->joint_count;
+    return last ? m->direction_count : m->steps[step + 1].first_direction;
+}
+
 static BranchSizes branch_sizes(const Mechanism *m) {
     BranchSizes sizes = {0};
-    int steps = m->flexure_count + m->joint_count;
-    for (int i = 0; i < steps; i++) {
+    for (int i = 0; i < m->flexure_count + m->joint_count; i++) {
         const Step *step = &m->steps[i];
         const FlexureType *kind = step->flexure ? kind_of(m, step->flexure) : NULL;
-        int end = i + 1 < steps ? m->steps[i + 1].first_direction : m->direction_count;
-        if (kind && kind->order > 0) {
-            int stride = kind->axial ? 2 : 1, coordinates = kind->order + 2 + kind->axial;
-            add_sizes(&sizes, stride * node_count(kind), coordinates, true);
-        } else {
-            add_sizes(&sizes, end - step->first_direction, end - step->first_direction, false);
-        }
-        add_sizes(&sizes, 1, 1, false);
+        int size = end_of_step(m, i) - step->first_direction;
+        bool beam = kind && kind->order > 0;
+        add_sizes(&sizes, size, beam ? kind->order + 3 + kind->axial : size, beam);
     }
     return sizes;
 }
@@ -94,21 +94,38 @@ static void set_parts(const System *system, const Branch *branch, const Complex 
     }
 }
 
-PRBM int add_branch(System *system, int parent, int start, int end, const Place *root) {
-    if (!system->mapped || start == end) {
-        return parent;
-    }
+PRBM void clear_branches(System *system) {
+    system->branch_count = 0;
+    system->branch_memory.used = 0;
+    system->branch_of[GROUND] = FIXED;
+}
+
+PRBM void begin_branch(System *system, int step, Scratch *scratch) {
+    const Step *added = &system->mechanism->steps[step];
+    Span span = span_of(system, added);
+    const int start = added->first_direction, end = end_of_step(system->mechanism, step);
     Branch *branch = &system->branches[system->branch_count];
+    if (!system->mapped || start == end) {
+        return;
+    }
+    branch->step = step;
     branch->start = start;
     branch->size = end - start;
     branch->even = even_length(branch->size);
-    branch->parent = parent;
-    if (parent != FIXED) {
-        const Branch *carrier = &system->branches[parent];
+    branch->parent = system->branch_of[span.root];
+    if (branch->parent != FIXED) {
+        const Branch *carrier = &system->branches[branch->parent];
+        size_t mark = scratch->used;
+        Place root = new_place(system, scratch);
+        on_body(system, span.root, span.z_start, &root);
         branch->lever = place_parts(&system->branch_memory, (size_t)carrier->even);
-        set_parts(system, carrier, root->A, branch->lever);
+        set_parts(system, carrier, root.A, branch->lever);
+        scratch->used = mark;
     }
-    return system->branch_count++;
+    if (!added->closes) {
+        system->branch_of[span.far] = system->branch_count;
+    }
+    system->branch_count++;
 }
 
 /* Return the index of a number in a list, or count if it does not contain it. */
@@ -154,7 +171,7 @@ static void set_coupling(System *system, Branch *branch) {
     size_t size = (size_t)branch->size * (size_t)branch->even;
     branch->H.re = place(&system->branch_memory, size, sizeof(double));
     branch->H.im = place(&system->branch_memory, size, sizeof(double));
-    branch->real = true;
+    branch->real = branch->size;
     zeros((int)size, branch->H.re);
     zeros((int)size, branch->H.im);
     for (int i = 0; i < branch->size; i++) {
@@ -162,7 +179,7 @@ static void set_coupling(System *system, Branch *branch) {
             Complex h = system->H[(branch->start + i) * system->d + branch->start + j];
             branch->H.re[i * branch->even + j] = h.re;
             branch->H.im[i * branch->even + j] = h.im;
-            branch->real = branch->real && h.im == 0.0;
+            branch->real = h.im != 0.0 && i < branch->real ? i : branch->real;
         }
     }
 }
@@ -272,6 +289,22 @@ static void set_path(System *system, Branch *branch) {
     }
 }
 
+/* Return the code for a branch.  The row of H of a body may be real, too. */
+static BranchCode code_of(const System *system, const Branch *branch) {
+    const Step *step = &system->mechanism->steps[branch->step];
+    const int nodes = step->flexure ? node_count(kind_of(system->mechanism, step->flexure)) : 0;
+    const int bodies = !step->closes;
+    bool plain = system->stretch_count == 0 && branch->count == LEAF_COORDINATES;
+    if (!plain || branch->real < nodes || branch->size != nodes + bodies) {
+        return ANY_BRANCH;
+    }
+    switch (nodes) {
+    case 5: return bodies ? LEAF_5_BODY : LEAF_5;
+    case 6: return bodies ? LEAF_6_BODY : LEAF_6;
+    default: return ANY_BRANCH;
+    }
+}
+
 PRBM void set_branches(System *system, Scratch *scratch) {
     int roots = 0;
     zeros(system->mapped ? system->n * system->n : 0, system->constant_mass);
@@ -288,8 +321,7 @@ PRBM void set_branches(System *system, Scratch *scratch) {
         if (!branch->identity) {
             set_all_products(system, branch);
         }
-        bool plain = branch->real && system->stretch_count == 0;
-        branch->leaf = plain && branch->count == LEAF_COORDINATES ? branch->size : 0;
+        branch->code = code_of(system, branch);
         set_path(system, branch);
         branch->root = roots;
         roots += branch->reach + 1;

@@ -2,7 +2,6 @@
  * mechanics/collection.py. */
 #include <string.h>
 
-#include "core/branches.h"
 #include "core/collection.h"
 
 /* --- values, points and masses ---------------------------------------------------------------- */
@@ -108,12 +107,11 @@ PRBM void close_loop(System *system, const Place *spot, const Place *other) {
 }
 
 /* Set the origin of a body: a place, its drawn position and the direction of the body. */
-PRBM void reach(System *system, int body, int carrier, const Place *spot, Complex drawn, int j) {
+PRBM void reach(System *system, int body, const Place *spot, Complex drawn, int j) {
     Place *origin = &system->origins[body];
     copy_place(system->d, origin, spot);
     origin->drawn = drawn;
     origin->j = j;
-    system->branch_of[body] = add_branch(system, carrier, j, j + 1, spot);
 }
 
 PRBM Span span_of(const System *system, const Step *step) {

@@ -28,7 +28,7 @@ PRBM Place new_place(const System *system, Scratch *scratch);
 /* Add the loop constraint that two places coincide. */
 PRBM void close_loop(System *system, const Place *spot, const Place *other);
 /* Set the origin of a body: a place, its drawn position and the direction of the body. */
-PRBM void reach(System *system, int body, int carrier, const Place *spot, Complex drawn, int j);
+PRBM void reach(System *system, int body, const Place *spot, Complex drawn, int j);
 PRBM Span span_of(const System *system, const Step *step);
 
 #endif

@@ -3,7 +3,6 @@
 #include <string.h>
 
 #include "core/beam.h"
-#include "core/branches.h"
 #include "core/flexure.h"
 #include "core/flexures.h"
 #include "core/free_body.h"
@@ -97,7 +96,6 @@ static bool walk_links(System *system, const Step *step, Scratch *scratch, Probl
         next = lay_link(system, direction, pieces.lengths[i], pieces.axial[i - 1],
                         is_stretch(system, next + 1), next);
     }
-    int branch = add_branch(system, system->branch_of[span.root], step->first_direction, next, &spot);
     int last_one = owners[pieces.n + 1] = step->closes ? system->origins[span.far].j : next;
     for (int i = 0; i <= pieces.n; i++) {
         /* In the drawing the angle of a body is 0, that of a link its direction. */
@@ -118,7 +116,7 @@ static bool walk_links(System *system, const Step *step, Scratch *scratch, Probl
         close_loop(system, &spot, &spare);
         copy_place(system->d, &spot, &spare); /* The last stub is part of the far body. */
     } else {
-        reach(system, span.far, branch, &spot, minus(span.z_end, last), last_one);
+        reach(system, span.far, &spot, minus(span.z_end, last), last_one);
     }
     add_rod(system, pieces.rods[pieces.n + 1], &spot, last_one, last, &spare);
     extend(&spot, last_one, last);
@@ -222,8 +220,6 @@ static Complex place_beam(System *system, const Step *step, const Beam *beam,
         rank_points(free_body, system, i);
         add_corner(system, &spot);
     }
-    int end = step->first_direction + nodes * stride;
-    int branch = add_branch(system, system->branch_of[span.root], step->first_direction, end, &root);
     Complex *none = take_complex(scratch, nodes, 1);
     zeros(2 * nodes, (double *)none);
     beam_place(system, step, beam, stride, &root, direction,
@@ -232,7 +228,7 @@ static Complex place_beam(System *system, const Step *step, const Beam *beam,
         on_body(system, span.far, span.z_end, &root);
         close_loop(system, &spot, &root);
     } else {
-        reach(system, span.far, branch, &spot, span.z_end, end);
+        reach(system, span.far, &spot, span.z_end, step->first_direction + nodes * stride);
     }
     return direction;
 }

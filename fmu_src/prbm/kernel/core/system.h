@@ -56,17 +56,24 @@ typedef struct {
     int start, size;
 } Block;
 
-/* A flexure or a body: consecutive directions, behind a root on another branch or on the ground. */
+/* Branches with code of their own: beams with LEAF_COORDINATES, as clamped ones of the order 3, without
+ * stretch, with 5 or 6 nodes, alone or with the body that they reach. */
+typedef enum { ANY_BRANCH, LEAF_5, LEAF_5_BODY, LEAF_6, LEAF_6_BODY } BranchCode;
+enum { LEAF_COORDINATES = 4 };
+
+/* What a step of the assembly adds: the directions of a flexure and of the body that it reaches,
+ * behind a root on another branch or on the ground. */
 typedef struct {
+    int step;              /* of the assembly */
     int start, size, even; /* The directions: the first, their number, its padded length. */
     int count;             /* The number of coordinates that they depend on. */
     int *coordinate;       /* (count,) in ascending order */
     double *change;        /* (count, even) changes of the directions with these coordinates */
     Parts H;               /* (size, even) below the diagonal, and zero elsewhere */
     Parts S;               /* (even,) first moments of mass of what moves with the directions */
-    bool real, identity;   /* Whether H is real, and whether the directions are the coordinates. */
-    int leaf;              /* The number of nodes of a clamped beam of the order 3 without stretch, for
-                            * which code is compiled separately; 0: another branch. */
+    int real;              /* The number of rows of H, the first ones, that are real. */
+    bool identity;         /* Whether the directions are the coordinates. */
+    BranchCode code;       /* The code that is compiled for it. */
     int *own;              /* (count (count + 1) / 2,) indices of the masses of the coordinates */
     int pairs;             /* The padded number of pairs of directions. */
     double *products;      /* (masses, pairs) changes of each mass with that of each pair */
@@ -78,9 +85,6 @@ typedef struct {
     int *both;             /* (reach,) index of the same coordinate among those of the branch */
     int root;              /* Index of the motion of the root among those of all branches. */
 } Branch;
-
-/* Coordinates of a clamped beam of the order 3. */
-enum { LEAF_COORDINATES = 4 };
 
 /* The constant arrays of a mechanism, as in the twin.  There are n coordinates, d directions, r
  * loop rows, p mass points, s stops, f friction points and b bodies.  Columns of A and of the
