@@ -171,11 +171,23 @@ static int find_blocks(int size, const bool *linked, Block *blocks) {
     int count = 0;
     for (int start = 0; start < size;) {
         int end = end_of_block(size, linked, start);
-        Block block = {start, end - start};
+        Block block = {start, end - start, 0};
         blocks[count++] = block;
         start = end;
     }
     return count;
+}
+
+/* Return the row of the body of a guide on two beams with a certain number of coordinates; 0: it is
+ * another block. */
+static int guide_split(int size, const int *last) {
+    int split = size == GUIDE ? size / 2 : 0;
+    for (int i = 0; i < split; i++) {
+        if (last[i] > split) {
+            return 0;
+        }
+    }
+    return split;
 }
 
 /* Find the last column that is linked with each row, counted in the block of the row. */
@@ -189,6 +201,7 @@ static void find_last(const System *system, const bool *linked, int *last) {
                 last[i] = linked[i * n + j] || linked[j * n + i] ? j - start : last[i];
             }
         }
+        system->mass_blocks[k].split = guide_split(end - start, last + start);
     }
 }
 

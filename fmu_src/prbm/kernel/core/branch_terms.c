@@ -22,33 +22,37 @@
 
 /* --- directions and derivatives --------------------------------------------------------------- */
 
-/* Compute the directions theta of the coordinates x, and their rates from the rates v. */
-SIZED void map_branch(int size, int count, const Branch *branch, const double *x,
-                      const double *v, double *theta, double *turn) {
-    const int even = even_length(size);
-    UNROLLED
-    for (int i = 0; i < size; i += LANES) {
-        Lanes angle = NO_LANES, rate = NO_LANES;
-        const double *change = branch->change + i;
-        UNROLLED
-        for (int c = 0; c < count; c++) {
-            const int j = branch->coordinate[c];
-            Lanes each = aligned_lanes(change + c * even);
-            angle += x[j] * each;
-            rate += v[j] * each;
-        }
-        if (i + LANES <= size) {
-            set_lanes(theta + branch->start + i, angle);
-            set_lanes(turn + branch->start + i, rate);
-        } else {
-            theta[branch->start + i] = LANE(angle, 0);
-            turn[branch->start + i] = LANE(rate, 0);
-        }
+/* Store the pair i of the directions of a branch; a last one alone, because the next number belongs
+ * to the next branch. */
+SIZED void set_pair(int size, int i, Lanes pair, double *out) {
+    if (i + LANES <= size) {
+        set_lanes(out + i, pair);
+    } else {
+        out[i] = LANE(pair, 0);
     }
 }
 
-PRBM void map_motion(const System *system, const double *x, const double *v, double *theta,
-                     double *turn) {
+/* Compute the directions theta of the coordinates x, and their rates turn from the rates v. */
+SIZED void map_branch(int size, int count, const Branch *branch, const double *RESTRICT x,
+                      const double *RESTRICT v, double *RESTRICT theta, double *RESTRICT turn) {
+    const int even = even_length(size), *coordinate = branch->coordinate;
+    UNROLLED
+    for (int i = 0; i < size; i += LANES) {
+        Lanes angle = NO_LANES, rate = NO_LANES;
+        UNROLLED
+        for (int c = 0; c < count; c++) {
+            Lanes each = aligned_lanes(branch->change + c * even + i);
+            angle += x[coordinate[c]] * each;
+            rate += v[coordinate[c]] * each;
+        }
+        set_pair(size, i, angle, theta + branch->start);
+        set_pair(size, i, rate, turn + branch->start);
+    }
+}
+
+PRBM void map_motion(const System *system, Kinematics *at) {
+    const double *x = at->angle, *v = at->speed;
+    double *theta = at->theta, *turn = at->turn;
     for (int k = 0; k < system->branch_count; k++) {
         const Branch *branch = &system->branches[k];
         switch (branch->code) {
@@ -58,6 +62,12 @@ PRBM void map_motion(const System *system, const double *x, const double *v, dou
         case LEAF_6_BODY: map_branch(7, LEAF_COORDINATES, branch, x, v, theta, turn); break;
         case ANY_BRANCH: map_branch(branch->size, branch->count, branch, x, v, theta, turn);
         }
+    }
+}
+
+PRBM void map_directions(const System *system, const double *x, double *theta) {
+    for (int j = 0; j < system->d; j++) {
+        theta[j] = direction_of(system, x, j);
     }
 }
 

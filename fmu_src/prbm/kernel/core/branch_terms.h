@@ -4,9 +4,10 @@
 
 #include "core/evaluated.h"
 
-/* Compute the directions theta (d,) of coordinates x (n,), and their rates turn from the rates v. */
-PRBM void map_motion(const System *system, const double *x, const double *v, double *theta,
-                     double *turn);
+/* Compute the directions theta (d,) of the coordinates x (n,). */
+PRBM void map_directions(const System *system, const double *x, double *theta);
+/* Compute the directions and their rates from the coordinates and their rates. */
+PRBM void map_motion(const System *system, Kinematics *at);
 /* Add the derivatives by directions x (r, wide), pulled back to the coordinates, to out
  * (r, even). */
 PRBM void pull_directions(const System *system, int r, const double *x, double *out);

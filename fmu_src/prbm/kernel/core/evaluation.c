@@ -81,7 +81,7 @@ PRBM void evaluation_place(Evaluation *evaluation, const System *system, Memory 
 PRBM void set_reference(Reference *reference, const System *system, const double *angle) {
     int wide = system->wide;
     if (system->mapped) {
-        map_motion(system, angle, angle, reference->theta, reference->theta);
+        map_directions(system, angle, reference->theta);
     } else {
         copy(system->d, angle, reference->theta);
     }
@@ -122,7 +122,7 @@ SHARED void directions_of(int even, const System *system, const Reference *near,
 
 /* Compute the directions and the arms, if the coordinates are not the directions. */
 NOINLINE void mapped_directions(const System *system, const Reference *near, Kinematics *at) {
-    map_motion(system, at->angle, at->speed, at->theta, at->turn);
+    map_motion(system, at);
     directions_of(system->wide, system, near, at);
 }
 
@@ -364,6 +364,19 @@ SIZED bool small_block_motion(const Equations *eq, Evaluation *result, int size,
     return true;
 }
 
+/* As factor_block, for a guide on two beams. */
+NOINLINE bool factor_guide_block(const Equations *eq, Evaluation *result, int start,
+                                 const double *M, double *U) {
+    if (!factor_guide(M, U, result->factors.inverse + start)) {
+        return false;
+    }
+    solve_guide(U, result->a + start, FORWARD);
+    for (int k = 0; k < eq->r; k++) {
+        solve_guide(U, result->factors.Z + k * eq->system->even + start, FORWARD);
+    }
+    return true;
+}
+
 /* Factor the blocks of the mass matrix in result->mass. */
 NOINLINE bool mapped_blocks_motion(const Equations *eq, Evaluation *result) {
     bool regular = true;
@@ -376,7 +389,9 @@ NOINLINE bool mapped_blocks_motion(const Equations *eq, Evaluation *result) {
             damp_mass(size, eq->system->last + start, eq->mass_damping, M,
                       result->at.speed + start, result->a + start);
         }
-        regular = factor_block(eq, result, block, M, U) && regular;
+        regular = (block->split > 0 ? factor_guide_block(eq, result, start, M, U)
+                                    : factor_block(eq, result, block, M, U)) &&
+                  regular;
         M += size * size;
         U += size * size;
     }
@@ -442,7 +457,7 @@ NOINLINE void mapped_terms(const Equations *eq, const Reference *near, Evaluatio
     const System *system = eq->system;
     const int even = system->even, wide = system->wide;
     double *Z = result->factors.Z;
-    map_motion(system, result->at.angle, result->at.speed, result->at.theta, result->at.turn);
+    map_motion(system, &result->at);
     switch (wide) {
     case 12: direction_terms(12, eq, near, result); break;
     case 14: direction_terms(14, eq, near, result); break;

@@ -80,6 +80,62 @@ PRBM bool factor_any(int size, const int *last, const double *M, double *U, doub
     return regular;
 }
 
+/* Return the last column of a row of U of a guide that is not zero. */
+static inline int guide_column(int row) {
+    return row < GUIDE / 2 ? GUIDE / 2 : GUIDE - 1;
+}
+
+/* As factor_any, for a guide. */
+SHARED bool factor_guide(const double *RESTRICT M, double *RESTRICT U, double *RESTRICT inverse) {
+    UNROLLED
+    for (int i = GUIDE - 1; i >= 0; i--) {
+        const int end = guide_column(i);
+        double pivot = M[i * GUIDE + i];
+        UNROLLED
+        for (int j = GUIDE - 1; j > 0; j--) {
+            if (i < j && j <= end) {
+                double sum = M[i * GUIDE + j];
+                UNROLLED
+                for (int k = 0; k < GUIDE; k++) {
+                    const bool linked = j < k && k <= end && k <= guide_column(j);
+                    sum = linked ? sum - U[i * GUIDE + k] * U[j * GUIDE + k] : sum;
+                }
+                U[i * GUIDE + j] = sum; /* U_ij D_j */
+            }
+        }
+        UNROLLED
+        for (int j = 0; j < GUIDE; j++) {
+            if (i < j && j <= end) {
+                double share = U[i * GUIDE + j] * inverse[j];
+                pivot -= share * U[i * GUIDE + j];
+                U[i * GUIDE + j] = share;
+            }
+        }
+        if (!(pivot > SINGULAR_RTOL * M[i * GUIDE + i])) {
+            return false;
+        }
+        inverse[i] = 1.0 / pivot;
+    }
+    return true;
+}
+
+/* Replace b by U^-1 b or U^-T b, for a guide. */
+SHARED void solve_guide(const double *RESTRICT U, double *RESTRICT b, Substitution way) {
+    UNROLLED
+    for (int k = 0; k < GUIDE; k++) {
+        const int i = way == FORWARD ? GUIDE - 1 - k : k;
+        double sum = b[i];
+        UNROLLED
+        for (int j = 0; j < GUIDE; j++) {
+            const bool linked = way == FORWARD ? i < j && j <= guide_column(i)
+                                               : j < i && i <= guide_column(j);
+            const double *row = way == FORWARD ? U + i * GUIDE + j : U + j * GUIDE + i;
+            sum = linked ? sum - *row * b[j] : sum;
+        }
+        b[i] = sum;
+    }
+}
+
 NOINLINE bool factor(int size, const double *M, double *U, double *inverse) {
     return factor_any(size, NULL, M, U, inverse);
 }
@@ -234,7 +290,12 @@ SIZED void solve_blocks(const Factors *factors, double *x, Substitution way) {
         case 2: solve_small(2, start, U, x, way); break;
         case 3: solve_small(3, start, U, x, way); break;
         case 4: solve_small(4, start, U, x, way); break;
-        default: solve_any(size, factors->last + start, U, x + start, way);
+        default:
+            if (factors->blocks[k].split > 0) {
+                solve_guide(U, x + start, way);
+            } else {
+                solve_any(size, factors->last + start, U, x + start, way);
+            }
         }
         U += size * size;
     }

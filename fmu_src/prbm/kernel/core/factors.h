@@ -29,6 +29,8 @@ PRBM bool factor_schur(Factors *factors);
 PRBM void solve_again(const Factors *factors, double *x, double *lam);
 /* Functions that are compiled for each small size of a block or of the system. */
 PRBM bool factor_any(int size, const int *last, const double *M, double *U, double *inverse);
+SHARED bool factor_guide(const double *RESTRICT M, double *RESTRICT U, double *RESTRICT inverse);
+SHARED void solve_guide(const double *RESTRICT U, double *RESTRICT b, Substitution way);
 SHARED bool small_factor(int size, const double *RESTRICT M, double *RESTRICT U,
                          double *RESTRICT inverse);
 SHARED void put_block(int size, int start, const double *from, double *to);

@@ -51,9 +51,10 @@ typedef struct {
 } FreeBody;
 
 /* A block on the diagonal of the mass matrix, for example that of the links of a flexure that
- * closes a loop. */
+ * closes a loop.  For a guide on two beams, split is the row of the body: the rows before it are zero
+ * in the columns behind it.  Otherwise it is 0. */
 typedef struct {
-    int start, size;
+    int start, size, split;
 } Block;
 
 /* Branches with code of their own: beams with LEAF_COORDINATES, as clamped ones of the order 3, without
