@@ -485,9 +485,8 @@ PRBM double kinetic_energy_of(const Evaluation *evaluation) {
         int start = factors->blocks[k].start, size = factors->blocks[k].size;
         for (int i = 0; i < size; i++) {
             rates[start + i] += v[start + i];
-            for (int j = i + 1; j <= factors->last[start + i]; j++) {
-                rates[start + j] += U[i * size + j] * v[start + i];
-            }
+            const int behind = factors->last[start + i] - i;
+            add_scaled(behind, v[start + i], U + i * size + i + 1, rates + start + i + 1);
             sum += rates[start + i] * rates[start + i] / factors->inverse[start + i];
         }
         U += size * size;

@@ -251,15 +251,31 @@ SHARED void solve_small(int size, int start, const double *RESTRICT U, double *R
     put_block(size, start, b, x);
 }
 
-/* Replace count vectors b, stride apart, by U^-1 b, within a block of any size. */
+/* Return the last element of count vectors b, stride apart, that is not zero in all of them. */
+static int last_element(int size, int count, int stride, const double *b) {
+    for (int i = size - 1; i > 0; i--) {
+        for (int k = 0; k < count; k++) {
+            if (b[k * stride + i] != 0.0) {
+                return i;
+            }
+        }
+    }
+    return 0;
+}
+
+/* Replace count vectors b, stride apart, by U^-1 b, within a block of any size.  The rows of a loop,
+ * which come in pairs, are zero in the coordinates of other loops. */
 PRBM void forward_block(int size, const int *last, const double *U, int count, int stride,
                         double *b) {
-    int k = 0;
-    for (; k + SMALL <= count; k += SMALL) {
-        forward_together(SMALL, stride, size - 2, 0, size - 1, size, last, U, b + k * stride);
-    }
-    for (; k < count; k++) {
-        forward_together(1, stride, size - 2, 0, size - 1, size, last, U, b + k * stride);
+    for (int k = 0; k < count; k += PAIR) {
+        const bool pair = k + 1 < count;
+        const int end = last_element(size, pair ? PAIR : 1, stride, b);
+        if (pair) {
+            forward_together(PAIR, stride, end - 1, 0, end, size, last, U, b);
+        } else {
+            forward_together(1, stride, end - 1, 0, end, size, last, U, b);
+        }
+        b += PAIR * stride;
     }
 }
 
@@ -267,9 +283,7 @@ PRBM void forward_block(int size, const int *last, const double *U, int count, i
 NOINLINE void backward_block(int size, const int *last, const double *U, double *b) {
     for (int i = 0; i < size - 1; i++) {
         const int end = last_column(size, last, i);
-        for (int j = i + 1; j <= end; j++) {
-            b[j] -= U[i * size + j] * b[i];
-        }
+        add_scaled(end - i, -b[i], U + i * size + i + 1, b + i + 1);
     }
 }
 
