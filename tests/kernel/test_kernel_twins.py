@@ -716,7 +716,9 @@ def factors_of(M, rows, columns, sizes, split=0):
         Z_columns = Z  # The kernel compares the pointers.
     starts = np.cumsum([0, *sizes])
     parts = np.concatenate([U[a:b, a:b].ravel() for a, b in itertools.pairwise(starts)])
-    blocks = np.array([starts[:-1], sizes, [split if sizes == (7,) else 0] * len(sizes)], np.int32).T.copy()
+    blocks = np.array(
+        [starts[:-1], sizes, [split if sizes == (7,) else 0] * len(sizes)], np.int32
+    ).T.copy()
     S, pivots = np.full(r * (2 * r + 1), np.nan), np.zeros(r, np.int32)
     last = np.repeat(np.array(sizes, np.int32) - 1, sizes)
     last[:split] = split
