@@ -42,7 +42,7 @@ static bool walk_all(System *system, Scratch *scratch, Problem *problem) {
     for (int i = 0; ok && i < m->flexure_count + m->joint_count; i++) {
         size_t mark = scratch->used;
         const Step *step = &m->steps[i];
-        begin_branch(system, i, scratch);
+        begin_branch(system, i);
         ok = step->flexure ? walk_flexure(system, step, scratch, problem)
                            : walk_joint(system, step, scratch, problem);
         scratch->used = mark;

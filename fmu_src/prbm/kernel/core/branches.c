@@ -100,7 +100,7 @@ PRBM void clear_branches(System *system) {
     system->branch_of[GROUND] = FIXED;
 }
 
-PRBM void begin_branch(System *system, int step, Scratch *scratch) {
+PRBM void begin_branch(System *system, int step) {
     const Step *added = &system->mechanism->steps[step];
     Span span = span_of(system, added);
     const int start = added->first_direction, end = end_of_step(system->mechanism, step);
@@ -113,15 +113,6 @@ PRBM void begin_branch(System *system, int step, Scratch *scratch) {
     branch->size = end - start;
     branch->even = even_length(branch->size);
     branch->parent = system->branch_of[span.root];
-    if (branch->parent != FIXED) {
-        const Branch *carrier = &system->branches[branch->parent];
-        size_t mark = scratch->used;
-        Place root = new_place(system, scratch);
-        on_body(system, span.root, span.z_start, &root);
-        branch->lever = place_parts(&system->branch_memory, (size_t)carrier->even);
-        set_parts(system, carrier, root.A, branch->lever);
-        scratch->used = mark;
-    }
     if (!added->closes) {
         system->branch_of[span.far] = system->branch_count;
     }
@@ -255,6 +246,32 @@ static bool is_identity(const Branch *branch) {
     return same;
 }
 
+/* Return the first mass point that moves with a branch; FIXED: there is none. */
+static int first_moved(const System *system, const Branch *branch) {
+    for (int k = 0; k < system->p; k++) {
+        for (int j = branch->start; j < branch->start + branch->size; j++) {
+            Complex A = system->A[k * system->d + j];
+            if (A.re != 0.0 || A.im != 0.0) {
+                return k;
+            }
+        }
+    }
+    return FIXED;
+}
+
+/* Set the displacement of the root of a branch with the directions of its parent: all mass points
+ * that move with the branch have the same. */
+static void set_lever(System *system, Branch *branch) {
+    const Branch *carrier = &system->branches[branch->parent];
+    const int point = first_moved(system, branch);
+    branch->lever = place_parts(&system->branch_memory, (size_t)carrier->even);
+    zeros(carrier->even, branch->lever.re);
+    zeros(carrier->even, branch->lever.im);
+    if (point != FIXED) {
+        set_parts(system, carrier, system->A + point * system->d, branch->lever);
+    }
+}
+
 /* Set the coordinates that move the root of a branch, and the masses that they share with those of
  * its directions. */
 static void set_path(System *system, Branch *branch) {
@@ -323,6 +340,9 @@ PRBM void set_branches(System *system, Scratch *scratch) {
         }
         branch->code = code_of(system, branch);
         set_path(system, branch);
+        if (branch->parent != FIXED) {
+            set_lever(system, branch);
+        }
         branch->root = roots;
         roots += branch->reach + 1;
     }

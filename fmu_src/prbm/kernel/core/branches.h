@@ -11,7 +11,7 @@ PRBM size_t root_count(const System *system);
 PRBM void clear_branches(System *system);
 /* Begin the branch of a step of the assembly, unless it adds no directions.  Systems without a map
  * have no branches. */
-PRBM void begin_branch(System *system, int step, Scratch *scratch);
+PRBM void begin_branch(System *system, int step);
 /* Set the constants of all branches from the factors and masses of the system. */
 PRBM void set_branches(System *system, Scratch *scratch);
 
