@@ -21,6 +21,7 @@ BASES = {
     "study": "PRBDM --vary 'stop.position=0:1 mm:2' --stop-time 1ms --workers 1",
     "sweep": "PRBDM.fmu free.csv",
 }
+QUICK = ("fit", "modes")
 DIGITS = "9" * 5000  # More than Python converts to an integer.
 TEXTS = (
     "1\n2", f"4 Hz +- 1 mode {DIGITS}", DIGITS, "4 Hz +- 1 mode ²", "x=0:1:²", "\udcff", "a\0b",
@@ -41,7 +42,14 @@ def leaves(parser: argparse.ArgumentParser, words: str) -> Iterator[tuple[list[s
 COMMANDS = {words: options for options, words in leaves(cli.parser(), "")}
 
 
-@pytest.mark.parametrize("command", [c for c in COMMANDS if c.partition(" ")[0] in BASES])
+@pytest.mark.parametrize(
+    "command",
+    [
+        pytest.param(words, marks=[] if words in QUICK else pytest.mark.slow)
+        for words in COMMANDS
+        if words.partition(" ")[0] in BASES
+    ],
+)
 def test_options_reject_texts_that_they_do_not_expect(command, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("free.csv").write_text("t [s],x [m]\n0,0\n1,1\n2,0\n3,1\n", encoding="utf-8")

@@ -1,6 +1,7 @@
 """SSP packages and containers: valid by the standard's schemas, equal results in all masters."""
 
 import hashlib
+import os
 import zipfile
 from pathlib import Path
 
@@ -85,6 +86,19 @@ def test_a_package_may_contain_a_single_fmu(tmp_path):
     found = ssp.simulate(path, 0.01, 1e-3)
     assert len(found) == 11
     assert "guide.shuttle.x" in found.dtype.names
+
+
+def test_a_package_that_cannot_be_written_leaves_the_old_file(tmp_path, monkeypatch):
+    def fails(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    path = tmp_path / "one.ssp"
+    path.write_bytes(b"old")
+    monkeypatch.setattr(os, "fsync", fails)
+    with pytest.raises(OSError, match="No space"):
+        ssp.package(path, {"guide": guide(2)}, {})
+    assert path.read_bytes() == b"old"
+    assert [*tmp_path.iterdir()] == [path]
 
 
 def test_package_contains_the_unchanged_fmus(package):

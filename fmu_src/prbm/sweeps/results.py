@@ -8,6 +8,7 @@ A part has the runs of one batch.  It is written under another name and then ren
 complete whenever it exists.  pandas, pyarrow and Dask read the folder as one table.
 """
 
+import io
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -26,6 +27,7 @@ from .outputs import GOOD, Outcome
 
 SETTINGS, LOCK = "_sweep.json", "_sweep.lock"
 DRAFTS = f".{SETTINGS}.*"  # Names of drafts of the settings, which a killed process leaves.
+PART_DRAFTS = ".part-*"  # Those of drafts of parts.
 ROW, STATUS, MESSAGE, SECONDS = "row", "status", "message", "seconds"
 OWN = (ROW, STATUS, MESSAGE, SECONDS)
 """Columns of every sweep; no parameter or output may have these names."""
@@ -102,7 +104,7 @@ class Results:
         """
         file = self.folder / SETTINGS
         try:
-            for pattern in ("_*.draft", DRAFTS):
+            for pattern in (PART_DRAFTS, DRAFTS):
                 for draft in self.folder.glob(pattern):
                     draft.unlink()
             if file.exists() and overwrite:
@@ -214,16 +216,10 @@ class Results:
         self.count += 1
 
     def _write(self, table: Any, part: Path) -> None:
-        """Write a draft and rename it to the part; a killed process leaves only the draft."""
-        draft = part.with_name(f"_{part.name}.draft")
-        try:
-            with draft.open("wb") as file:
-                pq.write_table(table, file)
-                file.flush()
-                os.fsync(file.fileno())
-            draft.replace(part)
-        finally:
-            draft.unlink(missing_ok=True)
+        """Write a part; a killed process leaves only a draft."""
+        content = io.BytesIO()
+        pq.write_table(table, content)
+        write(part, content.getvalue())
 
 
 def _short(value: object) -> str:

@@ -13,6 +13,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+from ..base.atomic import write
 from ..base.errors import PrbmError
 from ..base.progress import Progress
 from ..plots.figures import save
@@ -140,15 +141,14 @@ def reproduce(
     results = [one for one in _computed(wanted, progress or (lambda _: None))]
     path = Path(folder) / PAGE
     try:
-        (path.parent / FIGURES).mkdir(parents=True, exist_ok=True)
         known = path.read_text(encoding="utf-8") if only and path.exists() else ""
         for result in results:
             for drawing in result.drawings:
                 save(drawing.figure, path.parent / FIGURES / file_name(drawing))
         keys = [one.key for one in chosen()]
-        path.write_text(page(results, known, keys), encoding="utf-8")
+        write(path, page(results, known, keys).encode())
     except OSError as error:
-        raise ValidationError(f"{path}: cannot be written ({error.strerror})") from None
+        raise ValidationError(f"{path}: cannot be written ({error.strerror or error})") from None
     return results
 
 
