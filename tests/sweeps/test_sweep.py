@@ -584,7 +584,7 @@ def test_an_unreadable_fmu_is_reported(native, tmp_path, capsys):
     GRID.to_csv("t.csv", index=False)
     Path("text.fmu").write_text("no archive", encoding="utf-8")
     for name, sentence in (
-        ("none.fmu", "none.fmu cannot be read (No such file or directory); give an FMU"),
+        ("none.fmu", "none.fmu: cannot be read (No such file or directory)"),
         ("text.fmu", "text.fmu is not a readable FMU"),
     ):
         assert main(["sweep", name, "t.csv"]) == 2

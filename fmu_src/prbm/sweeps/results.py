@@ -20,6 +20,7 @@ import pandas as pd
 import pyarrow as pa  # type: ignore[import-untyped]
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
 
+from ..base import reading
 from ..base.atomic import write
 from ..base.errors import ParameterError
 from ..base.lock import LockedError, locked
@@ -27,6 +28,7 @@ from .outputs import GOOD, Outcome
 
 SETTINGS, LOCK = "_sweep.json", "_sweep.lock"
 DRAFTS = f".{SETTINGS}.*"  # Names of drafts of the settings, which a killed process leaves.
+SETTINGS_SIZE_MAX = 1 << 24  # bytes; the names of 100,000 outputs have some MB.
 PART_DRAFTS = ".part-*"  # Those of drafts of parts.
 ROW, STATUS, MESSAGE, SECONDS = "row", "status", "message", "seconds"
 OWN = (ROW, STATUS, MESSAGE, SECONDS)
@@ -110,7 +112,7 @@ class Results:
             if file.exists() and overwrite:
                 self._clear()
             if file.exists():
-                before = json.loads(file.read_bytes())
+                before = json.loads(reading.content(file, SETTINGS_SIZE_MAX, ParameterError))
                 if not isinstance(before, dict):
                     raise ValueError
                 self._compare(before)
@@ -162,6 +164,8 @@ class Results:
     def _tables(self) -> Iterator[tuple[Path, Any]]:
         for part in self._parts():
             try:
+                if not part.is_file():
+                    raise ValueError("not a file")
                 table = pq.read_table(part, schema=self.schema)
                 if any(row is None or row < 0 for row in table[ROW].to_pylist()):
                     raise ValueError("a row has no number, or a negative one")

@@ -13,6 +13,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+from ..base import reading
 from ..base.atomic import write
 from ..base.errors import PrbmError
 from ..base.progress import Progress
@@ -21,6 +22,7 @@ from .reproduced import RESULTS
 from .side_by_side import FIGURES, Reproduction, Result, file_name
 
 PAGE = "validation.md"
+PAGE_SIZE_MAX = 1 << 24  # bytes
 
 
 class ValidationError(PrbmError, ValueError):
@@ -141,7 +143,9 @@ def reproduce(
     results = [one for one in _computed(wanted, progress or (lambda _: None))]
     path = Path(folder) / PAGE
     try:
-        known = path.read_text(encoding="utf-8") if only and path.exists() else ""
+        known = ""
+        if only and path.exists():
+            known = reading.text(path, PAGE_SIZE_MAX, ValidationError).read()
         for result in results:
             for drawing in result.drawings:
                 save(drawing.figure, path.parent / FIGURES / file_name(drawing))
