@@ -27,11 +27,13 @@ PARTS = {
     "draws": (2_000, 20),
     "texts": (5_000, 300),
     "faults": (20, 3),
+    "hostile": (4, 2),
     "threads": (8, 4),
     "versions": (3, 1),
 }
 """Calls in total, damaged states in total, draws of each mechanism, texts of each kind, points of
-failure of each command, threads, and environments with versions of dependencies."""
+failure of each command, kinds of links and devices, threads, and environments with versions of
+dependencies."""
 
 
 def main() -> int:

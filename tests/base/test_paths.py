@@ -10,10 +10,12 @@ import prbm
 from prbm.base import atomic
 from prbm.base.errors import PrbmError
 from prbm.data.records import read_record
+from prbm.fmu import parameter_sets
 from prbm.fmu.parameter_sets import read_parameter_set
 from prbm.runs import inputs, result
 from prbm.runs.inputs import read_signal
 from prbm.runs.result import read_csv
+from prbm.sweeps import results, sweep, table
 from prbm.sweeps.sweep import read_fmu
 from prbm.systems.components import described
 
@@ -49,6 +51,9 @@ READERS = {
 }
 
 
+BOUNDED = READERS | {"table": table.read_table}
+
+
 @pytest.mark.parametrize("kind", READERS)
 def test_a_name_that_the_encoding_lacks_cannot_be_read(tmp_path, kind):
     with pytest.raises(PrbmError, match=r"half.*read.*codec can't encode"):
@@ -73,11 +78,37 @@ def test_a_pipe_is_not_replaced_by_a_file(tmp_path, write, linked):
     assert link.is_symlink()
 
 
-@pytest.mark.parametrize(("kind", "module"), [("signal", inputs), ("result", result)])
-def test_no_more_of_an_endless_file_is_read_than_the_limit(monkeypatch, kind, module):
-    monkeypatch.setattr(module, "FILE_SIZE_MAX", 1000, raising=False)
+@pytest.mark.parametrize(
+    ("kind", "module", "limit"),
+    [
+        ("signal", inputs, "FILE_SIZE_MAX"),
+        ("result", result, "FILE_SIZE_MAX"),
+        ("parameter set", parameter_sets, "FILE_SIZE_MAX"),
+        ("table", table, "FILE_SIZE_MAX"),
+        ("FMU of a sweep", sweep, "UNPACKED_SIZE_MAX"),
+    ],
+)
+def test_no_more_of_an_endless_file_is_read_than_the_limit(monkeypatch, kind, module, limit):
+    monkeypatch.setattr(module, limit, 1000)
     with pytest.raises(PrbmError, match="larger than 1000 bytes, the limit"):
-        READERS[kind](Path("/dev/zero"))
+        BOUNDED[kind](Path("/dev/zero"))
+
+
+def test_no_device_or_pipe_replaces_a_file_of_a_sweep(tmp_path, monkeypatch):
+    monkeypatch.setattr(results, "SETTINGS_SIZE_MAX", 1000)
+    stored = results.Results(tmp_path, {}, (), ())
+    (tmp_path / results.SETTINGS).symlink_to("/dev/zero")
+    with pytest.raises(PrbmError, match="larger than 1000 bytes, the limit"):
+        stored.begin()
+    os.mkfifo(tmp_path / "part-000000-1f3a.parquet")
+    with pytest.raises(PrbmError, match="not a file"):
+        stored.read()
+
+
+def test_a_table_in_parquet_is_no_pipe(tmp_path):
+    os.mkfifo(tmp_path / "table.parquet")
+    with pytest.raises(PrbmError, match="a pipe or a device"):
+        table.read_table(tmp_path / "table.parquet")
 
 
 def test_files_have_the_permissions_of_the_umask(tmp_path):

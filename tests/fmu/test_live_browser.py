@@ -1,8 +1,10 @@
 """Pages that simulate their mechanism, in Chromium from a file."""
 
 import json
+import threading
 import zipfile
 from dataclasses import replace
+from http.server import BaseHTTPRequestHandler, HTTPServer
 from io import BytesIO
 from pathlib import Path
 
@@ -12,8 +14,10 @@ from fmpy import simulate_fmu
 
 from browser import NARROW, WIDE, chromium
 from prbm.files.mechanism_file import load, shipped
+from prbm.fmu import native_fmu, python_fmu
 from prbm.fmu.explorer import explorer
 from prbm.fmu.native_fmu import build
+from prbm.kernel.compiler import NoCompilerError
 from prbm.kernel.simulation import KernelSimulation
 from prbm.mechanics.stress import with_stress
 from prbm.runs.experiment import experiment
@@ -67,6 +71,66 @@ def test_the_page_of_an_fmu_gives_the_impacts_of_the_fmu_to_the_bit(browser, mod
     assert int(data["impacts"]) == sum(result[f"{stop}.impact_count"][-1] for stop in stops)
     assert json.loads(data["last"]) == {s: result[f"{s}.impact_time"][-1] for s in stops}
     assert {*browser.requests()} == {page.as_uri()}
+    assert browser.errors() == []
+
+
+def test_the_policy_of_a_page_forbids_all_that_is_added_to_it(browser, guide, tmp_path):
+    """A script, a handler, a style, an image, a frame and a form do nothing and request nothing."""
+    asked: list[str] = []
+
+    class Server(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            asked.append(self.path)
+            self.send_error(404)
+
+    with HTTPServer(("127.0.0.1", 0), Server) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        try:
+            _try_additions(browser, guide, tmp_path, f"http://127.0.0.1:{server.server_port}")
+        finally:
+            server.shutdown()
+    assert asked == []
+
+
+def _try_additions(browser, guide, tmp_path, site) -> None:
+    added = (
+        "<script>document.title = 'taken'</script>"
+        f"<img src='{site}/x.png' onerror=\"document.title = 'taken'\">"
+        f"<script src='{site}/x.js'></script><iframe src='{site}/'></iframe>"
+        "<style>body { display: none }</style><p id='shown' style='display: none'>text</p>"
+        f"<form id='form' action='{site}/'></form>"
+    )
+    page = tmp_path / "page.html"
+    text = guide.read_text(encoding="utf-8").replace("</body>", f"{added}</body>")
+    page.write_text(text, encoding="utf-8")
+    data = browser.open(page)
+    assert data["state"] == "done"
+    assert browser.run("return document.title") == "PRBDM"
+    assert browser.run("return document.getElementById('shown').offsetHeight") > 0
+    browser.run("document.getElementById('form').submit()")
+    assert browser.run("return location.protocol") == "file:"
+    assert sum("Content Security Policy" in message for message in browser.errors()) >= 6
+
+
+def test_a_download_is_possible_under_the_policy(browser, guide):
+    browser.open(guide)
+    browser.find("#download").click()
+    assert browser.errors() == []
+
+
+@pytest.mark.parametrize("flavour", ["python", "without a module"])
+def test_a_static_page_keeps_its_style_and_has_no_script(browser, flavour, tmp_path, monkeypatch):
+    def missing(*_: object) -> bytes:
+        raise NoCompilerError("no ziglang")
+
+    monkeypatch.setattr(native_fmu, "browser_module", missing)
+    chosen = mechanism("PRBDM")
+    content = python_fmu.build(chosen) if flavour == "python" else build(chosen)
+    with zipfile.ZipFile(BytesIO(content)) as archive:
+        archive.extract("documentation/index.html", tmp_path)
+    browser.view(tmp_path / "documentation" / "index.html")
+    assert "script-src" not in (tmp_path / "documentation/index.html").read_text("utf-8")
+    assert browser.run("return getComputedStyle(document.body).maxWidth") != "none"
     assert browser.errors() == []
 
 

@@ -13,10 +13,11 @@ from kernel_simulation import KernelMistake, KernelSimulation
 from native_host import DISCARD, ERROR, INTERFACES, OK, Instance
 from prbm.base import tolerances
 from prbm.base.errors import EquilibriumError, SimulationError
+from prbm.files.mechanism_file import load
 from prbm.hybrid import events, guards
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics import complementarity, constraints, contact, statics
-from support import built, mechanism
+from support import CASES, built, mechanism
 
 
 def vice():
@@ -125,6 +126,23 @@ SIDEWAYS_IMPULSE = {"force.impulse.y": 0.01}
 JAM_MESSAGE = (
     r"no forces satisfy the laws of contact and friction at t = 0 s \(stop\): friction jams"
 )
+
+
+@pytest.mark.parametrize("engine", [Simulation, KernelSimulation])
+def test_a_compliant_stop_that_changes_its_phase_without_end_is_named(engine):
+    """It is pressed at the start; without the preload the motion goes on."""
+    given = load(CASES / "chatter1016.toml")
+    sim = engine(given)
+    depth = -sim.outputs()["s1.gap"]
+    assert depth > 0.0
+    with pytest.raises((SimulationError, KernelMistake), match=r"chatters; s1 .*preload") as error:
+        sim.advance(1e-3)
+    named = re.search(r"s1 is indented by (\S+) m: ", str(error.value))
+    assert named is not None
+    assert float(named[1]) == pytest.approx(depth, rel=0.02)  # It moves for 4 us.
+    sim = engine(given, {"s1.position": given.stops[1].position + 1.5 * depth})
+    sim.advance(1e-3)
+    assert sim.outputs()["s1.gap"] > -depth
 
 
 @pytest.mark.parametrize("engine", [Simulation, KernelSimulation])

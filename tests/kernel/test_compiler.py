@@ -282,6 +282,23 @@ def test_a_cache_folder_that_others_could_write_is_made_private(cache, monkeypat
     assert len(entries(cache)) == 1
 
 
+@pytest.mark.parametrize("depth", [0, 1])
+@pytest.mark.parametrize(("mode", "kept"), [(0o777, 0), (0o1777, 1), (0o755, 1)])
+@pytest.mark.parametrize("linked", [False, True])
+def test_a_folder_that_others_could_exchange_is_not_used(
+    cache, tmp_path, monkeypatch, depth, mode, kept, linked
+):
+    """Others can rename it if they may write to a folder above, unless this is sticky."""
+    inside = tmp_path / "above" / "shared"
+    inside.mkdir(parents=True)
+    if linked:
+        (tmp_path / "link").symlink_to(inside)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "link" if linked else inside))
+    (inside, inside.parent)[depth].chmod(mode)
+    assert only(libraries([HOST]))
+    assert len(entries(inside / "prbm-impact")) == kept
+
+
 @pytest.mark.parametrize("damage", [b"", b"garbage", "truncated", "flipped"])
 def test_a_damaged_entry_of_the_cache_is_compiled_again(cache, monkeypatch, damage):
     made = libraries([HOST])

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from c_importer import ANVIL, needs
-from reliability import calls, draws, faults, states, texts, threads, versions
+from reliability import calls, draws, faults, hostile, states, texts, threads, versions
 from reliability.driver import drive
 from reliability.report import Part
 
@@ -64,11 +64,25 @@ def test_changed_packages_are_read_or_rejected():
 
 @pytest.mark.slow
 @pytest.mark.skipif(not faults.available(), reason="faults are injected on Linux only")
-@pytest.mark.parametrize("name", ["build", "simulate", "compile"])
+@pytest.mark.parametrize("name", ["build", "simulate", "study", "compile"])
 def test_files_are_old_or_new_after_a_fault_at_a_write(name):
     found = faults.searched(name, 3)
     assert found["failures"] == []
     assert found["faults"] >= 6
+
+
+@pytest.mark.skipif(not faults.available(), reason="links, pipes and devices of Linux")
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[] if name == "modes" else pytest.mark.slow)
+        for name in hostile.COMMANDS
+    ],
+)
+def test_links_pipes_and_devices_lose_nothing(name):
+    runs, wrong = hostile.attacked(name)
+    assert wrong == []
+    assert runs >= len(hostile.PLACED)
 
 
 @pytest.mark.slow

@@ -312,6 +312,11 @@ CHANGES = {
         'name = "class"',
         "mechanism name 'class'",
     ),
+    "mechanism named as a device": (
+        'name = "Striker"',
+        'name = "Nul"',
+        "mechanism name 'Nul': Windows has a device of this name",
+    ),
     "mechanism named by a path": (
         '"Striker"',
         '"../../etc/x"',

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+import zipfile
 from collections import Counter
 from pathlib import Path
 
@@ -338,7 +339,7 @@ def test_a_second_sweep_into_the_same_folder_is_rejected(mishap, log):
     """The second sweep repeats no run, keeps drafts of the first, and names the first's process."""
     LONG.to_csv("table.csv", index=False)
     process = started(mishap, 3)
-    draft = Path("results.parquet/_part.draft")
+    draft = Path("results.parquet/.part-000000-1f3a.parquet.0a1b2c3d")
     draft.write_bytes(b"")
     with pytest.raises(ParameterError, match=rf"in use by another sweep \(process {process.pid} "):
         sweep(mishap, "table.csv", step=0.5, workers=1)
@@ -584,7 +585,7 @@ def test_an_unreadable_fmu_is_reported(native, tmp_path, capsys):
     GRID.to_csv("t.csv", index=False)
     Path("text.fmu").write_text("no archive", encoding="utf-8")
     for name, sentence in (
-        ("none.fmu", "none.fmu cannot be read (No such file or directory); give an FMU"),
+        ("none.fmu", "none.fmu: cannot be read (No such file or directory)"),
         ("text.fmu", "text.fmu is not a readable FMU"),
     ):
         assert main(["sweep", name, "t.csv"]) == 2
@@ -598,6 +599,17 @@ def test_an_fmu_without_a_library_for_this_platform_ends_the_sweep(native, tmp_p
     fmu = shutil.make_archive("bare", "zip", folder)
     with pytest.raises(SweepError, match="PRBDM: the FMU cannot be loaded: Cannot find shared"):
         sweep(fmu, GRID, workers=1)
+
+
+def test_an_fmu_that_a_worker_cannot_unpack_is_reported(mishap):
+    """The description can be read, but another file has a wrong checksum."""
+    content = bytearray(mishap.read_bytes())
+    with zipfile.ZipFile(mishap) as archive:
+        entry = archive.getinfo("resources/mishap.py")
+    content[entry.header_offset + 30 + len(entry.filename) + entry.compress_size // 2] ^= 0xFF
+    Path("damaged.fmu").write_bytes(content)
+    with pytest.raises(SweepError, match=r"a worker cannot unpack the FMU \(.*mishap\.py"):
+        sweep("damaged.fmu", pd.DataFrame({"trouble": [0.0]}))
 
 
 def test_a_missing_package_is_reported(mishap, monkeypatch):

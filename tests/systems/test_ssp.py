@@ -1,6 +1,8 @@
 """SSP packages and containers: valid by the standard's schemas, equal results in all masters."""
 
 import hashlib
+import os
+import tempfile
 import zipfile
 from pathlib import Path
 
@@ -85,6 +87,50 @@ def test_a_package_may_contain_a_single_fmu(tmp_path):
     found = ssp.simulate(path, 0.01, 1e-3)
     assert len(found) == 11
     assert "guide.shuttle.x" in found.dtype.names
+
+
+def test_a_package_that_cannot_be_written_leaves_the_old_file(tmp_path, monkeypatch):
+    def fails(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    path = tmp_path / "one.ssp"
+    path.write_bytes(b"old")
+    monkeypatch.setattr(os, "fsync", fails)
+    with pytest.raises(OSError, match="No space"):
+        ssp.package(path, {"guide": guide(2)}, {})
+    assert path.read_bytes() == b"old"
+    assert [*tmp_path.iterdir()] == [path]
+
+
+def damaged(path: Path) -> Path:
+    """Return an FMU with a description that can be read, and a file with a wrong checksum."""
+    content = bytearray(guide(2).read_bytes())
+    with zipfile.ZipFile(guide(2)) as archive:
+        entry = archive.getinfo("model.png")
+    content[entry.header_offset + 30 + len(entry.filename) + entry.compress_size // 2] ^= 0xFF
+    path.write_bytes(content)
+    return path
+
+
+@pytest.mark.parametrize("kind", ["package", "system", "container"])
+def test_a_rejected_system_leaves_no_temporary_folder(tmp_path, monkeypatch, kind):
+    bad, folder = {"a": damaged(tmp_path / "bad.fmu")}, tmp_path / "temporary"
+    ssp.package(tmp_path / "bad.ssp", bad, {}, stop_time=STOP)
+    rejected = {
+        "package": lambda: ssp.simulate(tmp_path / "bad.ssp"),
+        "system": lambda: cosimulation.simulate(bad, {}, STOP, STEP),
+        "container": lambda: container(tmp_path / "bad-container.fmu", bad, {}, STEP),
+    }
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    with pytest.raises(CouplingError, match=r"Bad CRC-32 .* 'model\.png'"):
+        rejected[kind]()
+    assert [*folder.iterdir()] == []
+
+
+def test_the_name_of_an_instance_in_a_container_is_no_path(tmp_path):
+    with pytest.raises(CouplingError, match=r"'\.\./a': must be a name of a folder"):
+        container(tmp_path / "c.fmu", {"../a": guide(2)}, {}, STEP)
 
 
 def test_package_contains_the_unchanged_fmus(package):

@@ -19,6 +19,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..base.atomic import write
 from ..base.errors import EquilibriumError, ParameterError
 from ..base.progress import Progress
 from ..base.unit_text import frequency_unit
@@ -143,9 +144,15 @@ class Comparison:
         return out.getvalue()
 
     def write(self, path: str | Path) -> Path:
-        """Write the rows to a CSV file; return its path."""
+        """Write the rows to a CSV file, completely or not at all; return its path.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be written.
+        """
         path = Path(path)
-        path.write_text(self.csv(), encoding="utf-8")
+        write(path, self.csv().encode())
         return path
 
 

@@ -12,7 +12,9 @@ from ..files.units import si_unit
 from ..mechanism.description import Mechanism
 
 PLUS_MINUS = re.compile(r"\s*(?:\+\s*/?\s*-|±)\s*")
-WHERE = re.compile(r"(?P<value>.*?)(?:\s+mode\s+(?P<mode>\d+))?(?:\s+at\s+(?P<at>.+))?\s*")
+WHERE = re.compile(
+    r"(?P<value>.*?)(?:\s+mode\s+(?P<mode>\d{1,9}))?(?:\s+at\s+(?P<at>.+))?\s*", re.DOTALL
+)
 
 
 def estimate(text: str, unit: str, option: str) -> Estimate:

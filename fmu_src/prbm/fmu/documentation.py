@@ -16,6 +16,7 @@ from ..mechanism.parts import COMPLIANT, LAWS, RIGID, FlexureType
 from ..runs.experiment import Experiment
 from .live.page import LivePart
 from .mathml import block, formula, inline, matrix, row
+from .policy import policy
 from .related import FOLDER
 
 STYLE = """
@@ -170,13 +171,15 @@ def explorer_page(mechanism: Mechanism, variables: tuple[Variable, ...], live: L
 
 
 def _page(mechanism: Mechanism, *sections: str, live: LivePart | None = None) -> str:
-    name, own, data = escape(mechanism.name), live.style if live else "", live.data if live else ""
+    name, style = escape(mechanism.name), STYLE + (live.style if live else "")
+    script = live.script if live else ""
     return (
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{policy(style, script)}">\n'
         f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{name}</title>\n<style>{STYLE}{own}</style>\n</head>\n<body>\n"
+        f"<title>{name}</title>\n<style>{style}</style>\n</head>\n<body>\n"
         + _focusable("\n".join(sections))
-        + f"\n{data}"
+        + (f"\n{live.data}<script>{script}</script>" if live else "\n")
         + "\n</body>\n</html>\n"
     )
 

@@ -11,9 +11,9 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
+from ..base import reading
 from ..base.errors import ParameterError
 from ..base.names import unknown
-from ..base.reading import opening_error, shown
 from ..base.version import GENERATION_TOOL
 from ..interface.units import UNITS
 from ..interface.variables import Variable
@@ -24,7 +24,7 @@ from .related import Related
 SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"  # Of SSP 2.0, too.
 SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
 MIME_TYPE = "application/x-ssp-parameter-set"
-BYTES_MAX = 10_000_000  # Size of a file that is read.
+FILE_SIZE_MAX = 10_000_000  # bytes
 BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 NO_NUMBERS = ("Boolean", "String", "Enumeration", "Binary")  # Types of values that are no numbers.
 
@@ -121,13 +121,7 @@ def read_parameter_set(path: str | Path, units: Mapping[str, str]) -> dict[str, 
 
 def _root(path: Path) -> Element:
     """Return the root of a parameter set."""
-    try:
-        with path.open("rb") as file:
-            content = file.read(BYTES_MAX + 1)
-    except (OSError, ValueError) as error:
-        raise ParameterError(f"{shown(path)}: cannot be read ({opening_error(error)})") from None
-    if len(content) > BYTES_MAX:
-        raise ParameterError(f"{path}: more than {BYTES_MAX // 10**6} MB; not a parameter set")
+    content = reading.content(path, FILE_SIZE_MAX, ParameterError)
     try:
         root = ElementTree.fromstring(content)
     except (ElementTree.ParseError, ValueError, LookupError) as error:

@@ -7,7 +7,7 @@ from enum import IntEnum
 from ..base.errors import SimulationError
 from ..base.tolerances import EVENT_WINDOW_RTOL, EVENTS_MAX
 from . import compliant, contact_modes, guards, impacts
-from .configuration import Configuration, Scales, contact_names
+from .configuration import Configuration, contact_names
 from .front import Front
 from .guards import Guard, StepView
 from .records import Impact
@@ -149,8 +149,8 @@ class EventWindow:
     since: float
     count: int = 0
 
-    def counting(self, event: Event, scales: Scales) -> "EventWindow":
-        """Return the window with one more event.
+    def counting(self, event: Event, configuration: Configuration, front: Front) -> "EventWindow":
+        """Return the window with one more event, which occurs at the front.
 
         Raises
         ------
@@ -158,14 +158,27 @@ class EventWindow:
             If there are more than ``EVENTS_MAX`` within ``EVENT_WINDOW_RTOL`` of the period.
         """
         window = self
-        if event.time - window.since > EVENT_WINDOW_RTOL * scales.time:
+        if event.time - window.since > EVENT_WINDOW_RTOL * configuration.scales.time:
             window = EventWindow(event.time)
         window = EventWindow(window.since, window.count + 1)
         if window.count > EVENTS_MAX:
             raise SimulationError(
                 f"more than {EVENTS_MAX} events (last: {event.kind.name.lower()}) within "
                 f"{event.time - window.since:.3g} s at t = {event.time:.9g} s: the contact "
-                "chatters; raise rest_speed or damping.beta, lower the restitution, or give the "
-                "body room between its walls"
+                f"chatters; {_remedy(configuration, front, event)}"
             )
         return window
+
+
+def _remedy(configuration: Configuration, front: Front, event: Event) -> str:
+    """Return what ends the chatter of a contact."""
+    if event.kind is EventKind.SWITCH:
+        depth = -float(front.gaps_and_rates()[0][event.contact])
+        return (
+            f"{configuration.mechanism.stops[event.contact].name} is indented by {depth:.3g} m: "
+            "reduce the preload or the stiffness"
+        )
+    return (
+        "raise rest_speed or damping.beta, lower the restitution, or give the body room between "
+        "its walls"
+    )

@@ -305,7 +305,7 @@ class Simulation:
 
     def _apply(self, event: Event) -> None:
         """Apply an event at the front."""
-        self.window = self.window.counting(event, self.configuration.scales)
+        self.window = self.window.counting(event, self.configuration, self.front)
         front = contact_peaks.latched_until(self.configuration, self.front, self.arc, event.time)
         self._set_front(*events.apply(self.configuration, front, event))
         if event.kind is EventKind.IMPACT:

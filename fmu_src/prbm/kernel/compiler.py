@@ -481,8 +481,10 @@ def private_cache() -> Path | None:
     if sys.platform == "win32":  # The access control list of the profile protects it.
         return usual if _created(usual) else None
     for folder in (usual, usual.with_name(f"{usual.name}-{os.geteuid()}")):
-        if _created(folder) and _private(folder):
-            return folder
+        if _created(folder):
+            real = folder.resolve()  # Without links, which others might change after the check.
+            if _private(real):
+                return real
     return None
 
 
@@ -497,7 +499,7 @@ def _created(folder: Path) -> bool:
 
 
 def _private(folder: Path) -> bool:
-    """Return whether only this user can write to a folder.
+    """Return whether only this user can write to a folder or exchange it.
 
     A folder of this user to which others could write is restricted.  The files of ziglang in it,
     which others may have changed, are removed; :func:`_read` checks all other files.
@@ -508,9 +510,20 @@ def _private(folder: Path) -> bool:
             folder.chmod(0o700)
             shutil.rmtree(folder / "zig", ignore_errors=True)
             found = folder.stat()
+        return trusted(found) and all(map(_keeps_entries, folder.parents))
     except OSError:
         return False
-    return trusted(found)
+
+
+def _keeps_entries(parent: Path) -> bool:
+    """Return whether no other user can rename or replace the entries of this user in a folder.
+
+    The sticky bit prevents this.  The group with the number of the user has no other members.
+    """
+    found = parent.stat()
+    sticky, own_group = found.st_mode & stat.S_ISVTX, found.st_gid == os.getegid() == _user()
+    others = stat.S_IWOTH if own_group else OTHERS_WRITE
+    return found.st_uid in (_user(), 0) and (bool(sticky) or not found.st_mode & others)
 
 
 def trusted(found: os.stat_result) -> bool:

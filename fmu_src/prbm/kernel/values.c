@@ -87,8 +87,7 @@ static bool get_indicator(Simulation *sim, int k, double *x, Problem *problem) {
     return true;
 }
 
-PRBM bool simulation_get(Simulation *simulation, int slot, double *x, Problem *problem) {
-    Simulation *sim = simulation;
+static bool get_value(Simulation *sim, int slot, double *x, Problem *problem) {
     const Slots *slots = &sim->configuration.mechanism->slots;
     if (slot < slots->inputs) {
         *x = sim->state.values[slot];
@@ -110,10 +109,15 @@ PRBM bool simulation_get(Simulation *simulation, int slot, double *x, Problem *p
     }
     const double *outputs = present_outputs(sim, output_groups(sim, slot), problem);
     *x = outputs ? outputs[slot] : 0.0;
-    if (outputs && !finite_number(*x)) {
-        return fail(problem, "its value at t = %.9g s is %g, because the states are not finite "
-                             "numbers, or far from every motion of the mechanism",
-                    sim->state.time, *x);
-    }
     return outputs != NULL;
+}
+
+PRBM bool simulation_get(Simulation *simulation, int slot, double *x, Problem *problem) {
+    if (!get_value(simulation, slot, x, problem)) {
+        return false;
+    }
+    return finite_number(*x) ||
+           fail(problem, "its value at t = %.9g s is %g, because the states or inputs are far from "
+                         "every motion of the mechanism",
+                simulation->state.time, *x);
 }

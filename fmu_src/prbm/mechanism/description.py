@@ -73,6 +73,8 @@ DIMENSIONS = {
 """Fields of the profiles of beams.  A notch is straight."""
 RESERVED = (GROUND, "base", "damping", "energy", "gravity", "link", "mode", "release", "solver")
 
+DEVICE = re.compile(r"con|prn|aux|nul|(com|lpt)\d", re.ASCII | re.IGNORECASE)  # On Windows.
+
 
 @dataclass(frozen=True, repr=False)
 class Mechanism:
@@ -133,6 +135,11 @@ class Mechanism:
             raise MechanismError(
                 f"mechanism name {self.name!r}: use letters a to z, digits and _, not starting "
                 "with a digit, and no keyword of Python (it becomes a file name and an identifier)"
+            )
+        if DEVICE.fullmatch(self.name):
+            raise MechanismError(
+                f"mechanism name {self.name!r}: Windows has a device of this name, and no file can "
+                "have it; choose another"
             )
         if len(self.gravity) != 2:
             raise MechanismError(f"gravity = {self.gravity!r} must have an x and a y component")

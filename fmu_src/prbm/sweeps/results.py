@@ -8,6 +8,7 @@ A part has the runs of one batch.  It is written under another name and then ren
 complete whenever it exists.  pandas, pyarrow and Dask read the folder as one table.
 """
 
+import io
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -19,6 +20,7 @@ import pandas as pd
 import pyarrow as pa  # type: ignore[import-untyped]
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
 
+from ..base import reading
 from ..base.atomic import write
 from ..base.errors import ParameterError
 from ..base.lock import LockedError, locked
@@ -26,6 +28,8 @@ from .outputs import GOOD, Outcome
 
 SETTINGS, LOCK = "_sweep.json", "_sweep.lock"
 DRAFTS = f".{SETTINGS}.*"  # Names of drafts of the settings, which a killed process leaves.
+SETTINGS_SIZE_MAX = 1 << 24  # bytes; the names of 100,000 outputs have some MB.
+PART_DRAFTS = ".part-*"  # Those of drafts of parts.
 ROW, STATUS, MESSAGE, SECONDS = "row", "status", "message", "seconds"
 OWN = (ROW, STATUS, MESSAGE, SECONDS)
 """Columns of every sweep; no parameter or output may have these names."""
@@ -102,13 +106,13 @@ class Results:
         """
         file = self.folder / SETTINGS
         try:
-            for pattern in ("_*.draft", DRAFTS):
+            for pattern in (PART_DRAFTS, DRAFTS):
                 for draft in self.folder.glob(pattern):
                     draft.unlink()
             if file.exists() and overwrite:
                 self._clear()
             if file.exists():
-                before = json.loads(file.read_bytes())
+                before = json.loads(reading.content(file, SETTINGS_SIZE_MAX, ParameterError))
                 if not isinstance(before, dict):
                     raise ValueError
                 self._compare(before)
@@ -160,6 +164,8 @@ class Results:
     def _tables(self) -> Iterator[tuple[Path, Any]]:
         for part in self._parts():
             try:
+                if not part.is_file():
+                    raise ValueError("not a file")
                 table = pq.read_table(part, schema=self.schema)
                 if any(row is None or row < 0 for row in table[ROW].to_pylist()):
                     raise ValueError("a row has no number, or a negative one")
@@ -214,16 +220,10 @@ class Results:
         self.count += 1
 
     def _write(self, table: Any, part: Path) -> None:
-        """Write a draft and rename it to the part; a killed process leaves only the draft."""
-        draft = part.with_name(f"_{part.name}.draft")
-        try:
-            with draft.open("wb") as file:
-                pq.write_table(table, file)
-                file.flush()
-                os.fsync(file.fileno())
-            draft.replace(part)
-        finally:
-            draft.unlink(missing_ok=True)
+        """Write a part; a killed process leaves only a draft."""
+        content = io.BytesIO()
+        pq.write_table(table, content)
+        write(part, content.getvalue())
 
 
 def _short(value: object) -> str:

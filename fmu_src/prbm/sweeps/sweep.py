@@ -27,11 +27,11 @@ from typing import TYPE_CHECKING, Any
 
 import fmpy  # type: ignore[import-untyped]
 
-from ..base.archives import check_unpacked_size
+from ..base import reading
+from ..base.archives import UNPACKED_SIZE_MAX, check_unpacked_size
 from ..base.errors import ParameterError, PrbmError
 from ..base.names import proposal
 from ..base.progress import Progress
-from ..base.reading import opening_error, shown
 from ..runs.inputs import filled, placeholders, read_signal
 from ..runs.run import ROWS_MAX
 from .outputs import CRASHED, GOOD, Outcome, Output, SpecificationError, parse_output
@@ -293,12 +293,7 @@ def read_fmu(path: Path) -> tuple[bytes, Any]:
     SweepError
         If it cannot be read, or has no co-simulation of FMI 2.0 or 3.0.
     """
-    try:
-        data = path.read_bytes()
-    except (OSError, ValueError) as error:
-        raise SweepError(
-            f"{shown(path)} cannot be read ({opening_error(error)}); give an FMU"
-        ) from None
+    data = reading.content(path, UNPACKED_SIZE_MAX, SweepError)
     try:
         check_unpacked_size(io.BytesIO(data))
         description = fmpy.read_model_description(io.BytesIO(data), validate=False)

@@ -15,6 +15,7 @@ from fmpy.simulation import (  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from ..base import reading
 from ..base.errors import ParameterError
 from ..base.names import proposal
 from ..runs.quantities import QUANTITIES
@@ -27,6 +28,7 @@ WORDS = {"true": 1.0, "false": 0.0}
 PROBABILITY_MIN = (
     2.0**-53
 )  # Smallest distance of probabilities from 0 and 1, where quantiles may be infinite.
+FILE_SIZE_MAX = 1 << 30  # bytes of a table in CSV; a million rows of 50 columns have 900 MB.
 NAMES_LISTED_MAX = 10  # Messages with more settable variables refer to "fmpy info" instead.
 HINT_LENGTH_MAX = 200  # characters
 RANGES = {"Int8": 7, "Int16": 15, "Int32": 31, "Integer": 31, "Enumeration": 31, "Int64": 53,
@@ -139,13 +141,20 @@ def read_table(table: Table) -> pd.DataFrame:
 
 def _read_file(path: Path) -> pd.DataFrame:
     if not path.exists():
-        raise ParameterError(f"{path} does not exist; give a CSV or Parquet file of parameters")
+        raise ParameterError(
+            f"{reading.shown(path)} does not exist; give a CSV or Parquet file of parameters"
+        )
     try:
         if path.suffix.lower() in (".parquet", ".pq"):
+            if not (path.is_file() or path.is_dir()):
+                raise ValueError("a pipe or a device")
             return pd.read_parquet(path)
-        return pd.read_csv(path, dtype=str, keep_default_na=False, skipinitialspace=True)
+        text = reading.text(path, FILE_SIZE_MAX, ParameterError)
+        return pd.read_csv(text, dtype=str, keep_default_na=False, skipinitialspace=True)
     except pd.errors.EmptyDataError:
         return pd.DataFrame()
+    except ParameterError:
+        raise
     except (OSError, ValueError) as error:  # Errors of pandas and pyarrow are subclasses.
         reason = " ".join(str(error).split()) or type(error).__name__
         raise ParameterError(f"{path} cannot be read as a table: {reason}") from None

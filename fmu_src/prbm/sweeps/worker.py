@@ -239,17 +239,35 @@ class FmuPlugin(WorkerPlugin):
 
     def __init__(self, fmu: bytes, job: Job, retries: int, timeout: float | None) -> None:
         self.arguments = fmu, job, retries, timeout
+        self.processes: Processes | None = None
+        self.failure = ""
 
     def setup(self, worker: Any) -> None:
-        """Unpack the FMU."""
-        self.processes = Processes(*self.arguments)
+        """Unpack the FMU; keep the reason of a failure for :meth:`run`."""
+        try:
+            self.processes = Processes(*self.arguments)
+        except Exception as error:  # FMPy raises plain exceptions.
+            self.failure = f"{error or type(error).__name__}"
+
+    def run(self, rows: Sequence[Mapping[str, float]]) -> list[Outcome]:
+        """Run the FMU once for each mapping of start values.
+
+        Raises
+        ------
+        Unusable
+            If the FMU cannot be unpacked or loaded, or the sweep was stopped.
+        """
+        if self.processes is None:
+            raise Unusable(f"a worker cannot unpack the FMU ({self.failure})")
+        return self.processes.run(rows)
 
     def teardown(self, worker: Any) -> None:
         """End the processes and remove the FMU."""
-        self.processes.close()
+        if self.processes is not None:
+            self.processes.close()
 
 
 def run_batch(plugin: str, rows: Sequence[Mapping[str, float]]) -> list[Outcome]:
     """Run the FMU on this worker once for each row."""
     installed: Any = get_worker().plugins[plugin]
-    return installed.processes.run(rows)  # type: ignore[no-any-return]
+    return installed.run(rows)  # type: ignore[no-any-return]

@@ -114,7 +114,10 @@ def container(
             variableMappings={v: [_found(inside, full)] for v, full in mapped.items()},
         )
         (folder / "unzipped").mkdir()
-        create_container_fmu(system, folder / "unzipped", folder / "container.fmu")
+        try:
+            create_container_fmu(system, folder / "unzipped", folder / "container.fmu")
+        except (OSError, zipfile.BadZipFile) as error:
+            raise CouplingError(f"an FMU cannot be unpacked ({error}); use an intact one") from None
         _remove_binaries(folder / "unzipped" / "binaries", common)
         archive = shutil.make_archive(str(folder / "common"), "zip", folder / "unzipped")
         write(path, Path(archive).read_bytes())
@@ -122,6 +125,8 @@ def container(
 
 def _inside(name: str, fmu: str | Path, folder: Path) -> Any:
     """Copy an FMU to NAME.fmu, since the container names its folder after the file."""
+    if not name or Path(name).name != name:
+        raise CouplingError(f"instance name {name!r}: must be a name of a folder")
     description, own = described(name, fmu), folder / f"{name}.fmu"
     if description.coSimulation is None:
         raise CouplingError(f"{name}: {fmu} has no co-simulation, which a container needs")

@@ -14,6 +14,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from ..base.atomic import write
 from ..base.progress import Progress
 from ..runs.result import Columns
 from . import cosimulation
@@ -61,6 +62,8 @@ def package(
     CouplingError
         If an FMU cannot be read, a name is unknown, a variable has the wrong causality, or a type
         has no counterpart in SSP.
+    OSError
+        If the package cannot be written; no part of it remains.
     """
     path, values = Path(path), dict(values or {})
     variables = {
@@ -87,10 +90,12 @@ def package(
     _add(root, SSD, "DefaultExperiment", startTime="0.0", stopTime=repr(float(stop_time)))
     contents = {DESCRIPTION: _text(root)}
     contents |= {f"resources/{name}.fmu": Path(fmu).read_bytes() for name, fmu in fmus.items()}
-    with zipfile.ZipFile(path, "w") as archive:
+    package = io.BytesIO()
+    with zipfile.ZipFile(package, "w") as archive:
         for name, content in contents.items():
             method = zipfile.ZIP_DEFLATED if name == DESCRIPTION else zipfile.ZIP_STORED
             archive.writestr(zipfile.ZipInfo(name, EPOCH), content, method)
+    write(path, package.getvalue())
 
 
 def _add(parent: ET.Element, space: str, tag: str, **attributes: str) -> ET.Element:

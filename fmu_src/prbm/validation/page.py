@@ -13,6 +13,8 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+from ..base import reading
+from ..base.atomic import write
 from ..base.errors import PrbmError
 from ..base.progress import Progress
 from ..plots.figures import save
@@ -20,6 +22,7 @@ from .reproduced import RESULTS
 from .side_by_side import FIGURES, Reproduction, Result, file_name
 
 PAGE = "validation.md"
+PAGE_SIZE_MAX = 1 << 24  # bytes
 
 
 class ValidationError(PrbmError, ValueError):
@@ -140,15 +143,16 @@ def reproduce(
     results = [one for one in _computed(wanted, progress or (lambda _: None))]
     path = Path(folder) / PAGE
     try:
-        (path.parent / FIGURES).mkdir(parents=True, exist_ok=True)
-        known = path.read_text(encoding="utf-8") if only and path.exists() else ""
+        known = ""
+        if only and path.exists():
+            known = reading.text(path, PAGE_SIZE_MAX, ValidationError).read()
         for result in results:
             for drawing in result.drawings:
                 save(drawing.figure, path.parent / FIGURES / file_name(drawing))
         keys = [one.key for one in chosen()]
-        path.write_text(page(results, known, keys), encoding="utf-8")
+        write(path, page(results, known, keys).encode())
     except OSError as error:
-        raise ValidationError(f"{path}: cannot be written ({error.strerror})") from None
+        raise ValidationError(f"{path}: cannot be written ({error.strerror or error})") from None
     return results
 
 

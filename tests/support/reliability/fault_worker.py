@@ -1,9 +1,9 @@
 """Run a command again and again with a fault at each of its changes of files.
 
 ``python fault_worker.py JOB`` reads a JSON file with ``fault`` (the library to arm, also in
-``LD_PRELOAD``), ``folder``, ``command`` (``build``, ``simulate`` or ``compile``), ``old`` and
-``new`` (arguments), ``points`` (largest number of faults) and ``log``.  It prints a JSON object
-with the number of faults and the failures.
+``LD_PRELOAD``), ``folder``, ``command`` (a name of :data:`COMMANDS`), ``old`` and ``new``
+(arguments), ``points`` (largest number of faults) and ``log``.  It prints a JSON object with the
+number of faults and the failures.
 """
 
 import ctypes
@@ -30,6 +30,7 @@ def _compile(_: Sequence[str]) -> int:
 COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {
     "build": lambda words: command_line.main(["build", *words]),
     "simulate": command_line.main,
+    "study": command_line.main,
     "compile": _compile,
 }
 

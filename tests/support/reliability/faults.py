@@ -106,6 +106,22 @@ def searched(command: str, points: int) -> dict[str, Any]:
                 ["simulate", "PRBDM", "--stop-time", time, "--step", "1e-3", *out]
                 for time in ("0.01", "0.02")
             ),
+            "study": tuple(
+                [
+                    "study",
+                    "PRBDM",
+                    "--vary",
+                    "stop.position=0:1 mm:2",
+                    "--of",
+                    "shuttle.x",
+                    "--workers",
+                    "1",
+                    "--stop-time",
+                    time,
+                    *out,
+                ]
+                for time in ("0.01", "0.02")
+            ),
             "compile": (None, []),
         }
         job = {
@@ -128,12 +144,16 @@ def searched(command: str, points: int) -> dict[str, Any]:
 
 
 def command(
-    words: Sequence[str], before: Sequence[str] = (), **changes: str | None
+    words: Sequence[str],
+    before: Sequence[str] = (),
+    folder: Path | None = None,
+    **changes: str | None,
 ) -> "subprocess.CompletedProcess[str]":
     """Run a command in a process of its own; return the completed process."""
     return subprocess.run(
         [*before, sys.executable, "-m", "prbm", *words], capture_output=True, text=True,
-        check=False, timeout=SECONDS_MAX, env=environment(**changes), cwd=tempfile.gettempdir(),
+        check=False, timeout=SECONDS_MAX, env=environment(**changes),
+        cwd=folder or tempfile.gettempdir(),
     )  # fmt: skip
 
 
@@ -208,7 +228,7 @@ def run(points: int, seed: int = 0, names: Sequence[str] | None = None) -> Part:
     """Try all faults; ``points`` is the largest number of faults of a kind and command."""
     del seed  # The faults are not random.
     part = Part("Faults of the environment", ("fault", "runs", "wrong"))
-    for name in ("build", "simulate", "compile"):
+    for name in ("build", "simulate", "study", "compile"):
         if names is None or name in names:
             found = searched(name, points)
             part.add(f"killed or disk full, {name}", found["faults"], len(found["failures"]))

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...base.atomic import write
 from ...base.errors import ParameterError
 from ...base.progress import Progress
 from ...base.unit_text import length_unit
@@ -104,9 +105,15 @@ class ImpactMap:
         return out.getvalue()
 
     def write(self, path: str | Path) -> Path:
-        """Write the map to a CSV file; return its path."""
+        """Write the map to a CSV file, completely or not at all; return its path.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be written.
+        """
         path = Path(path)
-        path.write_text(self.csv(), encoding="utf-8")
+        write(path, self.csv().encode())
         return path
 
     def __str__(self) -> str:

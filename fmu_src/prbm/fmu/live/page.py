@@ -27,12 +27,15 @@ class LivePart:
     markup : str
         Section of the page, which stays hidden without JavaScript.
     data : str
-        Elements with the data and the script, for the end of the page.
+        Elements with the data, for the end of the page.
+    script : str
+        The script, which follows the data.
     """
 
     style: str
     markup: str
     data: str
+    script: str
 
 
 def live_part(content: dict[str, Any], tables: bytes, module: bytes) -> LivePart:
@@ -51,9 +54,8 @@ def live_part(content: dict[str, Any], tables: bytes, module: bytes) -> LivePart
         f'<script type="application/json" id="live-content">{embedded(content)}</script>\n'
         f'<script type="text/plain" id="live-tables">{packed(tables)}</script>\n'
         f'<script type="text/plain" id="live-module">{_packed_module(module)}</script>\n'
-        f"<script>\n{script()}\n</script>"
     )
-    return LivePart(_text(STYLE), _text(MARKUP), data)
+    return LivePart(_text(STYLE), _text(MARKUP), data, f"\n{script()}\n")
 
 
 @cache

@@ -165,8 +165,7 @@ static void get_stop(State *state, int i, StateReader *reader) {
     last->impulse_sum = get_number(reader);
 }
 
-/* Read the state; return whether its numbers are valid.  The states of model exchange, which come
- * last, may have any values, because an importer's solver sets them. */
+/* Read the state; return whether its numbers are valid. */
 static bool read_state(Simulation *sim, const double *from) {
     State *state = &sim->state;
     const Mechanism *m = sim->configuration.mechanism;
@@ -182,11 +181,9 @@ static bool read_state(Simulation *sim, const double *from) {
         state->modes[m->stop_count + i] =
             (ContactMode)get_integer(&reader, CONTACT_FRICTIONLESS, CONTACT_SLIP_NEGATIVE);
     }
-    for (double *x = state->numbers; x < state->states; x++) {
-        *x = get_number(&reader);
+    for (size_t i = 0; i < state->number_count; i++) {
+        state->numbers[i] = get_number(&reader);
     }
-    size_t left = state->number_count - (size_t)(state->states - state->numbers);
-    memcpy(state->states, reader.at, left * sizeof *state->states);
     return reader.sound;
 }
 
