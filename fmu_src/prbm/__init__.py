@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .base.errors import PrbmError as PrbmError
     from .base.errors import SimulationError as SimulationError
     from .base.version import __version__ as __version__
+    from .cad.importing import read_drawing as read_drawing
     from .files.mechanism_file import load as load
     from .mechanism.description import Mechanism
     from .plots.shown import Result, simulate
@@ -43,6 +44,7 @@ __all__ = [
     "__version__",
     "equilibrium",
     "load",
+    "read_drawing",
     "simulate",
     "study",
 ]
@@ -61,6 +63,7 @@ _MODULES = {
     "__version__": ("base.version", "__version__"),
     "equilibrium": ("analysis.static_shape", "equilibrium"),
     "load": ("files.mechanism_file", "load"),
+    "read_drawing": ("cad.importing", "read_drawing"),
     "simulate": ("plots.shown", "simulate"),
     "study": ("sweeps.study", "study"),
 }

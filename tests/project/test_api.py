@@ -24,6 +24,7 @@ PUBLIC = [
     "__version__",
     "equilibrium",
     "load",
+    "read_drawing",
     "simulate",
     "study",
 ]

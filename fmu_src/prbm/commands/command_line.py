@@ -26,6 +26,7 @@ from .arguments import (
     animation_arguments,
     engine_argument,
     examples,
+    import_arguments,
     input_argument,
     mechanism_argument,
     out_argument,
@@ -92,6 +93,7 @@ def parser() -> argparse.ArgumentParser:
     _sweep(commands)
     _study(commands)
     measure_arguments(commands)
+    _import(commands)
     _picture(commands)
     _animate(commands)
     _explore(commands)
@@ -410,6 +412,19 @@ def _study(commands: Commands) -> None:
     stop_time_argument(parser)
     engine_argument(parser)
     out_argument(parser)
+
+
+def _import(commands: Commands) -> None:
+    parser = add_command(
+        commands, "import", "drawings:import_file",
+        "mechanism file from the outline of a plate in a drawing (DXF or SVG)",
+        examples(
+            "prbm import stage.dxf --thickness 8mm --material steel --ground 5,5 --out stage.toml",
+            "prbm import stage.dxf --thickness 8mm --check stage.png",
+        ),
+        details="Check the picture of --check: what was not understood is red.",
+    )  # fmt: skip
+    import_arguments(parser)
 
 
 def _picture(commands: Commands) -> None:
