@@ -31,8 +31,8 @@ from support import ROOT, SUPPORT
 PAGE = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")
 COMMANDS = (
     "list", "parameters", "modes", "equilibrium", "simulate", "stress", "shock", "fit",
-    "impact-map", "contact", "sweep", "study", "import", "picture", "animate", "explore", "modelica",
-    "ssp", "validate", "measure youngs-modulus", "measure calibration",
+    "impact-map", "contact", "sweep", "study", "import", "export", "picture", "animate", "explore",
+    "modelica", "ssp", "validate", "measure youngs-modulus", "measure calibration",
     "measure frequency", "measure restitution", "completion",
 )  # fmt: skip
 

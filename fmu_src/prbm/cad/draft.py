@@ -208,7 +208,7 @@ def _name_bodies(result: Draft) -> None:
     stage = max(single, key=lambda k: found.bodies[k].area)
     rest = [one for one in orbits if one[0] != stage]
     own = next(one for one in orbits if one[0] == stage)
-    names = _numbered([(_side(result, places[k]) if lines else (), "link") for k, lines, _ in rest])
+    names = _numbered([(_side(result, places[k]) if lines else (), "bar") for k, lines, _ in rest])
     for (first, lines, orbit), name in [
         (own, "_".join((*(_side(result, places[stage]) if own[1] else ()), "stage"))),
         *zip(rest, names, strict=True),

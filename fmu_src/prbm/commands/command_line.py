@@ -94,6 +94,7 @@ def parser() -> argparse.ArgumentParser:
     _study(commands)
     measure_arguments(commands)
     _import(commands)
+    _export(commands)
     _picture(commands)
     _animate(commands)
     _explore(commands)
@@ -425,6 +426,21 @@ def _import(commands: Commands) -> None:
         details="Check the picture of --check: what was not understood is red.",
     )  # fmt: skip
     import_arguments(parser)
+
+
+def _export(commands: Commands) -> None:
+    parser = add_command(
+        commands, "export", "drawings:export_file",
+        "outline of a mechanism as a drawing (DXF), for CAD or a laser cutter",
+        examples("prbm export NotchGuide", "prbm export my_mechanism.toml --out plate.dxf"),
+        details="Slots beside the flexures let them end where they are clamped. prbm import reads "
+        "the drawing again.",
+    )  # fmt: skip
+    mechanism_argument(parser)
+    parser.add_argument(
+        "--out", type=Path, metavar="FILE.dxf", help="file to write (default: MECHANISM.dxf)"
+    )
+    set_argument(parser)
 
 
 def _picture(commands: Commands) -> None:

@@ -1,12 +1,15 @@
-"""``prbm import``: mechanism files from drawings."""
+"""``prbm import`` and ``prbm export``: mechanism files from drawings, and drawings of them."""
 
 import argparse
 from pathlib import Path
 
-from ..base.atomic import check_file, write_all
+from ..base.atomic import check_file, write, write_all
 from ..base.unit_text import frequency_text
+from ..cad.export import dxf
 from ..cad.importing import Imported, Options, fundamental, import_drawing
-from ..files.settings import UserMistake, optional_quantity, quantity
+from ..cad.outline import outline
+from ..files.mechanism_file import load
+from ..files.settings import UserMistake, optional_quantity, quantity, settings
 from ..plots.drawing_check import check_picture, flexure_names
 
 INCH = 0.0254  # m
@@ -29,6 +32,18 @@ def import_file(options: argparse.Namespace) -> None:
         print(sentence)
     for file in files:
         print(file)
+
+
+def export_file(options: argparse.Namespace) -> None:
+    """Write the outline of a mechanism as DXF."""
+    mechanism = load(options.mechanism)
+    path = options.out or Path(f"{mechanism.name}.dxf")
+    check_file(path)
+    drawn = outline(mechanism, settings(mechanism, options.set))
+    write(path, dxf(drawn))
+    for note in drawn.notes:
+        print(f"note: {note}")
+    print(path)
 
 
 def summary(result: Imported) -> list[str]:

@@ -122,7 +122,9 @@ class _Picture:
         z = one.trace.z
         degrees = (math.degrees(cmath.phase(z[-1] - z[0])) + 89.0) % 180.0 - 89.0
         away = cmath.rect(NAME_OFFSET, math.radians(degrees + 90.0))
-        place = complex(z[np.argmin(np.abs(z - 0.5 * (z[0] + z[-1])))]) * self.factor
+        beside = cmath.rect(0.5 * float(one.trace.width.max()), math.radians(degrees + 90.0))
+        middle = complex(z[np.argmin(np.abs(z - 0.5 * (z[0] + z[-1])))])
+        place = (middle + beside) * self.factor
         self.axes.annotate(
             f"{name} {self.factor * one.shape.thickness:.3g}", (place.real, place.imag),
             (away.real, away.imag), textcoords="offset points", rotation=degrees, ha="center",
