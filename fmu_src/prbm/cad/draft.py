@@ -180,8 +180,13 @@ def _orbit(index: int, lines: Iterable[Mirror], which: str) -> tuple[set[int], t
 
 def _first(result: Draft, members: Iterable[int], places: Mapping[int, complex]) -> int:
     """Return the part of an orbit that is lowest, then leftmost."""
-    grid = 1e-5 * abs(complex(*result.found.plate.shape.bounds[2:])) or 1e-9
-    return min(members, key=lambda k: (round(places[k].imag / grid), places[k].real))
+
+    def order(k: int) -> tuple[bool, bool, float, float]:
+        """Return first the words of a place, which do not depend on round-off."""
+        words = _side(result, places[k])
+        return "upper" in words, "right" in words, places[k].imag, places[k].real
+
+    return min(members, key=order)
 
 
 def _orbits(

@@ -9,9 +9,13 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ..base.errors import MechanismError
-from ..drawing.shapes import FlexureLine, Shapes, corners, tangents
+from ..drawing.shapes import FlexureLine, Shapes, corners
 from ..mechanics.arrays import Complex, Real
 from ..mechanics.assembly import assemble
+from ..mechanics.beam import Beam
+from ..mechanics.collection import Collection
+from ..mechanics.flexures import beam_of
+from ..mechanics.profile import Straight
 from ..mechanics.system import FIXED, unit
 from ..mechanism.description import Mechanism
 from ..mechanism.flexure import PIN
@@ -24,6 +28,8 @@ SLOT_SHARE = 0.02  # at most this share of the size.
 OVERLAP_RTOL = 1e-6  # Overlap of parts that are joined, as a share of the size.
 AREA_RTOL = 1e-6  # Overlap of parts that are apart, as a share of the square of the size.
 STOP_SHARE = 0.05  # Length of the line of a stop.
+CURVE_POINTS = 161  # Points of an arc of a notch, or of a curved flexure.
+SAME_RTOL = 1e-9  # Points nearer than this share of the length coincide.
 CONTACT_MIN = 0.99  # Share of the end of a flexure that lies on its body.
 
 
@@ -125,16 +131,26 @@ class _Plate:
 
     def _strip(self, line: FlexureLine) -> _Strip:
         """Return the strip of a flexure; one with pivots is straight."""
-        z = corners(line.outline, self.shapes.straight)
-        kind = self.mechanism.type_of(line.flexure)
+        flexure = line.flexure
+        kind = self.mechanism.type_of(flexure)
         if line.jointed:
-            z = z[[0, -1]]
+            z = corners(line.outline, self.shapes.straight)[[0, -1]]
             thickness = np.full(2, value(kind, "thickness", self.system.values))
             along = np.full(2, (z[1] - z[0]) / abs(z[1] - z[0]))
             return _Strip(line, z, along, thickness)
-        thickness = np.asarray(line.outline.thickness)
-        kept = np.append(True, np.abs(np.diff(z)) > 1e-9 * self.size)
-        return _Strip(line, z[kept], tangents(z)[kept], thickness[kept])
+        parts = Collection(self.mechanism, self.system.values)
+        original = next(f for f in self.mechanism.flexures if f.name == flexure.name)
+        beam = beam_of(parts, original, kind)
+        v, thickness = _sections(beam)
+        start, end = parts.end(original, original.start), parts.end(original, original.end)
+        local, along = beam.line.position(v), beam.line.tangent(v)
+        turn = (end - start) / complex(beam.line.position(np.array([beam.line.length]))[0])
+        along = along * turn / np.abs(along * turn)
+        z = start + local * turn
+        strip = _Strip(line, z, along, thickness)
+        if original.start == flexure.start:
+            return strip
+        return _Strip(line, z[::-1], -along[::-1], thickness[::-1])
 
     def outline(self) -> Outline:
         """Return the plate with its marks."""
@@ -227,6 +243,20 @@ class _Plate:
             wall = self.shapes.hits[i] + position * into
             along = 0.5j * STOP_SHARE * self.size * into
             result.stops.append(np.array([wall - along, wall + along]))
+
+
+def _sections(beam: Beam) -> tuple[Real, Real]:
+    """Return positions along a beam, dense where it is curved, and the thickness there [m]."""
+    straight = not (beam.line.curvature or beam.line.rise)
+    v, thickness = [], []
+    for panel in beam.panels:
+        points = 2 if straight and isinstance(panel, Straight) else CURVE_POINTS
+        sections = panel.at(np.linspace(-1.0, 1.0, points))
+        v.append(sections.v)
+        thickness.append(sections.thickness)
+    every = np.concatenate(v)
+    kept = np.append(True, np.diff(every) > SAME_RTOL * every[-1])
+    return every[kept], np.concatenate(thickness)[kept]
 
 
 def _pad(z: complex, out: complex, size: float) -> shapely.Polygon:

@@ -15,6 +15,8 @@ from .curves import Curve, DrawingError, diagonal
 SAME_RTOL = 1e-7  # Ends of curves that are nearer than this share of the drawing coincide.
 GAP_RTOL = 1e-4  # Default of the largest closed gap, as a share of the diagonal.
 SLIVER_RTOL = 1e-7  # Areas below this share of the square of the diagonal are round-off.
+LIMIT_GROWTH = 3.0  # Growth of the limit below which ends are joined, in steps.
+ALIKE_SHARE = 0.05  # Distance of two lines that are the same, over their length.
 SAMPLES = 3  # Inner points at which two curves with the same ends are compared.
 LISTED_MAX = 5  # Places in a message.
 
@@ -99,7 +101,8 @@ def _distinct(lines: Sequence[Complex], near: float, notes: list[str]) -> list[C
         nearby = (
             i for dx in (-1, 0, 1) for dy in (-1, 0, 1) for i in grid[cell[0] + dx, cell[1] + dy]
         )
-        if not any(_alike(z, kept[i], near) for i in nearby):
+        close = min(near, ALIKE_SHARE * float(np.abs(np.diff(z)).sum()))
+        if not any(_alike(z, kept[i], close) for i in nearby):
             grid[cell].append(len(kept))
             kept.append(z.copy())
     if len(kept) < len(lines):
@@ -123,27 +126,28 @@ def _alike(one: Complex, other: Complex, near: float) -> bool:
 
 
 def _join(lines: list[Complex], same: float, gap: float, notes: list[str]) -> None:
-    """Move ends of lines together: first those that coincide, then those with a small gap."""
+    """Move ends of lines together: first those that coincide, then those with growing gaps.
+
+    An end that has been joined stays, so that short lines and the corners of thin leaves remain.
+    """
     ends = [(i, k) for i, z in enumerate(lines) for k in (0, -1)]
     z = np.array([lines[i][k] for i, k in ends])
+    waiting = np.arange(len(z))
     closed: list[float] = []
-    for limit in (same, gap):
-        groups = _groups(z, limit)
+    limit = same
+    while len(waiting):
+        groups = _groups(z[waiting], limit)
         sizes = np.bincount(groups)
-        first = limit == same
         for g in np.flatnonzero(sizes > 1):
-            members = np.flatnonzero(groups == g)
+            members = waiting[groups == g]
             spread = float(np.abs(z[members] - z[members].mean()).max())
-            if not first and spread > 0.0:
+            if limit > same:
                 closed.append(2.0 * spread)
             z[members] = z[members].mean()
-        if first:  # Only single ends have gaps: the corners of a thin leaf stay apart.
-            single = sizes[groups] == 1
-            paired = z[~single]
-            settled = dict(zip(np.flatnonzero(~single).tolist(), paired, strict=True))
-            z[~single] = np.inf
-    for i, value in settled.items():
-        z[i] = value
+        waiting = waiting[sizes[groups] == 1]
+        if limit >= gap:
+            break
+        limit = min(LIMIT_GROWTH * limit, gap)
     for (i, k), value in zip(ends, z, strict=True):
         lines[i][k] = value
     if closed:
@@ -153,10 +157,9 @@ def _join(lines: list[Complex], same: float, gap: float, notes: list[str]) -> No
 def _groups(z: Complex, limit: float) -> NDArray[np.int64]:
     """Return the number of the group of each point; points nearer than a limit form a group."""
     group = np.arange(len(z), dtype=np.int64)
-    finite = np.flatnonzero(np.isfinite(z))
-    if len(finite) > 1:
-        for a, b in cKDTree(_pairs(z[finite])).query_pairs(limit):
-            one, other = group[finite[a]], group[finite[b]]
+    if len(z) > 1:
+        for a, b in cKDTree(_pairs(z)).query_pairs(limit):
+            one, other = group[a], group[b]
             if one != other:
                 group[group == max(one, other)] = min(one, other)
     return group

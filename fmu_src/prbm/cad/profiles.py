@@ -15,11 +15,14 @@ from .walls import Walls
 UNIFORM_RTOL = 4e-3  # Change of the thickness of a leaf.
 FIT_RTOL = 0.01  # Largest distance of a wall from the fitted shape, over its depth or thickness.
 BOW_RTOL = 0.02  # Bow of a curved leaf over its thickness,
+THIN = 1.25  # Thickness of a thin part over the smallest one.
+SHORT = 3.0  # Length of a thin part over its thickness, up to which it has no bow.
 BOW_SHARE = 2e-4  # or over its length.
 CURVE_RTOL = 0.02  # Largest distance of a curved line from the fitted one, over its bow.
 ROUND_RTOL = 0.01  # Difference of the half axes of a circular notch.
 WAIST_MIN = 0.05  # Length of the waist of a filleted leaf over the length of its fillets.
-CUT_RTOL = 0.02  # Depth over that of the full arcs, below which a notch ends in a thicker part.
+BETTER = 0.3  # Distance over that of a simpler shape, from which another one is chosen.
+CUT_SHARE = 0.2  # Missing share of the depth of full arcs, above which a notch ends before them.
 
 
 @dataclass(frozen=True)
@@ -109,9 +112,12 @@ def shape_of(walls: Walls, trace: Trace, noise: float) -> Shape:
 
 
 def _bow(trace: Trace) -> float:
-    """Return the largest distance of the centre line from the line between its ends [m]."""
-    chord = trace.z[-1] - trace.z[0]
-    across = (np.conj(chord) * (trace.z - trace.z[0])).imag
+    """Return the bow of the thin part of a line, 0 if this part is short [m]."""
+    z = trace.z[trace.width <= THIN * trace.thinnest]
+    chord = z[-1] - z[0]
+    if abs(chord) < SHORT * trace.thinnest:
+        return 0.0
+    across = (np.conj(chord) * (z - z[0])).imag
     return float(np.abs(across).max() / abs(chord))
 
 
@@ -175,7 +181,9 @@ def _notch(section: Section, tolerance: float, noise: float) -> Shape | None:
     for free in (False, True):  # With one radius, then with two half axes.
         for waisted in (True, False):
             found = _fitted(section, (low, high), (thickness, depth), free, waisted, noise)
-            if found is not None and (best is None or found[0] < 0.3 * best[0]):
+            better = best is None or (found is not None and found[0] < BETTER * best[0])
+            needed = best is None or best[0] > 3.0 * noise
+            if found is not None and better and needed:
                 best = found
     return None if best is None else best[1]
 
@@ -240,7 +248,7 @@ def _notch_shape(
     if a != b:
         dimensions["notch_depth"] = b
     reach = a
-    if depth < (1.0 - CUT_RTOL) * b and 1.0 - depth / b > 0.1:
+    if depth < (1.0 - CUT_SHARE) * b:
         dimensions["end_thickness"] = t + 2.0 * depth
         reach = a * float(np.sqrt(1.0 - (1.0 - depth / b) ** 2))
     if waist:

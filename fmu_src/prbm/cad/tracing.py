@@ -28,6 +28,9 @@ WIDTH_CHANGE_MAX = 0.1  # Largest change of the thickness in a step, as a share.
 LATE_MAX = 2.0  # Farthest end of the second wall behind that of the first, over the thickness.
 STEPS_MAX = 20_000  # Steps of a trace in one direction.
 CENTRINGS = 4  # Iterations that place the first chord across the walls.
+CHORD_ANGLE = math.radians(3.0)  # Between the chords that are compared.
+LINED = math.cos(math.radians(5.0))  # Of the largest turn of a line that counts as straight.
+BASELINE = 2.0  # Length of a line over its thickness, from which it has a direction.
 
 
 class End(Enum):
@@ -175,8 +178,8 @@ class Tracer:
             left, right = pair
             z += 0.5j * tangent * (left.distance - right.distance)
             tangent = self._along(left, right, tangent)
-        pair = self._across(z, tangent)
-        if pair is None:
+        tangent = self._shortest(z, tangent)
+        if self._across(z, tangent) is None:
             return None
         ahead, behind = (self._half(z, sign * tangent) for sign in (1.0, -1.0))
         return (
@@ -192,6 +195,25 @@ class Tracer:
             if len(ahead.z) + len(behind.z) > 2
             else None
         )
+
+    def _shortest(self, z: complex, tangent: complex) -> complex:
+        """Return the direction across the shortest chord, which walls of short sides hide.
+
+        A parabola through the lengths of three chords has its minimum there.
+        """
+        for _ in range(CENTRINGS):
+            lengths = []
+            for angle in (-CHORD_ANGLE, 0.0, CHORD_ANGLE):
+                pair = self._across(z, tangent * np.exp(1j * angle))
+                if pair is None:
+                    return tangent
+                lengths.append(pair[0].distance + pair[1].distance)
+            curved = lengths[0] - 2.0 * lengths[1] + lengths[2]
+            if not curved > 0.0:
+                return tangent
+            angle = 0.5 * CHORD_ANGLE * (lengths[0] - lengths[2]) / curved
+            tangent *= complex(np.exp(1j * np.clip(angle, -CHORD_ANGLE, CHORD_ANGLE)))
+        return tangent
 
     def _across(self, z: complex, tangent: complex) -> tuple[Hit, Hit] | None:
         """Return where the walls on the left and on the right are met."""
@@ -230,7 +252,9 @@ class Tracer:
             if slope < -STEEP or self._entered(left, right):
                 half.end = End.NARROWS
                 return half
-            steep = steep or slope > STEEP
+            if slope > STEEP and not steep:
+                steep = True
+                half.tangent = self._straight(half, tangent)
             if not steep:
                 shift = 0.5 * (left.distance - right.distance)
                 z += 1j * half.tangent * shift
@@ -244,6 +268,14 @@ class Tracer:
             thinnest = min(thinnest, new)
             step = min(step * STEP_GROWTH, STEP_MAX * thinnest, self.walls.size / 20)
         return half
+
+    def _straight(self, half: Half, first: complex) -> complex:
+        """Return the direction in which a line goes on straight where its walls turn away."""
+        line = half.z[-1] - half.z[0]
+        if abs(line) < BASELINE * min(half.width):
+            return first
+        along = line / abs(line)
+        return along if (np.conj(along) * first).real > LINED else half.tangent
 
     def _step(
         self, half: Half, step: float, thinnest: float, *, smallest: bool
