@@ -140,3 +140,20 @@ def test_an_arc_has_the_curvature_of_its_circle(tmp_path):
     shape = only(imported(tmp_path, plate))
     assert abs(shape.dimensions["curvature"]) == pytest.approx(1 / 0.06, rel=1e-3)
     assert length(shape) == pytest.approx(2 * edge, rel=1e-3)
+
+
+def test_leaves_curved_to_the_same_side_are_no_mirror_images(tmp_path):
+    """Two equal arcs beside each other; with the curvature of mirror images one is wrong."""
+    angle = np.linspace(-0.31, 0.31, 200)
+    arc = strip(60j * (np.exp(-1j * angle) - 1), 0.5)
+    edge = 60 * np.sin(0.3)
+    plate = box(edge, -10, 40, 35).union(box(-40, -10, -edge, 35))
+    for y in (0, 25):
+        moved = np.array(arc.exterior.coords) @ [1, 1j] + 1j * y
+        plate = plate.union(polygon(moved))
+    result = imported(tmp_path, plate)
+    mechanism = result.mechanism
+    kinds = [mechanism.type_of(flexure) for flexure in mechanism.flexures]
+    values = mechanism.values()
+    assert len({values[f"{kind.name}.curvature"] for kind in kinds}) == 1
+    assert [mirror.axis for mirror in result.draft.lines] == ["x"] * len(result.draft.lines)

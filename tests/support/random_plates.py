@@ -221,7 +221,7 @@ def circles(known: Mechanism) -> Iterator[tuple[complex, float]]:
 
 
 def pieces(drawn: Outline, known: Mechanism) -> Iterator[tuple[np.ndarray, complex | None]]:
-    """Yield the lines and arcs of an outline: two ends and an inner point, and the centre of an arc."""
+    """Yield the two ends and an inner point of lines and arcs, with the centre of an arc."""
     found = [*circles(known)]
     for part in shapely.get_parts(drawn.plate):
         for ring in (part.exterior, *part.interiors):

@@ -22,6 +22,7 @@ CURVE_RTOL = 0.02  # Largest distance of a curved line from the fitted one, over
 ROUND_RTOL = 0.01  # Difference of the half axes of a circular notch.
 WAIST_MIN = 0.05  # Length of the waist of a filleted leaf over the length of its fillets.
 BETTER = 0.3  # Distance over that of a simpler shape, from which another one is chosen.
+UPRIGHT = 12.0  # Change of the thickness over that of the position, above which walls are upright.
 CUT_SHARE = 0.2  # Missing share of the depth of full arcs, above which a notch ends before them.
 
 
@@ -82,8 +83,8 @@ class Section:
         return self.origin + s * self.along
 
 
-def shape_of(walls: Walls, trace: Trace, noise: float) -> Shape:
-    """Return the kind and the dimensions of a thin part.
+def shape_of(walls: Walls, trace: Trace, noise: float) -> Shape | None:
+    """Return the kind and the dimensions of a thin part; None if its walls are not opposite.
 
     Parameters
     ----------
@@ -98,6 +99,8 @@ def shape_of(walls: Walls, trace: Trace, noise: float) -> Shape:
     if bow > max(BOW_RTOL * trace.thinnest, BOW_SHARE * trace.length, 2.0 * noise):
         return _curved(trace, bow, noise)
     section = _section(walls, trace)
+    if not (len(section.s) > 1 and section.width.min() > 0.0):
+        return None
     tolerance = max(UNIFORM_RTOL * trace.thinnest, 2.0 * noise)
     if np.ptp(section.width) <= tolerance:
         thickness = _mean(section.s, section.width)
@@ -197,7 +200,7 @@ def _fitted(
     noise: float,
 ) -> tuple[float, Shape] | None:
     """Return the largest distance from arcs and the shape; None if it is too far from them."""
-    s, width, length = section.s, section.width, section.length
+    s, width, length = *_not_upright(section), section.length
     thickness, depth = depths
     half = 0.5 * (waist[1] - waist[0]) if waisted else 0.0
     centre = 0.5 * (waist[0] + waist[1])
@@ -234,6 +237,19 @@ def _fitted(
     if waisted and ell < WAIST_MIN * (length - ell):
         return None
     return error, _notch_shape(section, t, c, (a, b), ell, error)
+
+
+def _not_upright(section: Section) -> tuple[Real, Real]:
+    """Return positions and thickness without both ends where walls are nearly across the axis."""
+    s, width = section.s, section.width
+    upright = np.abs(np.diff(width)) > UPRIGHT * np.diff(s)
+    middle = int(np.argmin(width))
+    first = np.flatnonzero(upright[:middle])
+    last = np.flatnonzero(upright[middle:])
+    kept = slice(
+        int(first[-1]) + 1 if len(first) else 0, middle + int(last[0]) + 1 if len(last) else len(s)
+    )
+    return s[kept], width[kept]
 
 
 def _notch_shape(

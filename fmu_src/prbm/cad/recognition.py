@@ -126,6 +126,8 @@ def _candidates(
         if trace.length < 0.5 * trace.thinnest:
             continue
         shape = shape_of(walls, trace, noise)
+        if shape is None:
+            continue
         long = trace.length >= SLENDER_MIN * trace.thinnest
         if long or _is_notch(shape, trace):
             left, right = trace.edges(walls)

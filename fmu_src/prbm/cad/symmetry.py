@@ -97,8 +97,18 @@ def _image(found: Recognised, mirror: Mirror, one: Found) -> int | None:
     for j, other in enumerate(found.flexures):
         pair = (other.shape.start, other.shape.end)
         if all(min(abs(z - end) for end in pair) <= near for z in ends):
-            return j if alike(one, other, found.noise) else None
+            mirrored = alike(one, other, found.noise) and _curved_as_image(mirror, one, other)
+            return j if mirrored else None
     return None
+
+
+def _curved_as_image(mirror: Mirror, one: Found, other: Found) -> bool:
+    """Return whether a flexure is curved as the mirror image of another one is."""
+    start = mirror.image(one.shape.start)
+    turned = abs(start - other.shape.start) > abs(start - other.shape.end)
+    signs = {"curvature": 1.0 if turned else -1.0, "rise": -1.0}  # A rise has no direction.
+    a, b = one.shape.dimensions, other.shape.dimensions
+    return all(sign * a[key] * b[key] > 0.0 for key, sign in signs.items() if key in a)
 
 
 def _map_bodies(found: Recognised, mirror: Mirror, one: Found, other: Found) -> bool:

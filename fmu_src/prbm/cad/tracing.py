@@ -20,6 +20,7 @@ STEP_MAX = 20.0  # Largest step over the thickness.
 STEP_MIN = 2e-4  # Smallest step over the thickness: the resolution of an end.
 SMOOTH = 0.1  # Largest change of a wall's advance over a step, for steps of a thickness and more.
 WALL_MAX = 4.0  # Largest advance of a wall over a step, unless the step is the smallest.
+STEEP_WALL = 0.1  # Largest advance of a steep wall in a step, over the thickness.
 CORNER = 40.0  # Largest advance of a wall over the smallest step; more is a corner.
 KINK = math.cos(math.radians(30.0))  # Of the largest turn of a smooth wall in a step.
 STEEP = 0.35  # Change of the thickness over a step, from which the line continues straight.
@@ -236,7 +237,7 @@ class Tracer:
         step = FIRST_STEP * width
         for _ in range(STEPS_MAX):
             smallest = step <= STEP_MIN * thinnest
-            found = self._step(half, step, thinnest, smallest=smallest)
+            found = self._step(half, step, thinnest, smallest=smallest, steep=steep)
             if found is None:
                 if not smallest:
                     step *= 0.5
@@ -278,7 +279,7 @@ class Tracer:
         return along if (np.conj(along) * first).real > LINED else half.tangent
 
     def _step(
-        self, half: Half, step: float, thinnest: float, *, smallest: bool
+        self, half: Half, step: float, thinnest: float, *, smallest: bool, steep: bool
     ) -> tuple[complex, Hit, Hit] | None:
         """Return the next point and where its walls are met; None if a wall is not smooth."""
         z = half.z[-1] + step * half.tangent
@@ -298,7 +299,10 @@ class Tracer:
             limits = 1.0 - SMOOTH, 1.0 + SMOOTH
         else:
             limits = 0.0, WALL_MAX
-        smooth = all(limits[0] * step <= x <= limits[1] * step for x in advances)
+        most = limits[1] * step
+        if steep:
+            most = max(most, STEEP_WALL * thinnest)
+        smooth = all(limits[0] * step <= x <= most for x in advances)
         smooth = smooth and not any(map(self._kinked, (half.left[-1], half.right[-1]), pair))
         slow = smallest or abs(new - half.width[-1]) <= WIDTH_CHANGE_MAX * half.width[-1]
         return (z, left, right) if smooth and slow else None
