@@ -9,6 +9,7 @@ from drawn_plates import (
     disc,
     filleted,
     framed_stage,
+    notch_guide,
     notched,
     polygon,
     strip,
@@ -157,3 +158,11 @@ def test_leaves_curved_to_the_same_side_are_no_mirror_images(tmp_path):
     values = mechanism.values()
     assert len({values[f"{kind.name}.curvature"] for kind in kinds}) == 1
     assert [mirror.axis for mirror in result.draft.lines] == ["x"] * len(result.draft.lines)
+
+
+def test_the_leg_between_two_notches_is_a_body(tmp_path):
+    """The notches end with upright walls, a corner of the leg: it becomes thinner there."""
+    result = imported(tmp_path, notch_guide())
+    assert [body.name for body in result.mechanism.bodies] == ["stage", "left_bar", "right_bar"]
+    assert {one.shape.profile for one in result.draft.found.flexures} == {"notch"}
+    assert not result.draft.found.doubts

@@ -80,3 +80,29 @@ def write(path: Path, plate: Geometry, version: str = "R2010", unit: int = 4) ->
             space.add_polyline2d(list(ring.coords)[:-1], close=True)
     document.saveas(path)
     return path
+
+
+def filleted_stage() -> Geometry:
+    """Return the framed stage with fillets of 0.6 mm at the ends of its leaves, in mm."""
+    plate = framed_stage(0.4)
+    for x in (32, 68):
+        for y, into in ((0, 1), (30, -1), (50, 1), (80, -1)):
+            for side in (-1, 1):
+                edge = x + side * 0.2
+                corner = box(edge, y, edge + side * 0.6, y + into * 0.6)
+                centre = complex(edge + side * 0.6, y + into * 0.6)
+                plate = plate.union(corner.difference(disc(centre, 0.6)))
+    return plate
+
+
+def notch_guide(waist: float = 1.0) -> Geometry:
+    """Return a stage on two legs with notches of the radius 4 mm, in mm."""
+    plate = box(-20, -20, 80, -5).union(box(-8, 65, 68, 80))
+    for x in (0, 60):
+        half = 4 + waist / 2
+        leg = box(x - half, -5, x + half, 65)
+        for y in (0, 60):
+            for side in (-1, 1):
+                leg = leg.difference(disc(complex(x + side * half, y), 4))
+        plate = plate.union(leg)
+    return plate

@@ -26,6 +26,7 @@ KINK = math.cos(math.radians(30.0))  # Of the largest turn of a smooth wall in a
 STEEP = 0.35  # Change of the thickness over a step, from which the line continues straight.
 FLAT = 0.1  # Change below which a part is uniform again after a steep one.
 WIDTH_CHANGE_MAX = 0.1  # Largest change of the thickness in a step, as a share.
+BEYOND = 0.01  # Where the width beyond an end is measured, over the thickness.
 LATE_MAX = 2.0  # Farthest end of the second wall behind that of the first, over the thickness.
 STEPS_MAX = 20_000  # Steps of a trace in one direction.
 CENTRINGS = 4  # Iterations that place the first chord across the walls.
@@ -321,6 +322,10 @@ class Tracer:
         pair = self._across(half.z[-1] + step * half.tangent, half.tangent)
         half.end = End.CORNER if pair is not None else End.TIP
         if pair is None:
+            return
+        beyond = self._across(half.z[-1] + BEYOND * min(half.width) * half.tangent, half.tangent)
+        if beyond is not None and sum(hit.distance for hit in beyond) < half.width[-1]:
+            half.end = End.NARROWS
             return
         left, right = pair
         goes_on = (
