@@ -1,6 +1,7 @@
 """The curves of a DXF file."""
 
 import io
+import logging
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -82,6 +83,7 @@ def _document(path: Path, content: bytes) -> Any:
     """Return the document of a file, repaired if needed."""
     import ezdxf.recover  # imported here because the import takes 0.3 s
 
+    logging.getLogger("ezdxf").setLevel(logging.CRITICAL)  # Repairs of the file.
     try:
         return ezdxf.recover.read(io.BytesIO(content))[0]
     except Exception as error:  # Among them DXFError, ValueError, IndexError, RecursionError.
@@ -165,6 +167,8 @@ class _Reader:
                 f"{self.curves.source}: a block has {entity.mcount} copies in an array; the limit "
                 f"is {COPIES_MAX}"
             )
+        if entity.dxf.get("zscale", 1.0) == 0.0:  # Flat blocks, which ezdxf cannot place.
+            entity.dxf.zscale = 1.0
         for one in entity.multi_insert() if entity.mcount > 1 else [entity]:
             self.read(one.virtual_entities(), depth + 1, layer)
 

@@ -15,7 +15,7 @@ from ..mechanism.flexure import NOTCH
 from .curves import DrawingError
 from .plates import Plate
 from .profiles import Shape, shape_of
-from .tracing import End, Trace, Tracer
+from .tracing import STEPS_TOTAL_MAX, End, Trace, Tracer
 from .walls import Walls
 
 LONGEST_SHARE = 0.25  # Largest thickness of a flexure, as a share of the diagonal.
@@ -28,7 +28,6 @@ COMPLIANCE_MIN = 1e-4  # Least compliance of a flexure over that of the most com
 DEPTHS = np.linspace(0.2, 4.0, 20)  # Where the width behind an end is measured, over thickness.
 CUT_RTOL = 1e-6  # Overlap of a cut with the bodies, as a share of the size.
 DUST_SHARE = 0.02  # Pieces with a smaller area over the square of the thickness are no bodies.
-PARTS_MAX = 2000  # Thin parts that are examined.
 
 
 @dataclass(frozen=True)
@@ -117,10 +116,8 @@ def _candidates(
     """Return the thin parts with their shapes, the thinnest first."""
     longest = LONGEST_SHARE * walls.size if thickest is None else thickest
     found: list[Found] = []
-    for count, trace in enumerate(Tracer(walls).parts(longest)):
-        if count >= PARTS_MAX:
-            doubts.append((0j, f"more than {PARTS_MAX} thin parts: the thickest were not examined"))
-            break
+    tracer = Tracer(walls)
+    for trace in tracer.parts(longest):
         if any(end not in (End.CORNER, End.THICK) for end in trace.ends):
             continue
         if trace.length < 0.5 * trace.thinnest:
@@ -133,6 +130,8 @@ def _candidates(
             left, right = trace.edges(walls)
             band = shapely.Polygon([(z.real, z.imag) for z in (*left, *right[::-1])])
             found.append(Found(shape, trace, band))
+    if tracer.steps > STEPS_TOTAL_MAX:
+        doubts.append((complex(walls.a[0]), "an intricate outline: thick parts were not examined"))
     return found
 
 

@@ -28,7 +28,8 @@ FLAT = 0.1  # Change below which a part is uniform again after a steep one.
 WIDTH_CHANGE_MAX = 0.1  # Largest change of the thickness in a step, as a share.
 BEYOND = 0.01  # Where the width beyond an end is measured, over the thickness.
 LATE_MAX = 2.0  # Farthest end of the second wall behind that of the first, over the thickness.
-STEPS_MAX = 20_000  # Steps of a trace in one direction.
+STEPS_MAX = 4000  # Steps of a trace in one direction,
+STEPS_TOTAL_MAX = 150_000  # and of all traces of a plate.
 CENTRINGS = 4  # Iterations that place the first chord across the walls.
 CHORD_ANGLE = math.radians(3.0)  # Between the chords that are compared.
 LINED = math.cos(math.radians(5.0))  # Of the largest turn of a line that counts as straight.
@@ -140,6 +141,8 @@ class Tracer:
 
     def __init__(self, walls: Walls) -> None:
         self.walls = walls
+        self.steps = 0  # Of all traces.
+        self._reach = 0.1 * walls.size
         self.taken: dict[int, list[tuple[float, float]]] = {}
 
     def parts(self, longest: float) -> Iterator[Trace]:
@@ -152,8 +155,11 @@ class Tracer:
         """
         chords = self.walls.chords(longest)
         for k in range(len(chords.z)):
+            if self.steps > STEPS_TOTAL_MAX:
+                return
             if self.is_taken(int(chords.ring[k]), float(chords.place[k])):
                 continue
+            self._reach = 4.0 * float(chords.length[k])
             middle = complex(chords.z[k] + 0.5 * chords.length[k] * chords.normal[k])
             trace = self.trace(middle, complex(-1j * chords.normal[k]))
             if trace is not None:
@@ -219,8 +225,8 @@ class Tracer:
 
     def _across(self, z: complex, tangent: complex) -> tuple[Hit, Hit] | None:
         """Return where the walls on the left and on the right are met."""
-        left = self.walls.hit(z, 1j * tangent)
-        right = self.walls.hit(z, -1j * tangent)
+        left = self.walls.hit(z, 1j * tangent, self._reach)
+        right = self.walls.hit(z, -1j * tangent, self._reach)
         return None if left is None or right is None else (left, right)
 
     def _along(self, left: Hit, right: Hit, tangent: complex) -> complex:
@@ -237,6 +243,7 @@ class Tracer:
         thinnest, steep = width, False
         step = FIRST_STEP * width
         for _ in range(STEPS_MAX):
+            self.steps += 1
             smallest = step <= STEP_MIN * thinnest
             found = self._step(half, step, thinnest, smallest=smallest, steep=steep)
             if found is None:
@@ -341,7 +348,7 @@ class Tracer:
         before = half.left[-1] if left else half.right[-1]
         step, reach, limit = 0.05 * half.width[-1], 0.0, LATE_MAX * half.width[-1]
         while reach < limit and step > STEP_MIN * half.width[-1]:
-            after = self.walls.hit(half.z[-1] + (reach + step) * half.tangent, turn)
+            after = self.walls.hit(half.z[-1] + (reach + step) * half.tangent, turn, self._reach)
             if after is None:
                 return 0.0
             advance = abs(self.walls.advance(before, after))

@@ -1,14 +1,17 @@
 """The walls of a plate: its sides, with the material on their left, and chords across it."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from ..mechanics.arrays import Complex, Real
 
 ANTIPARALLEL_MAX = -0.5  # Largest scalar product of the normals of two opposite walls.
+SIDES_MAX = 1000  # Sides that are searched without a tree.
 SAMPLES_PER_SIZE = 60  # Samples of walls along the diagonal of the plate.
 
 
@@ -56,22 +59,51 @@ class Walls:
         low, high = (complex(*shape.bounds[k : k + 2]) for k in (0, 2))
         self.size = abs(high - low)
 
-    def hit(self, z: complex, direction: complex) -> Hit | None:
-        """Return the first wall that a ray from inside the material meets; None from outside."""
-        step = self.b - self.a
+    @cached_property
+    def _tree(self) -> shapely.STRtree:
+        """The sides by their places."""
+        lines: Any = shapely.linestrings(np.stack([_pairs(self.a), _pairs(self.b)], axis=1))
+        return shapely.STRtree(lines)
+
+    def hit(self, z: complex, direction: complex, reach: float) -> Hit | None:
+        """Return the first wall that a ray from inside the material meets; None from outside.
+
+        Parameters
+        ----------
+        z, direction : complex
+            Start of the ray [m] and its unit vector.
+        reach : float
+            A length in which a wall is expected [m]; other walls are found later.
+        """
+        if len(self.a) <= SIDES_MAX:
+            return self._first(z, direction, np.arange(len(self.a)))
+        for length in (reach, 2.0 * self.size):
+            end = z + length * direction
+            box = shapely.box(
+                min(z.real, end.real), min(z.imag, end.imag),
+                max(z.real, end.real), max(z.imag, end.imag),
+            )  # fmt: skip
+            found = self._first(z, direction, np.sort(self._tree.query(box)))
+            if found is not None and found.distance <= length:
+                return found
+        return None
+
+    def _first(self, z: complex, direction: complex, sides: NDArray[np.int64]) -> Hit | None:
+        """Return the first of some sides that a ray meets; None from outside the material."""
+        a, step = self.a[sides], self.b[sides] - self.a[sides]
         across = (np.conj(direction) * step).imag
         with np.errstate(divide="ignore", invalid="ignore"):
-            reach = self.a - z
-            t = (np.conj(reach) * step).imag / across
-            share = (np.conj(reach) * direction).imag / across
+            before = a - z
+            t = (np.conj(before) * step).imag / across
+            share = (np.conj(before) * direction).imag / across
         valid = (t > 0.0) & (share >= 0.0) & (share <= 1.0)
         if not valid.any():
             return None
-        t = np.where(valid, t, np.inf)
-        k = int(np.argmin(t))
+        i = int(np.argmin(np.where(valid, t, np.inf)))
+        k = int(sides[i])
         if (np.conj(direction) * self.normal[k]).real >= 0.0:  # From outside the material.
             return None
-        return Hit(float(t[k]), k, float(self.start[k] + share[k] * self.length[k]))
+        return Hit(float(t[i]), k, float(self.start[k] + share[i] * self.length[k]))
 
     def advance(self, before: Hit, after: Hit) -> float:
         """Return the distance along a wall from one hit to another [m], infinite between rings."""
@@ -96,8 +128,7 @@ class Walls:
         z = self.a[side] + share * (self.b[side] - self.a[side])
         normal = self.normal[side]
         rays = shapely.linestrings(np.stack([_pairs(z), _pairs(z + longest * normal)], axis=1))
-        lines: Any = shapely.linestrings(np.stack([_pairs(self.a), _pairs(self.b)], axis=1))
-        ray, other = shapely.STRtree(lines).query(rays, predicate="intersects")
+        ray, other = self._tree.query(rays, predicate="intersects")
         apart = other != side[ray]
         ray, other = ray[apart], other[apart]
         step = self.b[other] - self.a[other]
