@@ -261,6 +261,7 @@ class _Writer:
         if stop.on >= 0:
             yield f'on = "{self.draft.names[stop.on]}"'
         direction = roundest(degrees, COPLANAR_DEGREES)
+        direction = 180.0 if direction == -180.0 else direction
         if direction:
             yield f"direction = {plain(direction)}"
         yield f"position = {self.unit.text(stop.gap)}  # the gap as drawn"
