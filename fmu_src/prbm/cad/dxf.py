@@ -3,6 +3,7 @@
 import io
 import logging
 import math
+import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -29,6 +30,7 @@ UNITS = {  # Length of a unit [m] by $INSUNITS.
     1: 0.0254, 2: 0.3048, 3: 1609.344, 4: 1e-3, 5: 1e-2, 6: 1.0, 7: 1e3, 8: 2.54e-8, 9: 2.54e-5,
     10: 0.9144, 11: 1e-10, 12: 1e-9, 13: 1e-6, 14: 0.1,
 }  # fmt: skip
+DWG = re.compile(rb"AC1\d{3}")  # Beginning of a DWG file.
 COPIES_MAX = 1000  # Copies of a block in one array.
 SPLINE_SEGMENTS_MIN = 8  # Of each part of a spline between two knots.
 
@@ -81,16 +83,16 @@ def read_dxf(path: Path, unit: float | None, tolerance: float | None) -> Curves:
 
 def _document(path: Path, content: bytes) -> Any:
     """Return the document of a file, repaired if needed."""
+    if DWG.match(content):
+        raise DrawingError(f"{path}: it is a DWG file; export the drawing as DXF")
     import ezdxf.recover  # imported here because the import takes 0.3 s
 
     logging.getLogger("ezdxf").setLevel(logging.CRITICAL)  # Repairs of the file.
     try:
         return ezdxf.recover.read(io.BytesIO(content))[0]
     except Exception as error:  # Among them DXFError, ValueError, IndexError, RecursionError.
-        dwg = content[:2] == b"AC"
-        reason = "it is a DWG file" if dwg else f"{type(error).__name__}: {error}"
         raise DrawingError(
-            f"{path}: not a DXF file ({reason}); export the drawing as DXF"
+            f"{path}: not a DXF file ({type(error).__name__}: {error}); export the drawing as DXF"
         ) from None
 
 
