@@ -9,19 +9,13 @@ import numpy as np
 import pytest
 import shapely
 
-from drawn_plates import filleted_stage, framed_stage, write
+from drawn_plates import filleted_stage, framed_stage, rings, svg, write
 from prbm.cad import curves, dxf
 from prbm.cad.curves import DrawingError
 from prbm.cad.importing import Options, import_drawing
 from prbm.cad.numbers import plain, roundest
 
 OPTIONS = Options(8e-3)
-
-
-def rings(plate):
-    for part in shapely.get_parts(plate):
-        for ring in (part.exterior, *part.interiors):
-            yield [(float(x), float(y)) for x, y in ring.coords]
 
 
 def drawing(tmp_path, change, plate=None, **options):
@@ -153,15 +147,6 @@ def test_parts_that_nothing_holds_are_left_out_and_reported(tmp_path):
 
 
 # --- SVG ------------------------------------------------------------------------------------------
-
-
-def svg(plate, head: str, wrap: str = "{}") -> str:
-    """Return the text of an SVG file with a plate, y downwards."""
-    paths = "".join(
-        f'<path d="M {" L ".join(f"{x:.6f},{-y:.6f}" for x, y in ring[:-1])} Z"/>'
-        for ring in rings(plate)
-    )
-    return f'<svg xmlns="http://www.w3.org/2000/svg" {head}>{wrap.format(paths)}</svg>'
 
 
 @pytest.mark.parametrize(

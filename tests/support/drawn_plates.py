@@ -1,6 +1,6 @@
 """Outlines of plates with known mechanisms, and their drawings."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import ezdxf
@@ -106,3 +106,19 @@ def notch_guide(waist: float = 1.0) -> Geometry:
                 leg = leg.difference(disc(complex(x + side * half, y), 4))
         plate = plate.union(leg)
     return plate
+
+
+def rings(plate: Geometry) -> Iterator[list[tuple[float, float]]]:
+    """Yield the corners of all rings of a plate, the first one again at the end."""
+    for part in shapely.get_parts(plate):
+        for ring in (part.exterior, *part.interiors):
+            yield [(float(x), float(y)) for x, y in ring.coords]
+
+
+def svg(plate: Geometry, head: str, wrap: str = "{}") -> str:
+    """Return the text of an SVG file with a plate, y downwards."""
+    paths = "".join(
+        f'<path d="M {" L ".join(f"{x:.6f},{-y:.6f}" for x, y in ring[:-1])} Z"/>'
+        for ring in rings(plate)
+    )
+    return f'<svg xmlns="http://www.w3.org/2000/svg" {head}>{wrap.format(paths)}</svg>'

@@ -86,12 +86,12 @@ class Curves:
         DrawingError
             If a coordinate is not a number or too large, or the points are too many.
         """
-        z = np.asarray(z * self.unit, complex)
-        if not np.all(np.abs(z) <= COORDINATE_MAX):  # false for NaN, too
+        if not np.all(np.abs(z) <= COORDINATE_MAX / self.unit):  # false for NaN, too
             raise DrawingError(
                 f"{self.source}: a coordinate on the layer {layer!r} is not a number or farther "
                 f"than {COORDINATE_MAX:g} m from the origin; check the unit, or move the drawing"
             )
+        z = np.asarray(z * self.unit, complex)
         self.points += len(z)
         if self.points > POINTS_MAX:
             raise DrawingError(

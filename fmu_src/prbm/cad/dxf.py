@@ -192,8 +192,8 @@ def joined(sides: Sequence[Complex]) -> Complex:
     >>> joined([np.array([1.0, 0.0]), np.array([1.0, 2.0])]).real.tolist()
     [0.0, 1.0, 2.0]
     """
-    if not sides:
-        return np.zeros(0, complex)
+    if not sides or not np.isfinite(np.concatenate(sides)).all():  # Curves rejects NaN later.
+        return np.concatenate([np.zeros(0, complex), *sides])
     first = sides[0]
     if len(sides) > 1:
         start, end = (float(np.abs(sides[1][[0, -1]] - z).min()) for z in (first[0], first[-1]))
