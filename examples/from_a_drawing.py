@@ -13,7 +13,6 @@ import ezdxf
 import numpy as np
 
 import prbm
-from prbm.base.atomic import write
 from prbm.cad.importing import Imported, Options, fundamental, import_drawing
 from prbm.plots.drawing_check import check_picture
 
@@ -59,8 +58,8 @@ def draw(path: str = "stage.dxf") -> None:
 def imported(path: str = "stage.dxf") -> Imported:
     """Return the imported drawing; write its file and its picture."""
     result = import_drawing(path, Options(1e-3 * DEPTH, "steel", ground_drawn=[-5 - 5j]))
-    write("stage.toml", result.text.encode())
-    write("stage.png", check_picture(result))
+    Path("stage.toml").write_text(result.text, encoding="utf-8")
+    Path("stage.png").write_bytes(check_picture(result))
     return result
 
 

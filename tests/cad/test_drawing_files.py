@@ -278,3 +278,11 @@ def test_the_name_of_a_drawing_may_have_any_letters(tmp_path):
     path = write(tmp_path / "plate.dxf", framed_stage())
     other = shutil.copy(path, tmp_path / '3 "plätze" {v2}.dxf')
     assert import_drawing(other, OPTIONS).mechanism.name.isidentifier()
+
+
+def test_a_drawing_of_two_plates_is_refused(tmp_path):
+    def second(document, space):
+        space.add_circle((50, 40), 100, dxfattribs={"layer": "plate 2"})
+
+    with pytest.raises(ValueError, match="layers of a second plate, which are not supported"):
+        drawing(tmp_path, second)

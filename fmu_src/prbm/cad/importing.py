@@ -126,6 +126,11 @@ def import_drawing(path: str | Path, options: Options) -> Imported:
     outlines = curves.plates()
     if not outlines:
         raise DrawingError(f"{path}: there are no lines or curves; {_skipped(curves)}")
+    if len(outlines) > 1:
+        raise DrawingError(
+            f"{path}: it has layers of a second plate, which are not supported: import each plate "
+            "alone, and join the bodies in the mechanism file"
+        )
     noise = options.tolerance or NOISE_RTOL * diagonal([c for group in outlines for c in group])
     cut = plate(outlines[0], options.gap)
     found = recognised(cut, noise, options.flexures_below)
