@@ -121,7 +121,7 @@ class _Writer:
         if shape.profile != LEAF:
             yield f'profile = "{shape.profile}"'
         for key, value in self.rounded(kind).items():
-            comment = f"  # {_sure(worst, shape.equivalent)}" if key == "thickness" else ""
+            comment = f"  # {certainty(worst, shape.equivalent)}" if key == "thickness" else ""
             yield f"{key} = {self._dimension(key, value)}{comment}"
         yield f"width = {self.unit.text(self.heading.thickness, 0.0)}"
         yield f'material = "{self.heading.material.name}"'
@@ -276,7 +276,7 @@ def _corners(ring: shapely.LinearRing) -> list[complex]:
     return [complex(corner) for corner in np.roll(z, -first)]
 
 
-def _sure(deviation: float, equivalent: bool) -> str:
+def certainty(deviation: float, equivalent: bool) -> str:
     """Return how well a shape fits, for a comment."""
     if equivalent:
         return (

@@ -8,6 +8,7 @@ from ..base.unit_text import frequency_text
 from ..cad.export import dxf
 from ..cad.importing import Imported, Options, fundamental, import_drawing
 from ..cad.outline import outline
+from ..cad.writing import certainty
 from ..files.mechanism_file import load
 from ..files.settings import UserMistake, optional_quantity, quantity, settings
 from ..plots.drawing_check import check_picture, flexure_names
@@ -50,7 +51,9 @@ def summary(result: Imported) -> list[str]:
     """Return sentences on what was recognised, assumed and not understood."""
     draft = result.draft
     found = draft.found
-    lines = [f"{len(draft.names)} moving bodies: {', '.join(draft.names.values())}"]
+    count = len(draft.names)
+    bodies = "1 moving body" if count == 1 else f"{count} moving bodies"
+    lines = [f"{bodies}: {', '.join(draft.names.values())}"]
     every = flexure_names(draft)
     for kind in draft.kinds:
         names = [
@@ -63,7 +66,7 @@ def summary(result: Imported) -> list[str]:
         lines.append(
             f"{kind.name}: {shape.profile}, thickness {1e3 * kind.dimensions['thickness']:.4g} mm, "
             f"length {1e3 * abs(shape.end - shape.start):.4g} mm: {', '.join(names)} "
-            f"({'doubtful' if shape.equivalent else 'within'} {100 * shape.deviation:.2g} %)"
+            f"({certainty(shape.deviation, shape.equivalent)})"
         )
     lines += [f"note: {note}" for note in result.notes]
     lines += [
