@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import shapely
 
-from drawn_plates import filleted_stage, framed_stage, rings, svg, write
+from drawn_plates import box, disc, filleted_stage, framed_stage, rings, strip, svg, write
 from prbm.cad import curves, dxf
 from prbm.cad.curves import DrawingError
 from prbm.cad.importing import Options, import_drawing
@@ -280,9 +280,22 @@ def test_the_name_of_a_drawing_may_have_any_letters(tmp_path):
     assert import_drawing(other, OPTIONS).mechanism.name.isidentifier()
 
 
-def test_a_drawing_of_two_plates_is_refused(tmp_path):
-    def second(document, space):
-        space.add_circle((50, 40), 100, dxfattribs={"layer": "plate 2"})
-
-    with pytest.raises(ValueError, match="layers of a second plate, which are not supported"):
-        drawing(tmp_path, second)
+def test_crossing_leaves_of_two_plates_are_bolted_to_the_same_bodies(tmp_path):
+    """A cross pivot: each plate has one leaf, and holes at the same places in both bodies."""
+    along = np.exp(1j * np.pi / 4)
+    holes = [disc(complex(x, y), 2) for x in (-25, 25) for y in (-30, 30)]
+    document = ezdxf.new("R2010", units=4)
+    for layer, turn in (("0", along), ("plate 2", along.conjugate())):
+        bars = box(-40, -40, 40, -20).union(box(-40, 20, 40, 40))
+        plate = bars.union(strip(turn * np.linspace(-30, 30, 10), 0.5))
+        for ring in rings(plate.difference(shapely.unary_union(holes))):
+            document.modelspace().add_lwpolyline(ring[:-1], close=True, dxfattribs={"layer": layer})
+    document.saveas(tmp_path / "plate.dxf")
+    result = import_drawing(tmp_path / "plate.dxf", Options(8e-3, ground=[-0.03j - 0.03]))
+    mechanism = result.mechanism
+    assert [body.name for body in mechanism.bodies] == ["stage"]
+    assert len(mechanism.flexures) == 2
+    ends = [one.shape.end - one.shape.start for one in result.draft.found.flexures]
+    assert sorted(np.degrees(np.angle(ends))) == pytest.approx([45.0, 135.0], abs=1e-3)
+    mass = 7850.0 * 8e-3 * 2 * (0.08 * 0.02 - 2 * np.pi * 0.002**2)
+    assert mechanism.bodies[0].mass == pytest.approx(mass, rel=2e-3)

@@ -151,7 +151,7 @@ def _reversed(one: Found) -> Found:
 # --- names --------------------------------------------------------------------------------------
 
 
-def _place(polygon: shapely.Polygon) -> complex:
+def _place(polygon: shapely.Polygon | shapely.MultiPolygon) -> complex:
     return complex(polygon.centroid.x, polygon.centroid.y)
 
 

@@ -14,6 +14,7 @@ from ..mechanics.assembly import assemble
 from ..mechanics.modal import modes
 from ..mechanics.statics import equilibrium
 from ..mechanism.description import Mechanism
+from .bolted import bolted
 from .curves import Curves, DrawingError, diagonal
 from .draft import Draft, draft
 from .dxf import read_dxf
@@ -126,19 +127,15 @@ def import_drawing(path: str | Path, options: Options) -> Imported:
     outlines = curves.plates()
     if not outlines:
         raise DrawingError(f"{path}: there are no lines or curves; {_skipped(curves)}")
-    if len(outlines) > 1:
-        raise DrawingError(
-            f"{path}: it has layers of a second plate, which are not supported: import each plate "
-            "alone, and join the bodies in the mechanism file"
-        )
     noise = options.tolerance or NOISE_RTOL * diagonal([c for group in outlines for c in group])
-    cut = plate(outlines[0], options.gap)
-    found = recognised(cut, noise, options.flexures_below)
-    found.doubts += [(z, "a free end of a line: not part of an outline") for z in cut.loose]
+    cut = [plate(group, options.gap) for group in outlines]
+    found = bolted([recognised(one, noise, options.flexures_below) for one in cut])
+    loose = "a free end of a line: not part of an outline"
+    found.doubts += [(z, loose) for z in found.plate.loose]
     drawn = [curves.unit * z for z in options.ground_drawn]
     find_ground(found, curves, [*options.ground, *drawn])
     stops = find_stops(found, curves)
-    notes = [*curves.notes, *cut.notes]
+    notes = [*curves.notes, *found.plate.notes]
     if curves.skipped:
         notes.append(_skipped(curves))
     heading = _heading(path, options, made_of)

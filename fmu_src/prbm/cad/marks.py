@@ -54,7 +54,7 @@ def find_ground(found: Recognised, curves: Curves, points: Sequence[complex]) ->
         If a point is outside all bodies, or all bodies are fixed.
     """
     for z in points:
-        found.ground.add(_body_at(found, z, "--ground"))
+        found.ground |= _bodies_at(found, z, "--ground")
     for curve in curves.on(GROUND):
         found.ground |= _marked(found, curve)
     if not found.ground:
@@ -66,18 +66,19 @@ def find_ground(found: Recognised, curves: Curves, points: Sequence[complex]) ->
         )
 
 
-def _body_at(found: Recognised, z: complex, user: str) -> int:
-    """Return the index of the body at a point."""
+def _bodies_at(found: Recognised, z: complex, user: str) -> set[int]:
+    """Return the indices of the bodies at a point, one in each plate."""
     point = shapely.Point(z.real, z.imag)
     distances = shapely.distance(found.bodies, point)
     k = int(np.argmin(distances))
     if distances[k] > TOUCHING_SHARE * _size(found):
-        near = found.bodies[k].representative_point()
+        body = found.bodies[k].representative_point()
         raise DrawingError(
             f"{user}: the point ({1e3 * z.real:g}, {1e3 * z.imag:g}) mm is on no body; the "
-            f"nearest body is at ({1e3 * near.x:.4g}, {1e3 * near.y:.4g}) mm"
+            f"nearest body is at ({1e3 * body.x:.4g}, {1e3 * body.y:.4g}) mm"
         )
-    return k
+    near = distances <= max(float(distances[k]), 1e-9 * _size(found))
+    return {int(i) for i in np.flatnonzero(near)}
 
 
 def _marked(found: Recognised, curve: Curve) -> set[int]:
@@ -161,7 +162,7 @@ def _stop(found: Recognised, curve: Curve, used: set[int]) -> FoundStop | None:
     body = others[0]
     along = curve.z[-1] - curve.z[0]
     normal = 1j * along / abs(along)
-    outline = np.array(found.bodies[body].exterior.coords)
+    outline = shapely.get_coordinates(found.bodies[body])
     corners = outline[:, 0] + 1j * outline[:, 1]
     reach = ((corners - curve.z[0]) * np.conj(normal)).real
     if abs(float(reach.max())) < abs(float(reach.min())):  # The body is on the negative side.

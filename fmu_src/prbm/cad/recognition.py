@@ -60,8 +60,8 @@ class Recognised:
     ----------
     plate : Plate
         The plate.
-    bodies : list of Polygon
-        The bodies, among them the ground [m].
+    bodies : list of Polygon or MultiPolygon
+        The bodies, among them the ground [m]; a body of several plates has several polygons.
     flexures : list of Found
         The flexures between them.
     ground : set of int
@@ -73,7 +73,7 @@ class Recognised:
     """
 
     plate: Plate
-    bodies: list[shapely.Polygon]
+    bodies: list[shapely.Polygon | shapely.MultiPolygon]
     flexures: list[Found]
     ground: set[int] = field(default_factory=set)
     doubts: list[tuple[complex, str]] = field(default_factory=list)
@@ -107,7 +107,7 @@ def recognised(plate: Plate, noise: float, thickest: float | None = None) -> Rec
             "the drawing, or give --flexures-below"
         )
     bodies, flexures = _divided(walls, plate.shape, chosen, doubts)
-    return Recognised(plate, bodies, flexures, doubts=doubts, noise=noise)
+    return Recognised(plate, [*bodies], flexures, doubts=doubts, noise=noise)
 
 
 def _candidates(

@@ -3,10 +3,13 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 import shapely
 
+from ..files.outlines import Area, polygon
+from ..files.units import number
 from ..mechanics.profile import Notch
 from ..mechanism.flexure import LEAF, NOTCH
 from .draft import Copied, Draft, Kind
@@ -210,24 +213,43 @@ class _Writer:
 
     def _body(self, copied: Copied) -> Iterator[str]:
         """Yield a body that is cut from the plate."""
-        polygon = self.draft.found.bodies[copied.index]
+        body = self.draft.found.bodies[copied.index]
+        parts = [p for p in shapely.get_parts(body) if isinstance(p, shapely.Polygon)]
         yield "[[bodies]]"
         yield f'name = "{copied.name}"'
-        outline, holes = self.rings(polygon)
+        if len(parts) > 1:
+            yield from self._bolted(parts)
+        outline, holes = self.rings(max(parts, key=lambda part: part.area))
         yield from self._ring("outline = ", outline, "")
         if holes:
             yield "holes = ["
             for hole in holes:
                 yield from self._ring("    ", hole, ",")
             yield "]"
-        yield f"thickness = {self.unit.text(self.heading.thickness, 0.0)}"
-        yield f'material = "{self.heading.material.name}"'
+        if len(parts) == 1:
+            yield f"thickness = {self.unit.text(self.heading.thickness, 0.0)}"
+            yield f'material = "{self.heading.material.name}"'
         yield from self._mirror(copied.mirrors)
         points = [*self._points({copied.index})]
         if points:
             yield ""
             yield "[bodies.points]"
             yield from points
+
+    def _bolted(self, parts: Sequence[shapely.Polygon]) -> Iterator[str]:
+        """Yield mass, inertia and centre of parts of several plates, with their outline drawn."""
+        areas = []
+        for part in parts:
+            rings = [polygon(_corners(ring)) for ring in (part.exterior, *part.interiors)]
+            holes = [Area(-hole.area, hole.centre, -hole.moment) for hole in rings[1:]]
+            areas.append(reduce(Area.plus, holes, rings[0]))
+        total = reduce(Area.plus, areas)
+        density = number(self.heading.material.density, "kg/m3")
+        per_area = density * self.heading.thickness
+        yield f"# {len(parts)} parts of several plates; their largest outline is drawn"
+        yield f'mass = "{1e3 * per_area * total.area:.6g} g"'
+        yield f'inertia = "{1e9 * per_area * total.moment:.6g} g.mm2"'
+        yield f"centre = {self.unit.point(total.centre)}"
 
     def rings(self, polygon: shapely.Polygon) -> tuple[list[complex], list[list[complex]]]:
         """Return outline and holes of a body with few corners [m]."""

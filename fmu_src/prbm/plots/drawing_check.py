@@ -96,12 +96,13 @@ class _Picture:
             if isinstance(part, shapely.Polygon):
                 self.patch(part, "#f2f2f2", 0.5)
         for k, body in enumerate(found.bodies):
-            if k in found.ground:
-                self.patch(body, FIXED, 1.0)
-                self.text(_inside(body), "ground", WALL)
-            elif k in self.draft.names:
-                self.patch(body, BODY, 1.0)
-                self.text(_inside(body), self.draft.names[k], LINK)
+            parts = [p for p in shapely.get_parts(body) if isinstance(p, shapely.Polygon)]
+            if k in found.ground or k in self.draft.names:
+                name = "ground" if k in found.ground else self.draft.names[k]
+                for part in parts:
+                    self.patch(part, FIXED if k in found.ground else BODY, 1.0)
+                place = _inside(max(parts, key=lambda part: part.area))
+                self.text(place, name, WALL if k in found.ground else LINK)
         self.axes.autoscale_view()
 
     def flexures(self) -> None:
