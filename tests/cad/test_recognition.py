@@ -122,6 +122,19 @@ def test_leaves_that_meet_in_a_small_hub_end_at_the_hub(tmp_path):
     expected = np.sqrt(29**2 - 0.25**2) - np.sqrt(1.5**2 - 0.25**2)
     for shape in shapes:
         assert length(shape) == pytest.approx(expected, rel=2e-3)
+    assert "repeat = { count = 3, angle = 120, about = [0, 0] }" in result.text
+    assert [flexure.name for flexure in result.mechanism.flexures] == ["leaf", "leaf_2", "leaf_3"]
+
+
+def test_equal_leaves_in_a_row_are_repeated(tmp_path):
+    """Four leaves with equal distances, inclined, so that there is no mirror line."""
+    plate = box(-20, -20, 60, 0).union(box(-10, 40, 70, 55))
+    for k in range(4):
+        along = (4 + 40j) / abs(4 + 40j)
+        plate = plate.union(strip(12 * k + along * np.linspace(-2, 44, 10), 0.5))
+    result = imported(tmp_path, plate)
+    assert 'repeat = { count = 4, step = ["12 mm", 0] }' in result.text
+    assert len(result.mechanism.flexures) == 4
 
 
 def test_a_raised_leaf_is_half_a_period_of_a_cosine(tmp_path):

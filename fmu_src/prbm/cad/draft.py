@@ -7,6 +7,7 @@ import shapely
 
 from ..mechanism.flexure import NOTCH, TAPER
 from .marks import FoundStop
+from .periodic import Row, rows
 from .profiles import Shape
 from .recognition import Found, Recognised
 from .symmetry import Mirror, alike, mirrors
@@ -41,11 +42,14 @@ class Copied:
         Its name.
     mirrors : tuple of Mirror
         The lines of its copies.
+    row : Row or None
+        Its copies in a row or on a circle.
     """
 
     index: int
     name: str
     mirrors: tuple[Mirror, ...] = ()
+    row: Row | None = None
 
 
 @dataclass
@@ -84,13 +88,16 @@ class Draft:
     @staticmethod
     def orbit(original: "Copied") -> set[int]:
         """Return the indices of a flexure and its copies."""
-        orbit = {original.index}
+        orbit = {original.index} if original.row is None else {*original.row.members}
         for mirror in original.mirrors:
             orbit |= {mirror.flexures[k] for k in orbit}
         return orbit
 
     def copy_name(self, original: "Copied", index: int) -> str:
         """Return the name of a flexure or of a copy of it."""
+        if original.row is not None:
+            number = original.row.members.index(index) + 1
+            return original.name if number == 1 else f"{original.name}_{number}"
         places = [
             0.5 * (one.shape.start + one.shape.end)
             for one in (self.found.flexures[original.index], self.found.flexures[index])
@@ -117,7 +124,7 @@ def draft(found: Recognised, stops: Sequence[FoundStop], *, symmetric: bool = Tr
     result = Draft(found, [*stops], mirrors(found) if symmetric else [])
     _orient(found)
     _name_bodies(result)
-    _name_flexures(result)
+    _name_flexures(result, rows(found) if symmetric and not result.lines else [])
     _sort_kinds(result)
     return result
 
@@ -241,11 +248,14 @@ def _numbered(wanted: Sequence[tuple[tuple[str, ...], str]]) -> list[str]:
     return names
 
 
-def _name_flexures(result: Draft) -> None:
+def _name_flexures(result: Draft, repeated: Sequence[Row]) -> None:
     """Name the flexures: by their side if there is one kind of place, with a number otherwise."""
     flexures = result.found.flexures
     places = {k: 0.5 * (one.shape.start + one.shape.end) for k, one in enumerate(flexures)}
-    orbits = _orbits(result, places, places, "flexures")
+    row_of = {row.members[0]: row for row in repeated}
+    copies = {k for row in repeated for k in row.members[1:]}
+    originals = [k for k in places if k not in copies]
+    orbits = _orbits(result, originals, places, "flexures")
     wanted = []
     for first, lines, _ in orbits:
         axes = {mirror.axis for mirror in lines}
@@ -259,7 +269,7 @@ def _name_flexures(result: Draft) -> None:
     unique = all(sides) and len({*sides}) == len(sides)
     names = sides if unique else _numbered(wanted)
     for (first, lines, _), name in zip(orbits, names, strict=True):
-        result.flexures.append(Copied(first, name, lines))
+        result.flexures.append(Copied(first, name, lines, row_of.get(first)))
 
 
 def noun(shape: Shape) -> str:

@@ -16,6 +16,7 @@ from .draft import Copied, Draft, Kind
 from .marks import FoundStop
 from .materials import Material
 from .numbers import Unit, plain, roundest
+from .periodic import Row
 from .recognition import Found
 from .symmetry import Mirror
 
@@ -157,6 +158,16 @@ class _Writer:
         yield f'start = "{start}"'
         yield f'end = "{end}"'
         yield from self._mirror(copied.mirrors)
+        if copied.row is not None:
+            yield f"repeat = {self._repeat(copied.row)}"
+
+    def _repeat(self, row: Row) -> str:
+        """Return equal parts in a row or on a circle."""
+        count = f"count = {len(row.members)}"
+        if row.step:
+            return f"{{ {count}, step = {self.unit.point(row.step)} }}"
+        angle = plain(roundest(row.angle, 1e-9))
+        return f"{{ {count}, angle = {angle}, about = {self.unit.point(row.about)} }}"
 
     def _reference(self, body: int, point: str) -> str:
         owner = "ground" if body in self.draft.found.ground else self.draft.names[body]
