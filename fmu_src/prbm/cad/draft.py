@@ -102,7 +102,10 @@ class Draft:
             0.5 * (one.shape.start + one.shape.end)
             for one in (self.found.flexures[original.index], self.found.flexures[index])
         ]
-        return _renamed(original.name, *(_side(self, z) for z in places))
+        name = _renamed(original.name, *(_side(self, z) for z in places))
+        if name == original.name and index != original.index:
+            name += f"_mirrored_{original.mirrors[0].axis}"
+        return name
 
     def kind_of(self, index: int) -> Kind:
         """Return the type of a flexure."""
