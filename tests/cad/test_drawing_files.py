@@ -155,7 +155,7 @@ def test_parts_that_nothing_holds_are_left_out_and_reported(tmp_path):
 )
 def test_an_svg_file_gives_the_mechanism_with_its_unit(tmp_path, head, scale):
     path = tmp_path / "plate.svg"
-    path.write_text(svg(filleted_stage(), head))
+    path.write_text(svg(filleted_stage(), head), encoding="utf-8")
     result = import_drawing(path, OPTIONS)
     assert len(result.mechanism.flexures) == 4
     assert thickness(result) == pytest.approx(0.4 * scale, rel=1e-3)
@@ -173,7 +173,7 @@ def test_transformations_shapes_and_layers_of_svg_files_are_read(tmp_path):
     )
     head = 'xmlns="http://www.w3.org/2000/svg" width="100mm" viewBox="0 0 100 100"'
     path = tmp_path / "plate.svg"
-    path.write_text(f"<svg {head}>{body}</svg>")
+    path.write_text(f"<svg {head}>{body}</svg>", encoding="utf-8")
     result = import_drawing(path, Options(8e-3, ground=[-0.09j]))
     (flexure,) = result.draft.found.flexures
     assert abs(flexure.shape.end - flexure.shape.start) == pytest.approx(0.04, rel=1e-3)

@@ -11,7 +11,9 @@ from drawn_plates import filleted_stage, framed_stage, notch_guide, write
 from exported_plates import frequencies
 from prbm.cad.importing import Options, import_drawing
 
-plane_stress = pytest.importorskip("plane_stress", reason="finite elements need scikit-fem, meshpy")
+plate_elements = pytest.importorskip(
+    "plate_elements", reason="finite elements need scikit-fem, meshpy"
+)
 
 E, DENSITY, POISSON = 200e9, 7850.0, 0.3  # steel
 PLATES = {  # Elements across the thinnest part, and the largest difference of the frequency.
@@ -33,6 +35,6 @@ def test_the_fundamental_frequency_is_that_of_plane_stress(name, tmp_path):
     thin = shapely.unary_union([one.band for one in found.flexures])
     ground = shapely.unary_union([found.bodies[k] for k in found.ground])
     fine = min(one.trace.thinnest for one in found.flexures) / divisions
-    grid = plane_stress.mesh(whole, thin, fine, 3e-3)
-    known = plane_stress.frequencies(grid, ground, E, DENSITY, POISSON)[0]
+    grid = plate_elements.mesh(whole, thin, fine, 3e-3)
+    known = plate_elements.frequencies(grid, ground, E, DENSITY, POISSON)[0]
     assert frequencies(result.mechanism)[0] == pytest.approx(known, rel=difference)

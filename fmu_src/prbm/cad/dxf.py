@@ -3,7 +3,6 @@
 import io
 import logging
 import math
-import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -30,7 +29,7 @@ UNITS = {  # Length of a unit [m] by $INSUNITS.
     1: 0.0254, 2: 0.3048, 3: 1609.344, 4: 1e-3, 5: 1e-2, 6: 1.0, 7: 1e3, 8: 2.54e-8, 9: 2.54e-5,
     10: 0.9144, 11: 1e-10, 12: 1e-9, 13: 1e-6, 14: 0.1,
 }  # fmt: skip
-DWG = re.compile(rb"AC1\d{3}")  # Beginning of a DWG file.
+DWG = b"AC10"  # Beginning of a DWG file.
 COPIES_MAX = 1000  # Copies of a block in one array.
 SPLINE_SEGMENTS_MIN = 8  # Of each part of a spline between two knots.
 
@@ -83,7 +82,7 @@ def read_dxf(path: Path, unit: float | None, tolerance: float | None) -> Curves:
 
 def _document(path: Path, content: bytes) -> Any:
     """Return the document of a file, repaired if needed."""
-    if DWG.match(content):
+    if content.startswith(DWG):
         raise DrawingError(f"{path}: it is a DWG file; export the drawing as DXF")
     import ezdxf.recover  # imported here because the import takes 0.3 s
 
