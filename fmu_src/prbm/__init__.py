@@ -14,6 +14,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .analysis.linear_model import linearize as linearize
     from .analysis.static_shape import equilibrium as equilibrium
     from .base.errors import EquilibriumError as EquilibriumError
     from .base.errors import MechanismError as MechanismError
@@ -43,6 +44,7 @@ __all__ = [
     "UnknownColumnError",
     "__version__",
     "equilibrium",
+    "linearize",
     "load",
     "read_drawing",
     "simulate",
@@ -62,6 +64,7 @@ _MODULES = {
     "UnknownColumnError": ("runs.result", "UnknownColumnError"),
     "__version__": ("base.version", "__version__"),
     "equilibrium": ("analysis.static_shape", "equilibrium"),
+    "linearize": ("analysis.linear_model", "linearize"),
     "load": ("files.mechanism_file", "load"),
     "read_drawing": ("cad.importing", "read_drawing"),
     "simulate": ("plots.shown", "simulate"),

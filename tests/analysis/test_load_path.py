@@ -5,8 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import ellipk
 
-from prbm.analysis.load_path import load_path
+from prbm.analysis.equilibria import rest_positions
+from prbm.analysis.load_path import CLOSED, load_path
 from prbm.base.errors import EquilibriumError
 from prbm.files.mechanism_file import load
 from prbm.mechanics.assembly import assemble
@@ -14,6 +16,7 @@ from prbm.mechanics.forces import elastic_energy
 from prbm.mechanics.statics import holding_stiffness
 from prbm.mechanism.parts import Force
 from prbm.plots.load_path import load_path_figure
+from random_mechanisms import seeded
 from support import ROOT, mechanism
 
 CASES = ROOT / "tests" / "cases"
@@ -115,10 +118,83 @@ def test_the_figure_shows_events_and_unstable_shapes():
     system = pushed(mechanism("CurvedBistable"), **{"gravity.y": 0.0})
     path = load_path(system, {}, {"push.y": -40.0})
     loads = np.array([-40.0 * point.share for point in path.points])
-    drawn = load_path_figure(path, amounts(system, path), loads, "push.y [N]", "Curved")
+    drawn = load_path_figure([path], [(amounts(system, path), loads)], "push.y [N]", "Curved")
     lines = {line.get_label(): line for line in drawn.axes[0].get_lines()}
     for kind in ("limit point", "bifurcation"):
         expected = [-40.0 * point.share for name, point in path.events if name == kind]
         np.testing.assert_array_equal(lines[kind].get_ydata(), expected)
     unstable = [point.unstable > 0 for point in path.points]
     np.testing.assert_array_equal(np.isnan(lines["stable"].get_ydata()), unstable)
+
+
+def test_the_branch_of_a_buckled_leaf_is_the_elastica():
+    """P / P_cr = (2 K(k) / pi)^2 with k = sin(alpha / 2) and the tip's rotation alpha."""
+    column = load(CASES / "column.toml")
+    leaf = tuple(replace(kind, order=7) for kind in column.flexure_types)
+    guide = replace(column, flexure_types=leaf)
+    system = pushed(guide, **{"gravity.y": 0.0})
+    critical = math.pi**2 * 200e9 * 20e-3 * 1e-3**3 / 12 / (4 * 0.3**2)
+    path = load_path(system, {}, {"push.y": -1.6 * critical}, branches=True)
+    (branch,) = path.branches  # The other one is its mirror image.
+    assert branch.ended is None
+    assert branch.points[0].share * 1.6 == pytest.approx(1.0, rel=1e-6)
+    tip = system.bodies["tip"].j
+    for point in branch.points[2:]:
+        alpha = abs(point.shape.q[tip] - system.q0[tip])
+        expected = (2 * ellipk(math.sin(alpha / 2) ** 2) / math.pi) ** 2
+        assert 1.6 * point.share == pytest.approx(expected, rel=1e-5)
+        assert point.unstable == 0
+    assert alpha > 1.5
+
+
+def test_a_bistable_mechanism_rests_again_where_the_load_has_gone():
+    """The path of CurvedBistable passes its rest positions; those of a held path are the same."""
+    system = pushed(mechanism("CurvedBistable"), **{"gravity.y": 0.0})
+    path = load_path(system, {}, {"push.y": -40.0}, branches=True)
+    rests = [(point, system.amount(point.shape.q)) for kind, point in path.events if kind == "rest"]
+    expected = rest_positions(system, np.linspace(3e-3, 6.5e-3, 8))
+    assert [place for _, place in rests] == pytest.approx([x.displacement for x in expected])
+    assert [point.unstable == 0 for point, _ in rests] == [x.stable for x in expected]
+    (snap,) = (x for x in path.branches if x.points[0].unstable == 0)
+    assert snap.ended == CLOSED
+    assert all(point.unstable for point in snap.points[1:])
+    largest = max(-40.0 * -point.share for point in snap.points)
+    assert largest == pytest.approx(17.37, abs=0.02)  # No shape of the branch carries more.
+
+
+@pytest.mark.parametrize("seed", [5, 12])
+def test_a_part_without_a_spring_of_its_own_does_not_end_the_path(seed):
+    """In these random mechanisms loops alone keep a part in place; its stiffness is round-off."""
+    guide = seeded(seed)
+    system = pushed(guide)
+    stiffness = system.K.diagonal()
+    force = 0.1 * float(np.median(stiffness[stiffness > 0.0])) / system.length
+    path = load_path(system, {}, {"push.x": force})
+    assert path.ended is None
+    assert path.points[-1].share == pytest.approx(1.0)
+
+
+@pytest.mark.slow
+def test_a_nearly_symmetric_double_beam_snaps_to_a_second_stable_position():
+    """One of four half beams of Qiu's double beam is thicker by 0.2 % (Qiu, Lang, Slocum, 2004).
+
+    The path follows the bifurcated branch of the symmetric mechanism.  It snaps below the force of
+    its bifurcation, 737.3 EI h/l^3 for each beam.  A second stable position exists.
+    """
+    double = load(CASES / "qiu10.toml")
+    kinds = tuple(replace(kind, order=5) for kind in double.flexure_types)
+    thick = 6e-6 * 1.002
+    odd = next(replace(k, name="odd", thickness=thick) for k in kinds if k.name == "left")
+    flexures = tuple(replace(f, type="odd") if f.name == "f1" else f for f in double.flexures)
+    system = pushed(replace(double, flexure_types=(*kinds, odd), flexures=flexures))
+    h, unit = 60e-6, 2 * 169e9 * 0.49e-3 * 6e-6**3 / 12 * 60e-6 / 3e-3**3
+    path = load_path(system, {}, {"push.y": -800 * unit}, step=0.02)
+    assert path.ended is None
+    found = [(kind, 800 * p.share, system.amount(p.shape.q) / h) for kind, p in path.events]
+    assert [kind for kind, *_ in found] == ["limit point", "rest", "limit point", "rest"]
+    snap, _, back, second = found
+    assert 730 < snap[1] < 737.3
+    assert back[1] < 0.0
+    assert 1.9 < second[2] < 2.0
+    rests = [point.unstable for kind, point in path.events if kind == "rest"]
+    assert rests == [1, 0]

@@ -70,6 +70,6 @@ def test_the_fundamental_mode_under_a_large_mass_is_not_missed():
 def test_a_model_that_requests_endless_updates_is_rejected(monkeypatch):
     model = Model.__new__(Model)
     model.time = 0.5
-    monkeypatch.setattr(Model, "call", lambda *_: (True,), raising=False)
+    monkeypatch.setattr(Model, "call", lambda *_: (True, *[False] * 4, 0.0), raising=False)
     with pytest.raises(CouplingError, match=r"at 0\.5 s the model requests more than 1000 updates"):
         model.update()

@@ -30,7 +30,7 @@ from support import ROOT, SUPPORT
 
 PAGE = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")
 COMMANDS = (
-    "list", "parameters", "modes", "equilibrium", "simulate", "stress", "shock", "fit",
+    "list", "parameters", "modes", "equilibrium", "linearize", "simulate", "stress", "shock", "fit",
     "impact-map", "contact", "sweep", "study", "import", "export", "picture", "animate", "explore",
     "modelica", "ssp", "validate", "measure youngs-modulus", "measure calibration",
     "measure frequency", "measure restitution", "completion",
@@ -215,6 +215,7 @@ def test_small_loads_on_a_loaded_body_have_its_compliance_and_stiffness(capsys):
         ("--at shuttle.top", "give both"),
         ("--stiffness shuttle --at shuttle.foo", "the load refers to the point 'shuttle.foo'"),
         ("--stiffness shuttle --at ground.upper_left", "ground.upper_left is no point of shuttle"),
+        ("--branches", "--branches are those of --vary"),
         ("--vary force.y=1", "give both ends of the range"),
         ("--vary force.y=1:1", "the ends of the range are equal"),
         ("--vary force.y=0:1 --held 1mm", "--vary excludes"),

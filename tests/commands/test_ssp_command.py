@@ -57,7 +57,7 @@ def test_rows_before_a_failure_are_written(tmp_path, capsys):
     options = ["--step", "100ms", "--stop-time", "1s", "--out", str(tmp_path)]
     assert main(["ssp", str(path), *options]) == 1
     captured = capsys.readouterr()
-    assert "sum: " in captured.err
+    assert "sum terminated the simulation at 0.5 s" in captured.err
     assert "simulated  0.5 s, 6 rows" in captured.out
     np.testing.assert_allclose(written(tmp_path)[1][:, 0], np.linspace(0.0, 0.5, 6), rtol=1e-12)
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from prbm import systems
 from prbm.fmu.start import interface
 from support import ROOT, built, mechanism
 
@@ -18,6 +19,16 @@ pytestmark = [pytest.mark.fmu, pytest.mark.native]
 def blocks() -> list[tuple[str, str]]:
     """Return the attribute of each code block, and its code."""
     return re.findall(r"```python ?(.*?)\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+
+
+def test_quoted_messages_of_the_table_are_those_of_the_package():
+    _, page = PAGE.read_text(encoding="utf-8").split("## Supported and refused", 1)
+    table, _ = page.split("## Partners", 1)
+    quoted = re.findall(r'"([^"]+)"', table)
+    assert len(quoted) > 10
+    texts = [path.read_text("utf-8") for path in sorted(Path(systems.__path__[0]).glob("*.py"))]
+    joined = re.sub(r'"\s*\n\s*f?"', "", "\n".join(texts))
+    assert [words for words in quoted if words not in joined] == []
 
 
 @pytest.fixture

@@ -1,5 +1,6 @@
 """Saving, restoring, serializing and resetting the state of a Python FMU."""
 
+import hashlib
 import json
 from ctypes import byref, c_void_p
 
@@ -10,6 +11,7 @@ from fmu_host import DISCARD, OK, Instance
 from support import around_first_impact, case, each_shipped
 
 STEP = 2.5e-3
+DIGEST = 32  # Bytes before the text of a serialized state.
 BEFORE = STEP * np.arange(17)  # The last time is 0.04 s; the first impact is at 0.041 s.
 AFTER = STEP * np.arange(16, 64)  # Six more impacts follow until 0.1575 s.
 
@@ -87,12 +89,13 @@ def test_an_incomplete_state_is_rejected_as_a_whole(fmus, lost):
     with Instance(fmus["PRBDM"]).initialize() as instance:
         instance.run(BEFORE)
         good = instance.fmu.getFMUState()
-        data = json.loads(instance.fmu.serializeFMUstate(good))
+        data = json.loads(instance.fmu.serializeFMUstate(good)[DIGEST:])
         instance.run(AFTER[:3])
         here = instance.values()
         *inside, key = lost.split()
         del (data[inside[0]] if inside else data)[key]
-        bad = instance.fmu.deSerializeFMUstate(json.dumps(data).encode())
+        text = json.dumps(data).encode()
+        bad = instance.fmu.deSerializeFMUstate(hashlib.sha256(text).digest() + text)
         instance.fmu.setFMUState(bad)
         assert any("is damaged" in m and key in m for m in instance.messages)
         assert instance.values() == here
@@ -100,6 +103,22 @@ def test_an_incomplete_state_is_rejected_as_a_whole(fmus, lost):
         instance.fmu.setFMUState(good)
         assert instance.step(BEFORE[-1], STEP) == OK
         instance.fmu.freeFMUState(bad)
+        instance.fmu.freeFMUState(good)
+
+
+def test_a_state_of_which_a_byte_has_changed_is_rejected(fmus):
+    with Instance(fmus["PRBDM"]).initialize() as instance:
+        instance.run(BEFORE)
+        good = instance.fmu.getFMUState()
+        data = instance.fmu.serializeFMUstate(good)
+        for place in range(0, len(data), len(data) // 50):
+            changed = bytes([*data[:place], data[place] ^ 1, *data[place + 1 :]])
+            bad = instance.fmu.deSerializeFMUstate(changed)
+            instance.fmu.setFMUState(bad)
+            assert instance.step(BEFORE[-1], STEP) == DISCARD, place
+            instance.fmu.freeFMUState(bad)
+        instance.fmu.setFMUState(good)
+        assert instance.step(BEFORE[-1], STEP) == OK
         instance.fmu.freeFMUState(good)
 
 

@@ -138,6 +138,16 @@ def test_states_derivatives_and_indicators_are_consistent(fmu, mechanisms):
     assert len(indicators) == 3 * len(guide.stops) + len(guide.frictions)
 
 
+def test_a_clock_is_an_output_but_no_initial_unknown(clocked):
+    """It cannot be read in Initialization Mode, and has no ``initial`` (FMI 3.0.2, 2.4.8)."""
+    description = read_model_description(str(clocked))
+    assert "stop.impact" in {u.variable.name for u in description.outputs}
+    initial = {u.variable.name for u in description.initialUnknowns}
+    assert "stop.impact" not in initial
+    outputs = {v.name for v in description.modelVariables if v.causality == "output"}
+    assert outputs - initial == {"stop.impact"}
+
+
 def test_parameters_are_knowns_in_fmi_3_but_not_in_fmi_2(fmu):
     """The two standards define ``dependencies`` differently."""
     description = read_model_description(str(fmu.path))

@@ -23,6 +23,7 @@ PUBLIC = [
     "UnknownColumnError",
     "__version__",
     "equilibrium",
+    "linearize",
     "load",
     "read_drawing",
     "simulate",

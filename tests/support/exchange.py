@@ -40,6 +40,9 @@ def moving(guide, parameters, inputs, discrete, rng, contact=None):
     if contact:
         kernel.set_contact(0, *contact)
     put(kernel, 0.0, x, inputs)
+    if contact:
+        kernel.begin()
+        put(kernel, 0.0, x, inputs)
     return kernel, x
 
 
@@ -74,8 +77,11 @@ def assert_directional(guide, parameters, inputs, discrete, contact=None):
         assert error[worst] <= 1e-6, (names[worst], found[worst], error[worst])
 
 
-def integrate(kernel, end, h=2e-5, inputs=lambda t: {}):
-    """Integrate by classical Runge-Kutta steps; locate events by bisection; yield each event."""
+def integrate(kernel, end, h=2e-5, inputs=lambda t: {}, *, completes=True):
+    """Integrate by classical Runge-Kutta steps; locate events by bisection; yield each event.
+
+    ``completes=False`` reports no completed steps, as importers that hide the steps of a solver.
+    """
     t, x = 0.0, kernel.exchange_get()
 
     def f(t, x):
@@ -109,7 +115,7 @@ def integrate(kernel, end, h=2e-5, inputs=lambda t: {}):
         kernel.set(inputs(t))
         kernel.exchange_set(t, x1)
         x = x1
-        if kernel.completed_step() or crossed(t, x1):
+        if (completes and kernel.completed_step()) or crossed(t, x1):
             kernel.exchange_set(t, x1)
             kernel.event()
             x = kernel.exchange_get()

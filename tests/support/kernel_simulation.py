@@ -36,6 +36,7 @@ FUNCTIONS = {
     "simulation_time": (DOUBLE, POINTER),
     "mechanism_open": (POINTER, POINTER, ctypes.c_size_t, POINTER),
     "mechanism_close": (None, POINTER),
+    "exchange_begin": (None, POINTER),
     "exchange_states": (INT, POINTER),
     "exchange_indicators": (INT, POINTER),
     "exchange_slot": (INT, POINTER, INT),
@@ -220,6 +221,11 @@ class KernelSimulation:
         x = np.empty(self.library.exchange_states(self.inner))
         self.library.exchange_get(self.inner, pointer(x))
         return x
+
+    def begin(self) -> None:
+        """Begin model exchange at the present states."""
+        self.derivatives()
+        self.library.exchange_begin(self.inner)
 
     def derivatives(self) -> np.ndarray:
         dx = np.empty(self.library.exchange_states(self.inner))

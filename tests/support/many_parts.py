@@ -88,8 +88,14 @@ def elastic():
             Body("pendulum", 0.002, 1e-7, (0.021, "L - 0.012"), {"pin": (0.02, "L")}),
         ),
         flexure_types=(
-            FlexureType("leaf", "2R", "L/100", 8e-3, 3e9, 1200.0, axial=True, stress=True),
-            FlexureType("chain", "nR", "L/80", 8e-3, 3e9, 1200.0, n=4, axial=True, stress=True),
+            FlexureType(
+                "leaf", "2R", "L/100", 8e-3, 3e9, 1200.0, axial=True, stress=True,
+                initial_strain=-2e-5,
+            ),
+            FlexureType(
+                "chain", "nR", "L/80", 8e-3, 3e9, 1200.0, n=4, axial=True, stress=True,
+                initial_strain=1e-5,
+            ),
             FlexureType("bar", "1R", 5e-4, 4e-3, 2e9, 1200.0, axial=True),
         ),
         flexures=(
@@ -191,7 +197,13 @@ def beams(*, axial: bool = True) -> Mechanism:
     orders = {"leaf": (3, None), "chain": (4, 8), "bar": (1, 3)}
     kinds = tuple(
         dataclasses.replace(
-            kind, model="beam", n=0, order=order, nodes=nodes, axial=axial or order == 1
+            kind,
+            model="beam",
+            n=0,
+            order=order,
+            nodes=nodes,
+            axial=axial or order == 1,
+            initial_strain=kind.initial_strain if axial else None,
         )
         for kind in links.flexure_types
         for order, nodes in [orders[kind.name]]
@@ -243,7 +255,15 @@ def profiles(*, axial: bool = True) -> Mechanism:
         "bar": {"order": 1, "curvature": 12.0},
     }  # fmt: skip
     kinds = [
-        dataclasses.replace(kind, model="beam", n=0, axial=axial, stress=True, **extra[kind.name])
+        dataclasses.replace(
+            kind,
+            model="beam",
+            n=0,
+            axial=axial,
+            stress=True,
+            initial_strain=kind.initial_strain if axial else None,
+            **extra[kind.name],
+        )
         for kind in links.flexure_types
     ]
     hinge = FlexureType(

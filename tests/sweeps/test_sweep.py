@@ -21,6 +21,7 @@ from pythonfmu import FmuBuilder
 from scipy import stats
 
 import prbm
+from coupled import integrator
 from mishap import CRASHES, CRASHES_ONCE, EXITS, FINE, HANGS, KILLS_WORKER, RAISES
 from native_host import clocked
 from prbm.base.errors import ParameterError
@@ -603,6 +604,19 @@ def test_a_missing_package_is_reported(mishap, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(SweepError, match=r"need the package distributed; install .*sweep"):
         sweep(mishap, GRID)
+
+
+@pytest.mark.parametrize("words", [[], ["--of", "value"], ["--output", "max(value)"]])
+def test_the_command_runs_an_fmu_of_another_tool(words):
+    """Without the outputs of this package all outputs of the FMU are recorded, or those named."""
+    pd.DataFrame({"start": [0.0, 1.0]}).to_csv("t.csv", index=False)
+    fmu = str(integrator())
+    assert main(["sweep", fmu, "t.csv", "--out", "r", "--stop-time", "1", "--step", "0.1",
+                 "--set", "rate=1", *words]) == 0  # fmt: skip
+    found = pd.read_parquet("r").set_index("row").sort_index()
+    name = words[-1] if words else "value"
+    np.testing.assert_allclose(found[name], [1.0, 2.0], rtol=1e-12)
+    assert [*found["status"]] == ["ok", "ok"]
 
 
 @pytest.mark.slow

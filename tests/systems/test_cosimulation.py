@@ -12,13 +12,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fmpy import simulate_fmu
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Slave
+from fmpy.model_description import Dimension
 
 from coupled import guide, integrator
 from prbm.base.errors import ParameterError
 from prbm.references.scalar_guide import ScalarGuide
 from prbm.runs.result import structured
-from prbm.systems import cosimulation
-from prbm.systems.components import CO_SIMULATION, Component, CouplingError, start_value
+from prbm.systems import components, cosimulation
+from prbm.systems.components import (
+    CO_SIMULATION,
+    Component,
+    CouplingError,
+    described,
+    start_value,
+)
 from prbm.systems.cosimulation import GAUSS_SEIDEL, JACOBI, System, simulate
 from reference_fmus import table
 from support import mechanism, possible
@@ -329,7 +338,7 @@ def test_a_step_of_zero_is_rejected():
 
 def test_rows_before_a_failure_are_kept():
     fmus = {"a": integrator(), "b": integrator()}
-    with pytest.raises(CouplingError, match="b: ") as caught:
+    with pytest.raises(CouplingError, match="b terminated") as caught:
         simulate(fmus, CIRCLE, 1.0, H, START | {"b.end": 10 * H}, scheme=JACOBI)
     found, (_, a, _) = caught.value.columns, circle(JACOBI)
     np.testing.assert_array_equal(found["time"], H * np.arange(11))
@@ -358,6 +367,62 @@ def test_steps_have_one_length_if_an_fmu_needs_that(uneven):
         simulate(fmus, {}, 0.3, 0.2)
     with pytest.raises(CouplingError, match=r"one needs .* use events=False"):
         simulate(fmus, {}, 0.3, 0.1, events=True)
+
+
+def test_the_end_by_an_fmu_of_fmi_2_is_the_reason():
+    """The status of the step is Discard, with the status ``fmi2Terminated``; no rows are lost."""
+    with pytest.raises(CouplingError, match=r"b terminated the simulation at 0.1 s$") as caught:
+        simulate({"b": integrator()}, {}, 1.0, 0.1, {"b.end": 0.1}, ["b.value"])
+    np.testing.assert_array_equal(caught.value.columns["time"], [0.0, 0.1])
+
+
+def test_the_reason_that_a_python_fmu_logs_is_part_of_the_message(fmus):
+    own = {"guide": fmus["PRBDM"]}
+    with pytest.raises(CouplingError, match=r"guide terminated .* at 0 s: .*stop.restitution = 2"):
+        simulate(own, {}, 0.1, 0.1, {"guide.stop.restitution": 2.0})
+
+
+@pytest.mark.parametrize(
+    ("wires", "values", "record"),
+    [
+        ({}, {}, ["guide.shuttle.x"]),
+        ({"guide.force.y": "guide.shuttle.x"}, {}, []),
+        ({"guide.force.x": "guide.shuttle.y"}, {}, []),
+        ({}, {"guide.force.x": 0.1}, []),
+    ],
+)
+def test_arrays_are_refused_before_the_run(wires, values, record, monkeypatch):
+    def with_arrays(name, fmu):
+        description = described(name, fmu)
+        for v in description.modelVariables:
+            if v.name in ("shuttle.x", "force.x"):
+                v.dimensions = [Dimension("3", None)]
+        return description
+
+    monkeypatch.setattr(components, "described", with_arrays)
+    with pytest.raises(CouplingError, match=r"guide\.(shuttle|force)\.x is an array"):
+        simulate({"guide": guide(3)}, wires, 0.1, 0.1, values, record)
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_missing_resources_are_named(fmi, tmp_path):
+    path = tmp_path / "bare.fmu"
+    with zipfile.ZipFile(guide(fmi)) as source, zipfile.ZipFile(path, "w") as copy:
+        for name in source.namelist():
+            if not name.startswith("resources/"):
+                copy.writestr(name, source.read(name))
+    with pytest.raises(CouplingError, match=r"a: instantiate failed .*including its folder reso"):
+        simulate({"a": path}, {}, 0.1, 0.1)
+
+
+def test_a_step_that_fails_is_no_end(monkeypatch):
+    def fails(own, kind):
+        raise FMICallException(function="fmi2GetBooleanStatus", status=3)
+
+    for answer in (lambda own, kind: False, fails):
+        monkeypatch.setattr(FMU2Slave, "getBooleanStatus", answer)
+        with pytest.raises(CouplingError, match=r"b: .*DoStep at 0 s returned the status 2"):
+            simulate({"b": integrator()}, {}, 1.0, 0.1, {"b.end": 0.0})
 
 
 def test_the_end_of_a_simulation_in_event_mode_is_not_ignored(monkeypatch):

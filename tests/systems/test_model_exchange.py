@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from fmpy.fmi2 import FMU2Model
 
 from coupled import guide, integrator
 from prbm.references.scalar_guide import Monolith, ScalarGuide
@@ -105,6 +106,31 @@ def test_error_messages_name_variable_and_status(changes, sentence):
 def test_errors_contain_the_message_of_an_fmu_of_fmi_3():
     with pytest.raises(CouplingError, match=r"flexure\.length = -1 m must be at least"):
         simulate(guide(3), lambda t, outputs, z: ({}, []), [], 0.01, 1e-3, {"flexure.length": -1.0})
+
+
+@pytest.mark.parametrize(
+    ("function", "answer", "sentence", "rows"),
+    [
+        ("completedIntegratorStep", (False, True), "terminated the simulation at 0.0", 2),
+        ("newDiscreteStates", (False, True, False, False, False, 0.0), "terminated .* at 0 s", 0),
+        ("newDiscreteStates", (False, False, False, False, True, 0.5), "event at 0.5 s", 0),
+    ],
+)
+def test_the_end_by_the_fmu_is_the_reason(function, answer, sentence, rows, monkeypatch):
+    """No partner at hand ends it there, so that the answer of the guide is exchanged."""
+    original = getattr(FMU2Model, function)
+
+    def replaced(own):
+        given = original(own)
+        started = function != "completedIntegratorStep" or own.steps > 30
+        own.steps = getattr(own, "steps", 0) + 1
+        return answer if started else given
+
+    monkeypatch.setattr(FMU2Model, "steps", 0, raising=False)
+    monkeypatch.setattr(FMU2Model, function, replaced)
+    with pytest.raises(CouplingError, match=sentence) as caught:
+        simulate(guide(2), lambda t, outputs, z: ({}, []), [], 0.1, 1e-3)
+    assert rows == 0 or len(caught.value.columns) >= rows
 
 
 def test_an_fmu_without_model_exchange_is_rejected():

@@ -294,6 +294,17 @@ def test_a_container_refuses_what_its_library_does_not_support(tmp_path, monkeyp
             container(path, {"sum": integrator()}, {}, 1e-3, shown=["sum.value"])
 
 
+def test_a_container_needs_co_simulation(tmp_path, monkeypatch):
+    def without(name, fmu):
+        found = described(name, fmu)
+        found.coSimulation = None
+        return found
+
+    monkeypatch.setattr("prbm.systems.container.described", without)
+    with pytest.raises(CouplingError, match=r"sum: .* has no co-simulation"):
+        container(tmp_path / "x.fmu", {"sum": integrator()}, {}, 1e-3, shown=["sum.value"])
+
+
 def test_a_container_rejects_local_variables(tmp_path):
     with pytest.raises(CouplingError, match=r"link\[1\]\.angle: must be a parameter, an input"):
         container(tmp_path / "x.fmu", fmus(), {}, 1e-3, shown=["carrier.link[1].angle"])

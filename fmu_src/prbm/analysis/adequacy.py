@@ -56,9 +56,12 @@ class Vibration:
     held : float or None
         Displacement [m] or, if the release is by an angle, rotation [rad] of the released body,
         held by a force or a moment; None: at rest.
+    loads : tuple of (str, float)
+        Names and values of the dead loads [N], [N m].
     """
 
     held: float | None = None
+    loads: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -267,7 +270,7 @@ class _Model:
             if math.isfinite(C):
                 result[Quantity.RESTITUTION, 0] = C
         else:
-            held = equilibrium(system, shape.held)
+            held = equilibrium(system, shape.held, dict(shape.loads))
         lowest = modes(system, held).frequency[:count].tolist()
         return result | {(Quantity.FREQUENCY, k): f for k, f in enumerate(lowest, start=1)}
 

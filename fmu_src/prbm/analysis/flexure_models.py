@@ -36,6 +36,7 @@ def with_flexures(
         keeps = kind.model == model and order is None and nodes is None
         return replace(
             kind, model=model, axial=axial, n=n,
+            initial_strain=kind.initial_strain if axial else None,
             order=kind.order if keeps else order, nodes=kind.nodes if keeps else nodes,
             coefficients=kind.coefficients if kind.model == model else {},
         )  # fmt: skip

@@ -11,8 +11,9 @@ import math
 # --- description -------------------------------------------------------------------------------
 JOINT_DISTANCE_RTOL = 1e-9  # Of the size: largest distance of two points that a joint connects.
 INERTIA_RATIO_MIN = (
-    1e-12  # Of the largest inertia of a coordinate: the motion of less is round-off.
+    1e-12  # Of the largest inertia of a coordinate: the motion of a body with less is round-off.
 )
+FLEXURE_INERTIA_RATIO_MIN = 1e-16  # The same for a flexure, whose springs are weak, too.
 DEPENDENT_LOOP_RTOL = 1e-9  # Of the loop Jacobian's largest entry: smaller pivots are round-off.
 STUB_RTOL = 1e-12  # Of a cantilever's length: excess of the sum of its links that is round-off.
 
@@ -151,6 +152,9 @@ STOP_TIME_RTOL = 1e-3  # Of a communication step: allowed overshoot of the stop 
 # --- model exchange ----------------------------------------------------------------------------
 NOMINAL_ANGLE_MIN = 1e-2  # rad; smallest amplitude from which nominal values of states are derived.
 NOMINAL_STRAIN_FACTOR = 0.1  # Of the energy at the start: assumed in the stiffest axial spring.
+TURN_RTOL = 1e-7  # Of the reference speed: rate after an extremum of a contact at its event.
+DIFFERENCE_RTOL = 1e-5  # Of a parameter: step of the derivative with respect to it.
+DIFFERENCE_ATOL = 1e-7  # In the unit of a parameter that is zero: the same.
 DRIFT_RTOL = 1e-7  # Of the size: drift of a held contact that requests an event.
 DRIFT_SPEED_FACTOR = 10.0  # Of DRIFT_RTOL: the same for speeds, which solvers keep less exactly.
 MOVING_DRIFT_FACTOR = 10.0  # Of DRIFT_RTOL: the same while the wall moves.

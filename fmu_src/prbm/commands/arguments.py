@@ -222,7 +222,7 @@ def sweep_arguments(parser: ArgumentParser) -> None:
         help="folder of the results (default: %(default)s)",
     )  # fmt: skip
     add(
-        "--output", action="append", metavar="OUTPUT",
+        "--output", "--of", action="append", metavar="OUTPUT",
         help="recorded output: a variable, for its final value; 'max(shuttle.x)', or min, mean; "
         "'first(shuttle.x > 0)', the first time of a condition; 'since(stop.contact)', the time "
         "from which it holds to the end; repeatable (default: all outputs)",
@@ -304,6 +304,27 @@ def set_argument(parser: ArgumentParser, meaning: str = "value of a parameter") 
     parser.add_argument(
         "--set", action="append", default=[], metavar="NAME=VALUE",
         help=f'{meaning}, in SI or with a unit: "release.displacement=-10 mm"; repeatable',
+    )  # fmt: skip
+
+
+def linear_arguments(parser: ArgumentParser) -> None:
+    """Add the arguments of linear models."""
+    add = parser.add_argument
+    text = "inputs, such as force.x or base.acceleration.x (default: all forces and the base)"
+    add("--inputs", nargs="+", metavar="NAME", help=text)
+    text = "outputs, such as shuttle.x or base.force.x (default: the motion of the released body)"
+    add("--outputs", nargs="+", metavar="NAME", help=text)
+    text = "stops that the mechanism rests on (default: none)"
+    add("--resting", nargs="+", metavar="STOP", help=text)
+    text = "range of the frequency response [Hz] (default: about the lowest modes)"
+    add("--frequencies", metavar="A:B", help=text)
+
+
+def load_argument(parser: ArgumentParser) -> None:
+    """Add --load."""
+    parser.add_argument(
+        "--load", nargs="+", metavar="NAME=X",
+        help="dead loads, forces [N] and moments [N m], such as force.y=-5N (default: none)",
     )  # fmt: skip
 
 

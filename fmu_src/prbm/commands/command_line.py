@@ -28,6 +28,8 @@ from .arguments import (
     examples,
     import_arguments,
     input_argument,
+    linear_arguments,
+    load_argument,
     mechanism_argument,
     out_argument,
     parameters_argument,
@@ -84,6 +86,7 @@ def parser() -> argparse.ArgumentParser:
     _parameters(commands)
     _modes(commands)
     _equilibrium(commands)
+    _linearize(commands)
     _simulate(commands)
     _stress(commands)
     _shock(commands)
@@ -140,8 +143,12 @@ def _parameters(commands: Commands) -> None:
 def _modes(commands: Commands) -> None:
     parser = add_command(
         commands, "modes", "modes:frequencies",
-        "natural frequencies and modes, about the equilibrium under gravity or a held shape",
-        examples("prbm modes PRBDM2R", "prbm modes PRBDM2R --held -10mm --out modes"),
+        "natural frequencies and modes, about the equilibrium under gravity and loads, or held",
+        examples(
+            "prbm modes PRBDM2R",
+            "prbm modes PRBDM2R --held -10mm --out modes",
+            "prbm modes CurvedBistable --load force.y=-5N",
+        ),
     )  # fmt: skip
     mechanism_argument(parser)
     parser.add_argument(
@@ -152,6 +159,7 @@ def _modes(commands: Commands) -> None:
         help="displacement [m] at which the released body is held, or angle [rad] if it is "
         "released by an angle (default: not held)",
     )  # fmt: skip
+    load_argument(parser)
     set_argument(parser)
     out_argument(parser)
 
@@ -202,10 +210,10 @@ def _equilibrium(commands: Commands) -> None:
     add = parser.add_argument
     text = "displacements [m] or angles [rad] at which the body is held"
     add("--held", nargs="+", metavar="X", help=text)
-    text = "forces [N] and moments [N m], such as force.y=-5N"
-    add("--load", nargs="+", metavar="NAME=X", help=text)
+    load_argument(parser)
     text = "follow the shapes while a load varies, such as force.y=0:-20N, through limit points"
     add("--vary", metavar="NAME=A:B", help=text)
+    add("--branches", action="store_true", help="follow the branches of --vary at bifurcations")
     add("--stiffness", metavar="BODY", help="print the compliance and stiffness matrix of a body")
     add("--at", metavar="BODY.POINT", help="point of --stiffness (default: the centre of mass)")
     add("--from", dest="start", metavar="A", help="first displacement of a force curve [m]")
@@ -214,6 +222,23 @@ def _equilibrium(commands: Commands) -> None:
         "--points", type=int, default=41, metavar="N",
         help="number of points of the force curve (default: %(default)s)",
     )  # fmt: skip
+    set_argument(parser)
+    out_argument(parser)
+
+
+def _linearize(commands: Commands) -> None:
+    parser = add_command(
+        commands, "linearize", "linear:linear_model",
+        "linear model x' = A x + B u, y = C x + D u about a shape at rest, and frequency responses",
+        examples(
+            "prbm linearize GuideBeam",
+            "prbm linearize GuideBeam --inputs force.x --outputs shuttle.x shuttle.vx --out model",
+            "prbm linearize GuideBeam --inputs base.acceleration.x --frequencies 1:1000Hz",
+        ),
+    )  # fmt: skip
+    mechanism_argument(parser)
+    linear_arguments(parser)
+    load_argument(parser)
     set_argument(parser)
     out_argument(parser)
 

@@ -1,11 +1,12 @@
 """Shapes under a load that varies: the option --vary of ``prbm equilibrium``."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..analysis.load_path import LoadPath, load_path
+from ..analysis.load_path import LoadPath, PathPoint, load_path
 from ..files.settings import UserMistake, quantity
+from ..mechanics.arrays import Real
 from ..mechanics.inputs import load_units
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
@@ -32,9 +33,30 @@ def given_load(mechanism: Mechanism, option: str, text: str) -> tuple[str, str, 
     return name, number, units[name]
 
 
+def given_loads(mechanism: Mechanism, texts: Sequence[str] | None) -> dict[str, float]:
+    """Return the loads of the option --load [N], [N m].
+
+    Raises
+    ------
+    UserMistake
+        If there is no such load, or its value is not a quantity of its unit.
+    """
+    loads = {}
+    for text in texts or ():
+        name, number, si = given_load(mechanism, "--load", text)
+        loads[name] = quantity(number, si, f"--load {name}")
+    return loads
+
+
+def load_text(loads: Mapping[str, float]) -> str:
+    """Return loads as the continuation of a description; empty without loads."""
+    return "".join(f"; {name} = {x:g}" for name, x in loads.items())
+
+
 def vary(
-    text: str, loads: Mapping[str, float], mechanism: Mechanism, system: System, output: Output
-) -> None:
+    text: str, loads: Mapping[str, float], mechanism: Mechanism, system: System, output: Output,
+    branches: bool = False,
+) -> None:  # fmt: skip
     """Print, write and draw the shapes while a load varies, with limit points and bifurcations."""
     name, ends, si = given_load(mechanism, "--vary", text)
     first, colon, last = ends.partition(":")
@@ -43,23 +65,40 @@ def vary(
     low, high = (quantity(x, si, f"--vary {name}") for x in (first, last))
     if low == high:
         raise UserMistake(f"--vary {text}: the ends of the range are equal")
-    path = load_path(system, {**loads, name: low}, {**loads, name: high})
-    amounts = np.array([system.amount(point.shape.q) for point in path.points])
-    varied = np.array([low + point.share * (high - low) for point in path.points])
+    path = load_path(system, {**loads, name: low}, {**loads, name: high}, branches)
+    paths = (path, *path.branches)
+    curves = [_curve(system, one, low, high) for one in paths]
     unit = held_unit(mechanism)
-    _print(path, amounts, varied, f"{name} [{si}]", system)
-    kinds = {point: kind for kind, point in path.events}
+    label = f"{name} [{si}]"
+    for number, (one, curve) in enumerate(zip(paths, curves, strict=True)):
+        if number:
+            print(f"branch {number}, from its bifurcation:")
+        _print(one, *curve, label, system)
     output.table(
         f"{mechanism.name}-load-path.csv",
-        [f"{unit.amount} [{unit.si}]", f"{name} [{si}]", "unstable directions", "event"],
-        [[float(x), float(load), point.unstable, kinds.get(point, "")]
-         for x, load, point in zip(amounts, varied, path.points, strict=True)],
-    )  # fmt: skip
-    label, turns = f"{name} [{si.replace('.', ' ')}]", mechanism.release.turns
+        ["branch", f"{unit.amount} [{unit.si}]", label, "unstable directions", "event"],
+        [
+            [number, float(x), float(load), point.unstable, _event(one, point)]
+            for number, (one, curve) in enumerate(zip(paths, curves, strict=True))
+            for x, load, point in zip(*curve, one.points, strict=True)
+        ],
+    )
+    shown, turns = f"{name} [{si.replace('.', ' ')}]", mechanism.release.turns
     output.figure(
         f"{mechanism.name}-load-path.png",
-        lambda: load_path_figure(path, amounts, varied, label, mechanism.title, turns),
+        lambda: load_path_figure(paths, curves, shown, mechanism.title, turns),
     )
+
+
+def _curve(system: System, path: LoadPath, low: float, high: float) -> tuple[Real, Real]:
+    """Return the displacements and the loads of the points of a path."""
+    amounts = np.array([system.amount(point.shape.q) for point in path.points])
+    return amounts, np.array([low + point.share * (high - low) for point in path.points])
+
+
+def _event(path: LoadPath, point: PathPoint) -> str:
+    """Return the kind of the event at a point, or nothing."""
+    return next((kind for kind, one in path.events if one is point), "")
 
 
 def _print(

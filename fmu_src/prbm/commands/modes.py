@@ -17,6 +17,7 @@ from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import value
 from ..runs.released import released_label
+from .load_paths import given_loads, load_text
 from .output import Output, aligned
 from .systems import assembled, check_held, held_scale, held_unit, rounded
 
@@ -28,18 +29,15 @@ def frequencies(options: argparse.Namespace) -> None:
     """Print frequencies and the share of each motion in the kinetic energy of a mode."""
     mechanism, values, system = assembled(options)
     output = Output(options.out)
-    if options.count < 1:
-        raise UserMistake(f"--count {options.count}: must be at least 1")
-    at, held = None, held_unit(mechanism)
-    if options.held is not None:
-        at = check_held(quantity(options.held, held.si, "--held"), system, "--held")
-    shape = equilibrium(system, at)
+    at = _checked(options, system)
+    loads = given_loads(mechanism, options.load)
+    shape = equilibrium(system, at, loads)
     found = modes(system, shape)
     count = min(options.count, len(found.frequency))
     motions = [(body.name, m) for body in mechanism.bodies for m in ("x", "y", "turning")]
     e = system.directions(shape.q)
     shares = np.array([_shares(system, e, found.shape[:, k]) for k in range(count)])
-    print(_where(system, shape, at))
+    print(_where(system, shape, at, loads))
     ratios, times = damping(system, found)
     head = [
         "mode",
@@ -68,9 +66,7 @@ def frequencies(options: argparse.Namespace) -> None:
         print(
             f"{len(found.frequency) - count} higher modes are not shown; show more with --count N"
         )
-    shapes: list[Shape] = [Vibration(at), *map(Impact, range(len(mechanism.stops)))]
-    for sentence in notes(mechanism, values, shapes):
-        print(sentence)
+    _print_notes(mechanism, values, at, loads)
     output.table(
         f"{mechanism.name}-modes.csv",
         ["mode", "frequency [Hz]", "damping ratio [-]", "decay time [s]",
@@ -84,16 +80,40 @@ def frequencies(options: argparse.Namespace) -> None:
             for k in range(count)
         ],
     )  # fmt: skip
-    output.figure(f"{mechanism.name}-modes.png", lambda: _figure(mechanism, values, count, at))
+    output.figure(
+        f"{mechanism.name}-modes.png", lambda: _figure(mechanism, values, count, at, loads)
+    )
     output.write()
 
 
+def _checked(options: argparse.Namespace, system: System) -> float | None:
+    """Return the amount of --held [m], [rad]; reject a count without modes."""
+    if options.count < 1:
+        raise UserMistake(f"--count {options.count}: must be at least 1")
+    if options.held is None:
+        return None
+    held = held_unit(system.mechanism)
+    return check_held(quantity(options.held, held.si, "--held"), system, "--held")
+
+
+def _print_notes(
+    mechanism: Mechanism, values: Mapping[str, float], at: float | None, loads: Mapping[str, float]
+) -> None:
+    """Print what a better model changes about the shape and, without loads, about impacts."""
+    shapes: list[Shape] = [Vibration(at, tuple(loads.items()))]
+    if not loads:
+        shapes += map(Impact, range(len(mechanism.stops)))
+    for sentence in notes(mechanism, values, shapes):
+        print(sentence)
+
+
 def _figure(
-    mechanism: Mechanism, values: Mapping[str, float], count: int, at: float | None
-) -> "Figure":
+    mechanism: Mechanism, values: Mapping[str, float], count: int, at: float | None,
+    loads: Mapping[str, float],
+) -> "Figure":  # fmt: skip
     from ..plots.picture import MODES_MAX, picture  # imported here: it takes a second
 
-    return picture(mechanism, values, min(count, MODES_MAX), at)
+    return picture(mechanism, values, min(count, MODES_MAX), at, loads)
 
 
 def _shares(system: System, e: Complex, phi: Real) -> list[float]:
@@ -119,7 +139,7 @@ def _seconds(time: float) -> str:
     return f"{factor * time:.3g} {unit}"
 
 
-def _where(system: System, shape: Equilibrium, at: float | None) -> str:
+def _where(system: System, shape: Equilibrium, at: float | None, loads: Mapping[str, float]) -> str:
     """Return a description of the shape about which the mechanism vibrates."""
     name, release = system.mechanism.name, system.mechanism.release
     held, moved = held_unit(system.mechanism), released_label(release)
@@ -129,8 +149,8 @@ def _where(system: System, shape: Equilibrium, at: float | None) -> str:
         effort = held.si_effort.replace(".", " ")
         return (
             f"{name}, {moved} held at {held.factor * at:.6g} {held.shown} from straight"
-            f"{along} by {shape.force:.5g} {effort}"
+            f"{along} by {shape.force:.5g} {effort}{load_text(loads)}"
         )
     at_rest = "at rest under gravity" if system.gravity else "at rest without gravity"
     place = rounded(held.factor * system.amount(shape.q), held.factor * held_scale(system))
-    return f"{name} {at_rest}, {moved} {place} {held.shown} from straight{along}"
+    return f"{name} {at_rest}, {moved} {place} {held.shown} from straight{along}{load_text(loads)}"

@@ -17,7 +17,7 @@ from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from ..plots.holding import holding_figure
 from ..runs.released import released_label
-from .load_paths import given_load, vary
+from .load_paths import given_loads, load_text, vary
 from .output import Output, aligned
 from .systems import ZERO_RTOL, HeldUnit, assembled, check_held, held_scale, held_unit, rounded
 
@@ -41,7 +41,8 @@ def rest_positions(options: argparse.Namespace) -> None:
         _range(options, mechanism, system, output, head)
     elif options.vary:
         print(head)
-        vary(options.vary, _loads(options, mechanism), mechanism, system, output)
+        loads = given_loads(mechanism, options.load)
+        vary(options.vary, loads, mechanism, system, output, options.branches)
     else:
         _shapes(options, mechanism, system, output, head)
     output.write()
@@ -51,7 +52,7 @@ def _shapes(
     options: argparse.Namespace, mechanism: Mechanism, system: System, output: Output, head: str
 ) -> None:
     """Print single shapes under loads, held or free, with the places of all bodies and probes."""
-    unit, loads = held_unit(mechanism), _loads(options, mechanism)
+    unit, loads = held_unit(mechanism), given_loads(mechanism, options.load)
     held: list[float | None] = [None]
     if options.held:
         given = quantities(options.held, unit.si, "--held")
@@ -63,7 +64,7 @@ def _shapes(
         holding.described(system, shape.displacement if x is None else x, shape.shape)
         for x, shape in zip(held, shapes, strict=True)
     ]
-    _print(head + "".join(f"; {name} = {x:g}" for name, x in loads.items()), points, system)
+    _print(head + load_text(loads), points, system)
     if not options.held:
         _print_rest(points[0].displacement, points[0].frequency > 0.0, system)
     output.table(f"{mechanism.name}-equilibrium.csv", _csv_head(unit), _rows(points))
@@ -78,15 +79,6 @@ def _shapes(
     )  # fmt: skip
     if options.stiffness:
         _stiffness(options, mechanism, system, shapes, output)
-
-
-def _loads(options: argparse.Namespace, mechanism: Mechanism) -> dict[str, float]:
-    """Return the loads of the option --load [N], [N m]."""
-    loads = {}
-    for text in options.load or ():
-        name, number, si = given_load(mechanism, "--load", text)
-        loads[name] = quantity(number, si, f"--load {name}")
-    return loads
 
 
 def _stiffness(
@@ -131,6 +123,8 @@ def _check_options(options: argparse.Namespace) -> None:
         raise UserMistake("--load and --stiffness exclude --from and --to: give one or the other")
     if options.vary and (ranged or options.held or options.stiffness):
         raise UserMistake("--vary excludes --held, --stiffness, --from and --to")
+    if options.branches and not options.vary:
+        raise UserMistake("--branches are those of --vary NAME=A:B: give both")
     if options.at and not options.stiffness:
         raise UserMistake("--at is the point of --stiffness BODY: give both")
 

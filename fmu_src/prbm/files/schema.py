@@ -126,6 +126,7 @@ class Section(Named):
     waist_length: Annotated[Quantity, measured(parts.FlexureType, "waist_length")] | None = None
     curvature: Annotated[Quantity, measured(parts.FlexureType, "curvature")] | None = None
     rise: Annotated[Quantity, measured(parts.FlexureType, "rise")] | None = None
+    initial_strain: Annotated[Quantity, measured(parts.FlexureType, "initial_strain")] | None = None
     stress: StrictBool = Field(
         False, description="Whether the stress of the flexures, and its peak, are outputs"
     )
@@ -135,8 +136,8 @@ class Section(Named):
 
 
 _OWN = (
-    "model", "n", "order", "nodes", *SECTION, "material", *MATERIAL, "axial", "stress",
-    "coefficients", *PROFILE,
+    "model", "n", "order", "nodes", *SECTION, "material", *MATERIAL, "axial",
+    "initial_strain", "stress", "coefficients", *PROFILE,
 )  # fmt: skip
 _NO_MATERIAL_TWICE: list[Any] = [{"not": {"required": ["material", key]}} for key in MATERIAL]
 _MADE_OF: Any = {"anyOf": [{"required": ["material"]}, {"required": [*MATERIAL]}]}

@@ -2,13 +2,14 @@
 
 import html
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from ..base.text import printable
 from ..base.version import GENERATION_TOOL
 from ..interface.native import NativeInterface
 from ..interface.variables import Variable
 from ..mechanics.inputs import Wall
+from ..mechanics.stress import stressed
 from ..mechanism.description import Mechanism
 from ..mechanism.flexure import BEAM, MODELS
 from ..mechanism.parts import COMPLIANT, LAWS, RIGID, FlexureType
@@ -262,11 +263,11 @@ def _use(mechanism: Mechanism, experiment: Experiment) -> str:
         "PyFMI) need nothing else. Other importers must find the Python library when they load "
         "the FMU (on Linux for instance with <code>LD_PRELOAD=libpython3.11.so</code>).</p>\n"
         f"<p>The folder <code>{FOLDER}</code> has the start values as a parameter set (SSV).</p>\n"
-        "<p>Path: unpack the FMU to a folder whose path is plain ASCII without <code>% # ?</code>. "
-        "The wrapper library pythonfmu does not decode percent-encoded paths (except for spaces) "
-        "and crashes the host. FMPy unpacks to the folder of temporary files; if that path has "
-        "other characters, set the environment variable <code>TMPDIR</code> (Linux) or "
-        "<code>TMP</code> (Windows).</p>\n"
+        "<p>Path: unpack the FMU to a folder whose path has only letters and digits of ASCII, "
+        "spaces and <code>. _ - ~</code>. The library pythonfmu decodes no other percent-encoded "
+        "characters and crashes the host. FMPy unpacks to the folder of temporary files; if needed "
+        "set <code>TMPDIR</code> (Linux) or <code>TMP</code> (Windows), or use the native FMU of "
+        "this mechanism, which reads all paths.</p>\n"
         "<p>Errors:</p>\n<ul>\n"
         "<li>An invalid value, parameter set or step is rejected. The reason is logged, and every "
         "<code>doStep</code> returns <code>fmi2Discard</code> until the value is corrected.</li>\n"
@@ -276,6 +277,9 @@ def _use(mechanism: Mechanism, experiment: Experiment) -> str:
         "<li>Getting a variable with the function of another type, or a value reference that is "
         "not in the model description, logs an error and returns NaN, 0 or false. The simulation "
         "continues.</li>\n"
+        "<li>In these cases, and if a saved state is damaged, the call itself returns "
+        "<code>fmi2OK</code>, and any GUID is accepted: pythonfmu permits no other status. The "
+        "native FMU returns <code>fmi2Error</code>.</li>\n"
         "<li>FMPy ends the simulation early at <code>fmi2Discard</code>. The reasons of rejected "
         "steps are therefore also printed to the standard error stream.</li>\n"
         "<li>The wrapper forwards log messages, those of impacts included, only if the importer "
@@ -630,6 +634,21 @@ def _exchange(interface: NativeInterface, version: int) -> str:
     )
 
 
+def _peaks(mechanism: Mechanism) -> Iterator[str]:
+    if any(stop.compliant for stop in mechanism.stops):
+        yield (
+            "<p>While a compliant stop is pressed, each extremum of its force and indentation is a "
+            "state event (release indicator): <code>peak_force</code>, <code>indentation</code> "
+            "and <code>contact_duration</code> do not depend on the importer's steps.</p>"
+        )
+    if stressed(mechanism):
+        yield (
+            "<p>In model exchange <code>peak_stress</code> is sampled at the steps that the "
+            "importer completes and at events. For an error of 0.1 % these steps must be at most a "
+            "twentieth of the period of the fastest vibration of the stress.</p>"
+        )
+
+
 def _events(mechanism: Mechanism, interface: NativeInterface, version: int) -> str:
     if not (mechanism.stops or mechanism.frictions):
         return "<h2>Events</h2>\n<p>This mechanism has no events.</p>"
@@ -638,6 +657,7 @@ def _events(mechanism: Mechanism, interface: NativeInterface, version: int) -> s
         "rest), the release of a stop that holds, and the beginning and the end of sliding with "
         "friction. Each has an event indicator, which changes its sign at the event. Indicators "
         "are scaled to the order of 1 and are never 0 after an event.</p>",
+        *_peaks(mechanism),
         "<p>At an event, values are those <em>before</em> the event until it has been handled; in "
         "model exchange, that is the update of the discrete states in event mode. In "
         "co-simulation without event mode, impacts happen inside a step. The latched outputs "

@@ -119,12 +119,18 @@ def _unknown(
 
 
 def initial_unknowns(interface: NativeInterface) -> list[Variable]:
-    """Return the initial unknowns: outputs, calculated parameters, states and derivatives."""
+    """Return the initial unknowns: outputs, calculated parameters, states and derivatives.
+
+    Clocks are none, although they are outputs.  FMI 3.0.2 (2.4.8) lists outputs whose ``initial``
+    is approx or calculated, a clock has no such attribute, and ``fmi3GetClock`` is not permitted
+    in Initialization Mode.
+    """
     moving = {*interface.states, *interface.derivatives}
     return [
         v
         for v in interface.variables
-        if v.causality in ("output", "calculatedParameter") or v.name in moving
+        if (v.causality in ("output", "calculatedParameter") and v.type != CLOCK)
+        or v.name in moving
     ]
 
 

@@ -19,6 +19,7 @@ from ..hybrid.simulation import Simulation
 from ..interface.variables import BASE, Variable, with_starts
 from ..mechanics.assembly import assemble
 from ..mechanics.modal import modes_at
+from ..mechanics.stress import stressed
 from ..mechanism.description import Mechanism
 from ..runs.engine import PYTHON
 from ..runs.experiment import Experiment
@@ -55,8 +56,14 @@ Rows are {step:g} s apart, which is the communication step. Compare your results
    exchange use a relative tolerance of 1e-8.
 2. Compare rows of equal time. Leave out rows within {near:g} s of an impact: outputs jump there.
 3. Integer and Boolean outputs are equal. Differences of other outputs are at most 1e-5 (model
-   exchange: 1e-3) of the largest magnitude in the column, or of a larger nominal value. Without
-   damping a motion can be chaotic: compare the time until the first impacts then.
+   exchange: 1e-3) of the largest magnitude in the column, or of a larger nominal value; of
+   modal_restitution, a ratio of velocities that vanish in the last bounces, ten times as much.
+   Without damping a motion can be chaotic: compare the time until the first impacts then.
+"""
+SAMPLED = """\
+   In model exchange, peak_stress is sampled at the steps that your tool completes, and at events.
+   Steps must be at most a twentieth of the period of the fastest vibration of the stress; with
+   longer steps leave out peak_stress, its time and its position.
 """
 VALIDATION = """\
 validation   {name}_validation_out.csv: start values in {name}_validation.ssv, 0 to {end:g} s,
@@ -113,7 +120,8 @@ def reference(
     smoke = columns[: SMOKE_STEPS + 1]
     validation = _validation(mechanism, changes, variables, experiment, outputs)
     more = VALIDATION.format(name=name, end=stop / VALIDATION_SHARE) if validation else ""
-    text = (GUIDE + (AT_IMPACTS if validation else "")).format(
+    parts = GUIDE, SAMPLED if stressed(mechanism) else "", AT_IMPACTS if validation else ""
+    text = "".join(parts).format(
         name=name, stop=stop, step=step, smoke=float(smoke["time"][-1]), validation=more,
         near=NEAR_IMPACT * step, same=SAME_TIME * step,
     )  # fmt: skip

@@ -7,6 +7,7 @@ from functools import cache
 
 from ..base.errors import SimulationError
 from ..base.tolerances import PEAK_REACH_FACTOR, PEAK_REFINEMENT_FACTOR, PEAK_REFINEMENTS
+from ..mechanics.arrays import Real
 from ..mechanics.dynamics import Equations
 from .arc import Arc
 from .configuration import Configuration
@@ -25,7 +26,7 @@ def latched_until(
     front : Front
         The end of the step, with the maxima up to its start.
     arc : Arc or None
-        The step that leads to the front.
+        The step that leads to the front; None if there is none, as at the start.
     time : float
         A time in the step, or later [s].
 
@@ -35,12 +36,15 @@ def latched_until(
         If an indentation is larger than the mechanism.
     """
     end = min(time, front.time)
-    if not front.equations.pressed or arc is None or end <= arc.start:
+    if not front.equations.pressed or (arc is not None and end <= arc.start):
         return front
     latched, equations = list(front.latched), front.equations
     for i in equations.pressed:
-        contact = _along(equations, arc, i)
-        depth, force = (_largest(contact, k, arc.start, end) for k in (0, 1))
+        if arc is None:
+            depth, force = _contact_at(equations, i, front.time, front.y)
+        else:
+            contact = _along(equations, arc, i)
+            depth, force = (_largest(contact, k, arc.start, end) for k in (0, 1))
         check_depth(configuration, i, depth, end)
         latched[i] = replace(
             latched[i],
@@ -70,13 +74,18 @@ def _along(equations: Equations, arc: Arc, stop: int) -> Callable[[float], tuple
 
     @cache
     def contact(t: float) -> tuple[float, float]:
-        y, n = arc.at(t), equations.n
-        e, v, extras = equations.system.directions(y[:n]), y[n : 2 * n], y[2 * n + 2 :]
-        gap = float(equations.gaps(t, e, extras)[stop])
-        rate = float(equations.gap_rates(t, e, v, extras)[stop])
-        return -gap, equations.compliant.force(stop, -gap, -rate)
+        return _contact_at(equations, stop, t, arc.at(t))
 
     return contact
+
+
+def _contact_at(equations: Equations, stop: int, t: float, y: Real) -> tuple[float, float]:
+    """Return indentation and force of a pressed stop at a time and a state."""
+    n = equations.n
+    e, v, extras = equations.system.directions(y[:n]), y[n : 2 * n], y[2 * n + 2 :]
+    gap = float(equations.gaps(t, e, extras)[stop])
+    rate = float(equations.gap_rates(t, e, v, extras)[stop])
+    return -gap, equations.compliant.force(stop, -gap, -rate)
 
 
 def _largest(

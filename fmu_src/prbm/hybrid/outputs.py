@@ -61,7 +61,7 @@ def all_outputs(
     out["base.moment"] = moment
     out["energy.kinetic"] = kinetic_energy(M, v)
     contact_energy = own.energy(equations.gaps(t, e, extras)) if own.stops else 0.0
-    out["energy.elastic"] = forces.elastic_energy(system.K, q - system.q0) + contact_energy
+    out["energy.elastic"] = forces.elastic_energy(system.K, q - system.rest) + contact_energy
     out["energy.gravitational"] = forces.gravitational_energy(system, e)
     out["energy.dissipated"] = float(y[2 * n])
     out["energy.work"] = float(y[2 * n + 1])

@@ -50,11 +50,11 @@ from .variables import (
 )
 
 FILE = "mechanism.bin"
-MAGIC, VERSION = b"PRBM", 7
+MAGIC, VERSION = b"PRBM", 8
 HEAD = 16  # Bytes before those that the checksum covers.
 DIMENSIONS = (
     "end_thickness", "end_width", "notch_radius", "notch_depth", "waist_length", "curvature",
-    "rise",
+    "rise", "initial_strain",
 )  # fmt: skip
 """Fields of a flexure type that are not always given, in the order of its fields."""
 STARTS = ("displacement", "angle", "amplitude")  # The starts of a release.

@@ -9,6 +9,7 @@
 
 #define JOINT_DISTANCE_RTOL 1e-09
 #define INERTIA_RATIO_MIN 1e-12
+#define FLEXURE_INERTIA_RATIO_MIN 1e-16
 #define DEPENDENT_LOOP_RTOL 1e-09
 #define STUB_RTOL 1e-12
 #define SINGULAR_RTOL 1e-12
@@ -125,6 +126,9 @@ enum { EFFORT_MAX = 1000000 };
 #define STOP_TIME_RTOL 0.001
 #define NOMINAL_ANGLE_MIN 0.01
 #define NOMINAL_STRAIN_FACTOR 0.1
+#define TURN_RTOL 1e-07
+#define DIFFERENCE_RTOL 1e-05
+#define DIFFERENCE_ATOL 1e-07
 #define DRIFT_RTOL 1e-07
 #define DRIFT_SPEED_FACTOR 10.0
 #define MOVING_DRIFT_FACTOR 10.0
@@ -199,7 +203,7 @@ typedef enum {
 
 /* --- prbm.interface.tables ---------------------------------------------------------------------- */
 
-enum { TABLES_VERSION = 7 };
+enum { TABLES_VERSION = 8 };
 enum { TABLES_HEAD = 16 };
 enum { COORDINATES_MAX = 512 };
 enum { DIRECTIONS_MAX = 1024 };
@@ -242,7 +246,8 @@ typedef enum {
     DIMENSION_WAIST_LENGTH = 4,
     DIMENSION_CURVATURE = 5,
     DIMENSION_RISE = 6,
-    DIMENSION_COUNT = 7,
+    DIMENSION_INITIAL_STRAIN = 7,
+    DIMENSION_COUNT = 8,
 } Dimension;
 typedef enum {
     START_DISPLACEMENT = 0,

@@ -4,6 +4,7 @@
 #include "core/gaps.h"
 #include "hybrid/access.h"
 #include "hybrid/configuration.h"
+#include "hybrid/contact_peaks.h"
 #include "hybrid/events.h"
 #include "hybrid/guards.h"
 #include "hybrid/walls.h"
@@ -83,11 +84,58 @@ PRBM double release_indicator(const Simulation *sim, const Instant *at, int i) {
     return lesser(pressed, steady);
 }
 
+/* The rate of the force F = k d^n (1 + a d'/v0) of a pressed stop, divided by k d^(n-1) v0: a number
+ * of the order of 1, also at d = 0. */
+static double force_growth(const Equations *eq, const Instant *at, int stop) {
+    const ComplianceLaw *law = &eq->laws[stop];
+    const Touching *touching = &eq->contacts.touching[stop];
+    double depth = -gap(eq, stop, at->time, at->e, at->extra);
+    double rate = -gap_rate(eq, stop, at->time, at->e, at->v, at->extra);
+    double bend = -gap_acceleration(eq, stop, at->time, at->e, at->v, at->found);
+    return (law->exponent * rate * damping_ratio(law, touching, rate) +
+            depth * damping_slope(law, touching) * bend) /
+           touching->reference_speed;
+}
+
+PRBM void watch_turns(Simulation *sim, const Instant *at) {
+    const Equations *eq = &sim->equations;
+    for (int k = 0; k < eq->pressed_count; k++) {
+        int i = eq->pressed[k];
+        Dent dent = latest_dent(sim, i);
+        double rate = -gap_rate(eq, i, at->time, at->e, at->v, at->extra);
+        dent.deepens = rate < 0.0 ? -1.0 : 1.0;
+        dent.grows = force_growth(eq, at, i) < 0.0 ? -1.0 : 1.0;
+        store_dent(sim, i, &dent);
+    }
+}
+
+PRBM Turn turn_indicator(const Simulation *sim, const Instant *at, int i) {
+    const Touching *touching = &sim->state.touching[i];
+    Dent last = latest_dent(sim, i);
+    double rate = -gap_rate(&sim->equations, i, at->time, at->e, at->v, at->extra);
+    double depth = last.deepens * rate / touching->reference_speed, force = 1.0;
+    if (touching->phase != PHASE_FREE) {
+        force = last.grows * force_growth(&sim->equations, at, i);
+    }
+    Turn turn = {lesser(depth, force) + TURN_RTOL, force < depth ? last.grows : last.deepens,
+                 force < depth};
+    if (last.deepens == 0.0) {
+        turn.value = 1.0; /* There has been no event. */
+    }
+    return turn;
+}
+
+static double switch_indicator(const Simulation *sim, const Instant *at, int i) {
+    double phase = lifted_guard(sim, at, EVENT_SWITCH, i) / guard_scale(sim, EVENT_SWITCH);
+    return lesser(phase, turn_indicator(sim, at, i).value);
+}
+
 static double indicator(const Simulation *sim, const Instant *at, EventKind kind, int contact) {
     switch (kind) {
     case EVENT_IMPACT:
     case EVENT_SEPARATION: return closing_indicator(sim, at, kind, contact);
     case EVENT_RELEASE: return release_indicator(sim, at, contact);
+    case EVENT_SWITCH: return switch_indicator(sim, at, contact);
     default: return lifted_guard(sim, at, kind, contact) / guard_scale(sim, kind);
     }
 }

@@ -441,6 +441,7 @@ PRBM bool exchange_event(Simulation *simulation, bool *changed, Problem *problem
                latch_present(sim, now.evaluation, false, problem));
     if (ok) {
         restart_peaks_from(sim, now.evaluation);
+        watch_turns(sim, &now.at);
         arm(sim, &now.at);
         accept(sim);
         states_of(sim, state->front, state->states);
@@ -497,6 +498,7 @@ PRBM void exchange_begin(Simulation *sim) {
     states_of(sim, sim->state.front, sim->state.states);
     forget_present(sim);
     if (exchange_moment(sim, &now, &ignored)) {
+        watch_turns(sim, &now.at);
         arm(sim, &now.at);
     }
     forget_present(sim);

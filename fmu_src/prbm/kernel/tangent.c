@@ -298,7 +298,7 @@ static void energy_changes(const Tangent *t, const double *dx, double *out) {
     out[ENERGY_KINETIC] = kinetic_change(t);
     for (int i = 0; i < n; i++) {
         for (int j = 0; j < n; j++) {
-            out[ENERGY_ELASTIC] += (t->y[i] - system->q0[i]) * system->K[i * n + j] * t->dq[j];
+            out[ENERGY_ELASTIC] += (t->y[i] - system->rest[i]) * system->K[i * n + j] * t->dq[j];
         }
     }
     Complex moved = along_arms(system->d, system->S, t->dE);

@@ -1,6 +1,8 @@
 /* Directional derivatives of the contacts at compliant stops. */
 #include "core/gaps.h"
 #include "core/vectors.h"
+#include "hybrid/access.h"
+#include "indicators.h"
 #include "tangent_contact.h"
 
 /* The indentation of a stop, its rate, and their changes. */
@@ -113,7 +115,22 @@ static double bend_change_of(const Tangent *t, int stop) {
     return -change;
 }
 
-PRBM double switch_indicator_change(const Tangent *t, int stop) {
+/* Change of the indicator of an extremum, without its sign. */
+static double turn_change(const Tangent *t, int stop, const Indentation *x, bool of_force) {
+    const ComplianceLaw *law = &t->eq->laws[stop];
+    const Touching *touching = touching_at(t, stop);
+    const Instant *at = t->at;
+    if (!of_force) {
+        return x->drate / touching->reference_speed;
+    }
+    double slope = damping_slope(law, touching), ratio = damping_ratio(law, touching, x->rate);
+    double bend = -gap_acceleration(t->eq, stop, at->time, t->e, t->v, t->evaluation);
+    return (law->exponent * (ratio + x->rate * slope) * x->drate +
+            slope * (x->dd * bend + x->d * bend_change_of(t, stop))) /
+           touching->reference_speed;
+}
+
+static double phase_indicator_change(const Tangent *t, int stop) {
     const Scales *scales = &t->sim->configuration.scales;
     const ComplianceLaw *law = &t->eq->laws[stop];
     const Touching *touching = touching_at(t, stop);
@@ -128,4 +145,14 @@ PRBM double switch_indicator_change(const Tangent *t, int stop) {
                    ? slope * x.drate
                    : -x.drate / touching->reference_speed;
     }
+}
+
+PRBM double switch_indicator_change(const Tangent *t, int stop) {
+    double phase = lifted_guard(t->sim, t->at, EVENT_SWITCH, stop);
+    Turn turn = turn_indicator(t->sim, t->at, stop);
+    if (phase <= turn.value) {
+        return phase_indicator_change(t, stop);
+    }
+    Indentation x = indentation_at(t, stop);
+    return turn.sign == 0.0 ? 0.0 : turn.sign * turn_change(t, stop, &x, turn.of_force);
 }

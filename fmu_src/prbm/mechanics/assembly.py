@@ -14,6 +14,7 @@ import numpy as np
 from ..base.errors import MechanismError, ParameterError
 from ..base.tolerances import (
     DEPENDENT_LOOP_RTOL,
+    FLEXURE_INERTIA_RATIO_MIN,
     INERTIA_RATIO_MIN,
     JOINT_DISTANCE_RTOL,
     SINGULAR_RTOL,
@@ -162,6 +163,7 @@ class _Assembler(Collection):
             mechanism=mechanism,
             values=dict(self.values),
             q0=q0,
+            rest=np.array(self.rest),
             Phi=Phi,
             arm=arm,
             H=spread.conj().T @ (m[:, None] * spread),
@@ -290,14 +292,22 @@ def check_masses(M: Real, names: Sequence[str]) -> None:
     Raises
     ------
     ParameterError
-        If the mass matrix is singular, or inertias differ by more than ``INERTIA_RATIO_MIN``.
+        If the mass matrix is singular, or the inertia of a body is less than
+        ``INERTIA_RATIO_MIN`` of the largest one, or that of a flexure less than
+        ``FLEXURE_INERTIA_RATIO_MIN``.
     """
     inertias = np.diag(M)
-    light, heavy = int(np.argmin(inertias)), int(np.argmax(inertias))
-    if 0.0 < inertias[light] < INERTIA_RATIO_MIN * inertias[heavy]:
+    limits = np.array(
+        [
+            INERTIA_RATIO_MIN if name.startswith("body ") else FLEXURE_INERTIA_RATIO_MIN
+            for name in names
+        ]
+    )
+    light, heavy = int(np.argmin(inertias / limits)), int(np.argmax(inertias))
+    if 0.0 < inertias[light] < limits[light] * inertias[heavy]:
         raise ParameterError(
             f"the inertia of {names[light]}, {inertias[light]:.3g} kg m2, is less than "
-            f"{INERTIA_RATIO_MIN:g} of that of {names[heavy]}, {inertias[heavy]:.3g} kg m2, so "
+            f"{limits[light]:g} of that of {names[heavy]}, {inertias[heavy]:.3g} kg m2, so "
             "that round-off would change the motion: check the units of masses, inertias, "
             "densities, lengths and coordinates (numbers without a unit are in SI), or make the "
             "light part heavier"

@@ -32,6 +32,7 @@ class Collection:
         self.mechanism = mechanism
         self.values = values
         self.q0: list[float] = []
+        self.rest: list[float] = []  # Coordinates at which no spring has a force.
         self.changes: list[dict[int, float]] = []  # The rows of Phi, one per direction.
         self.arm: list[int] = []
         self.J: list[float] = []
@@ -98,6 +99,7 @@ class Collection:
     def coordinate(self, owner: str, start: float = 0.0) -> int:
         """Add a coordinate of a part and return its index."""
         self.q0.append(start)
+        self.rest.append(start)
         self.owners.append(owner)
         return len(self.q0) - 1
 

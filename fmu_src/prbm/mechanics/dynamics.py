@@ -97,7 +97,7 @@ class Equations:
         # Springs and their damping in one product with (q, v): see torques.
         damping = self.beta * system.K
         self._K_y = np.block([[system.K, damping], [0 * system.K, damping]])
-        self._straight = np.concatenate([system.K @ system.q0, np.zeros(self.n)])
+        self._straight = np.concatenate([system.K @ system.rest, np.zeros(self.n)])
 
     def _number_contacts(self) -> None:
         """Sort the contacts by their modes, and number their rows."""

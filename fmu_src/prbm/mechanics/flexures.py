@@ -66,6 +66,11 @@ def _section(parts: Collection, kind: FlexureType) -> tuple[float, float, float]
     return E * b * h**3 / 12, E * b * h, rho * b * h
 
 
+def initial_strain(parts: Collection, kind: FlexureType) -> float:
+    """Return the strain without a force [-]."""
+    return 0.0 if kind.initial_strain is None else value(kind, "initial_strain", parts.values)
+
+
 def _strength(parts: Collection, kind: FlexureType) -> tuple[float, float]:
     """Return area [m^2] and section modulus [m^3]."""
     h, b = (value(kind, name, parts.values) for name in ("thickness", "width"))
@@ -83,8 +88,10 @@ def _add_links(parts: Collection, flexure: Flexure, pieces: Segments) -> None:
 
     place, owner = parts.on(root, z_start), parts.index[root]
     corners = [place]
+    kind = parts.mechanism.type_of(flexure)
+    strain = initial_strain(parts, kind) * _section(parts, kind)[1]
     links = [
-        _add_link(parts, direction, length, axial)
+        _add_link(parts, direction, length, axial, strain)
         for length, axial in zip(pieces.lengths[1:-1], pieces.axial, strict=True)
     ]
     known = far in parts.origin
@@ -109,7 +116,7 @@ def _add_links(parts: Collection, flexure: Flexure, pieces: Segments) -> None:
         parts.reach(far, place, z_end - last, owners[-1])
     parts.rod(pieces.rods[-1], place, owners[-1], last)
     points.rod(len(links) + 1, len(parts.masses) - first)
-    angles, kind = [parts.angle(j) for j in owners], parts.mechanism.type_of(flexure)
+    angles = [parts.angle(j) for j in owners]
     masses, forwards = slice(first, len(parts.masses)), start == flexure.start
     free = of_links(
         flexure.name, forwards, pieces, direction, _strength(parts, kind), owners, angles, masses,
@@ -142,8 +149,13 @@ class _Points:
             self.found.append((2 * i + 1, self.pieces.lengths[0], 0.0))
 
 
-def _add_link(parts: Collection, direction: complex, length: float, axial: float) -> int:
-    """Add a link, and its stretch if it has an axial stiffness [N/m]; return its direction."""
+def _add_link(
+    parts: Collection, direction: complex, length: float, axial: float, blocked: float
+) -> int:
+    """Add a link, and its stretch if it has an axial stiffness [N/m]; return its direction.
+
+    ``blocked`` is the pressure of the link that is kept at its drawn length [N].
+    """
     parts.link_count += 1
     owner = f"link[{parts.link_count}]"
     j = parts.direction({parts.angle_of_flexure(owner, cmath.phase(direction)): 1.0})
@@ -151,6 +163,7 @@ def _add_link(parts: Collection, direction: complex, length: float, axial: float
         stretch = parts.coordinate(owner)
         parts.direction({stretch: 1.0}, arm=j)
         parts.spring(axial * length**2, None, stretch)
+        parts.rest[stretch] = blocked / (axial * length)
     return j
 
 
@@ -234,6 +247,7 @@ def _add_beam(parts: Collection, flexure: Flexure, beam: Beam, kind: FlexureType
         parts.spring(rate, None, j)
     if strain is not None:
         parts.spring(beam.axial_rate, None, strain)
+        parts.rest[strain] = initial_strain(parts, kind)
 
 
 def _add_node(

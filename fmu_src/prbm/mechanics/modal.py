@@ -63,9 +63,25 @@ def _modes(system: System, q: Real, B: Complex, lam: Real, w: Complex) -> Modes:
     The tangent stiffness K_t is that of the loads w and of the multipliers lam along B.
     """
     e = system.directions(q)
-    M = system.mass_matrix(e)
     K_t = tangent_stiffness(system.K, w, B, lam, e, system.arm, system.Phi)
-    rows = system.loop_rows.jacobian(e)
+    return vibrations(system, e, K_t, system.loop_rows.jacobian(e))
+
+
+def vibrations(system: System, e: Complex, K_t: Real, rows: Real) -> Modes:
+    """Return the solutions of K_t phi = omega^2 M phi with rows phi = 0.
+
+    Parameters
+    ----------
+    system : System
+        The mechanism.
+    e : (d,) complex
+        Directions of the shape.
+    K_t : (n, n)
+        Tangent stiffness [N m/rad].
+    rows : (r, n)
+        Gradients of the active constraints, which are independent of each other.
+    """
+    M = system.mass_matrix(e)
     # Coordinates of unit inertia make the basis Z independent of how the inertias differ.
     scale = 1.0 / np.sqrt(M.diagonal())
     Z = scale[:, None] * np.linalg.qr((rows * scale).T, mode="complete")[0][:, len(rows) :]
@@ -169,7 +185,7 @@ def modes_at(system: System, q: Real) -> Modes:
     B = np.vstack([system.loops, system.holding_row(q)])
     rows = system.gradient(B, e)
     w = field_row(system.spread(system.S), system.gravity)
-    load = springs(system.K, q - system.q0) + system.Phi.pull((w * e).real)
+    load = springs(system.K, q - system.rest) + system.Phi.pull((w * e).real)
     right = np.concatenate([load, np.zeros(len(B))])
     kkt = constraints.saddle(M, rows, rows)
     lam = -constraints.solve(kkt, right, system.n, system.length)[system.n :]

@@ -107,7 +107,7 @@ def section_loads(
         Evaluation there.
     """
     system = equations.system
-    e, deflection = system.directions(q), q - system.q0
+    e, deflection = system.directions(q), q - system.rest
     loads = point_loads(equations, e, v, found.a)
     pulls = [*_inputs(equations), *contact_forces(equations, e, found)]
     strained = deflection + equations.beta * v
@@ -141,7 +141,7 @@ def static_section_loads(
     if not mechanism.release.turns:
         release = mechanism.release
         pulls.append((release.body, shape.force * unit(release.direction)))
-    e, deflection = system.directions(shape.q), shape.q - system.q0
+    e, deflection = system.directions(shape.q), shape.q - system.rest
     loads = (system.m * system.gravity).astype(complex)
     return connection_loads(system, e, deflection, deflection, loads, pulls, shape.lam)[0]
 

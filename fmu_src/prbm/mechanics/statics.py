@@ -4,10 +4,10 @@ At rest the torques balance,
 
     K (q - q0) - Phi^T Re(w e) - Q - J^T lam - r^T F = 0,
 
-with the springs K, the row w of gravity and the forces, the moments Q, the Jacobian J of the loops
-and their forces lam, the Jacobian r of the held displacement and the holding force F.  Second
-derivatives by the directions couple at most the angle and the stretch of one arm, because every
-position is linear in the arms.
+with the springs K, the row w of gravity and the forces, the moments Q (those of initial strains
+included), the Jacobian J of the loops and their forces lam, the Jacobian r of the held displacement
+and the holding force F.  Second derivatives by the directions couple at most the angle and the
+stretch of one arm, because every position is linear in the arms.
 """
 
 import math
@@ -274,9 +274,12 @@ def _holding_unit(system: System) -> float:
 
 
 def load_row(system: System, loads: Mapping[str, float]) -> tuple[Complex, Real]:
-    """Return the spread row w of gravity and the given forces, and the given moments [N m]."""
+    """Return the spread row w of gravity and the given forces, and the given moments [N m].
+
+    The torques of the initial strains in the drawn shape are among the moments.
+    """
     given = checked_loads(system.mechanism, loads)
-    w, moment = field_row(system.S, system.gravity), np.zeros(system.n)
+    w, moment = field_row(system.S, system.gravity), system.K @ (system.rest - system.q0)
     for force, frame in zip(system.mechanism.forces, system.pushed, strict=True):
         x, y, turning = (given[f"{force.name}.{what}"] for what in ("x", "y", "moment"))
         w = w + force_row(frame.A, complex(x, y))

@@ -248,6 +248,8 @@ class System:
     q0 : (n,)
         Coordinates of the straight shape: absolute angles, counter-clockwise from +x [rad], and
         stretches, which are zero there [-].
+    rest : (n,)
+        Coordinates at which no spring has a force: q0, but the initial strains [rad], [-].
     Phi : DirectionMap
         The map from coordinates to directions.
     arm : (d,) int
@@ -257,7 +259,7 @@ class System:
     J : (d,)
         Rotary inertia of each body about the mass centres of its parts [kg m^2].
     K : (n, n)
-        Springs: elastic energy (q - q0)^T K (q - q0) / 2 [N m/rad], [N m].
+        Springs: elastic energy (q - rest)^T K (q - rest) / 2 [N m/rad], [N m].
     A, c, m : (p, d) complex, (p,) complex, (p,)
         Mass points z = c + A E [m] and their masses [kg].
     loops, loops_c : (r, d) complex, (r,)
@@ -302,6 +304,7 @@ class System:
     mechanism: Mechanism
     values: Mapping[str, float]
     q0: Real
+    rest: Real
     Phi: DirectionMap
     arm: Whole
     H: Complex

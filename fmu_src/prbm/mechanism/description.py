@@ -315,6 +315,7 @@ class Mechanism:
             )
         self._check_order(kind)
         _check_profile(kind)
+        _check_strain(kind)
         chain = kind.model == CHAIN
         if chain and not 1 <= kind.n <= LINKS_MAX:
             raise MechanismError(
@@ -513,6 +514,15 @@ def _check_law(stop: Stop) -> None:
                 f"{stop.name}.{name} = {getattr(stop, name)}: a rigid stop has no {name}; remove "
                 'it, or choose law = "compliant"'
             )
+
+
+def _check_strain(kind: FlexureType) -> None:
+    """Reject an initial strain of flexures that cannot stretch."""
+    if kind.initial_strain is not None and not kind.axial:
+        raise MechanismError(
+            f"{kind.name}.initial_strain: the flexures cannot stretch; set axial = true, or remove "
+            "initial_strain"
+        )
 
 
 def _check_profile(kind: FlexureType) -> None:

@@ -95,6 +95,9 @@ class FlexureType:
     rise : Quantity or None
         Distance of the parallel tangents at the ends of a beam that is drawn as half a period of a
         cosine [m].  It is positive if the end is to the left of the tangent at the start.
+    initial_strain : Quantity or None
+        Strain of flexures that stretch without a force, relative to the drawn shape [-].  Residual
+        stress sigma is -sigma/E; a flexure that was made too long has a positive one.
     stress : bool
         Whether the stress of the flexures, and its peak, are outputs.
     yield_strength, tensile_strength : float or None
@@ -124,6 +127,7 @@ class FlexureType:
     waist_length: Quantity | None = None
     curvature: Quantity | None = None
     rise: Quantity | None = None
+    initial_strain: Quantity | None = None
     stress: bool = False
     yield_strength: float | None = None
     tensile_strength: float | None = None
@@ -392,6 +396,9 @@ FIELDS: dict[type, dict[str, tuple[str, str, float, float, float | None, bool]]]
         "rise": _meta(
             "m", "Distance of the parallel tangents at both ends as drawn, positive to the left",
             -LENGTH_MAX, LENGTH_MAX, 1e-3,
+        ),
+        "initial_strain": _meta(
+            "", "Strain without a force, positive if longer than drawn", -0.1, 0.1, 1e-3
         ),
     },
     Body: {

@@ -57,6 +57,7 @@ def picture(
     values: Mapping[str, float] | None = None,
     shown: int = 0,
     held: float | None = None,
+    loads: Mapping[str, float] | None = None,
 ) -> Figure:
     """Draw the straight shape with the names of its parts, and modes about an equilibrium.
 
@@ -75,6 +76,8 @@ def picture(
     held : float or None
         Displacement at which the released body is held [m]; None: the equilibrium without a
         holding force.
+    loads : mapping or None
+        Dead loads on this equilibrium, by the names of the inputs [N], [N m].
 
     Returns
     -------
@@ -95,7 +98,7 @@ def picture(
     z = np.concatenate([*_places(shapes, shapes.straight), *_walls(shapes)])
     if start is not None:
         z = np.concatenate([z, *_places(shapes, start)])
-    vibrating = _vibrating(shapes, held) if shown else None
+    vibrating = _vibrating(shapes, held, loads) if shown else None
     if vibrating is not None:
         shown = min(shown, len(vibrating[0].frequency))
     aspect = float(np.ptp(z.imag[np.isfinite(z)]) / np.ptp(z.real[np.isfinite(z)]))
@@ -131,9 +134,11 @@ def _released(shapes: Shapes) -> tuple[Complex | None, str]:
     return (E if apart > MOVED_RTOL * shapes.size else None), ""
 
 
-def _vibrating(shapes: Shapes, held: float | None) -> tuple[Modes, Complex]:
+def _vibrating(
+    shapes: Shapes, held: float | None, loads: Mapping[str, float] | None
+) -> tuple[Modes, Complex]:
     """Return the modes, and the arms of the shape in equilibrium."""
-    rest = equilibrium(shapes.system, held)
+    rest = equilibrium(shapes.system, held, loads)
     return modes(shapes.system, rest), shapes.arms(rest.q)
 
 

@@ -163,12 +163,17 @@ class Component:
         Raises
         ------
         CouplingError
-            If no variable has that name; the message lists similar names.
+            If no variable has that name, and the message lists similar names; or it is an array.
         """
         if name not in self.variables:
             near = get_close_matches(name, self.variables)
             hint = f"; similar names are {', '.join(near)}" if near else ""
             raise CouplingError(f"{self.name} has no variable {name!r}{hint}")
+        if self.variables[name].dimensions:
+            raise CouplingError(
+                f"{self.name}.{name} is an array: arrays are not supported; use an FMU whose "
+                "variables are scalars"
+            )
         return self.variables[name]
 
     def get(self, names: Sequence[str]) -> dict[str, Value]:

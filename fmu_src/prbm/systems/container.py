@@ -123,6 +123,8 @@ def container(
 def _inside(name: str, fmu: str | Path, folder: Path) -> Any:
     """Copy an FMU to NAME.fmu, since the container names its folder after the file."""
     description, own = described(name, fmu), folder / f"{name}.fmu"
+    if description.coSimulation is None:
+        raise CouplingError(f"{name}: {fmu} has no co-simulation, which a container needs")
     for variable in description.modelVariables:
         if variable.type == "Clock":
             raise CouplingError(

@@ -28,6 +28,8 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Self
 
+from fmpy.fmi2 import fmi2Terminated  # type: ignore[import-untyped]
+
 from ..base.progress import Progress
 from ..fmu.unpack import plain_folder
 from ..runs.result import Columns, structured
@@ -98,18 +100,36 @@ class Instance(Component):
 
     def step(self, end: float) -> bool:
         """Step towards a time [s]; return whether an event is due at the new ``time``."""
-        result = self.call("doStep", self.time, end - self.time)
         if self.version == 2:
-            self.time = end
+            self._step_fmi2(end)
             return False
+        result = self.call("doStep", self.time, end - self.time)
         event, terminated, early, reached = result
         self.time = reached if early else end
         self._check_not_terminated(terminated)
         return bool(event)
 
-    def _check_not_terminated(self, terminated: bool) -> None:
+    def _step_fmi2(self, end: float) -> None:
+        """Step to a time [s].  An FMU of FMI 2.0 ends the simulation by the status Discard."""
+        self.last_error = ""
+        try:
+            self.call("doStep", self.time, end - self.time)
+        except CouplingError:
+            self._check_not_terminated(self._has_terminated(), self.last_error)
+            raise
+        self.time = end
+
+    def _has_terminated(self) -> bool:
+        """Return whether an FMU of FMI 2.0 whose step has failed reports the end."""
+        try:
+            return bool(self.fmu.getBooleanStatus(fmi2Terminated))
+        except Exception:  # The function is optional.
+            return False
+
+    def _check_not_terminated(self, terminated: bool, why: str = "") -> None:
         if terminated:
-            raise CouplingError(f"{self.name} terminated the simulation at {self.time:g} s")
+            reason = why and f": {why}"
+            raise CouplingError(f"{self.name} terminated the simulation at {self.time:g} s{reason}")
 
     def enter_events(self) -> None:
         """Enter event mode, if the instance uses it."""

@@ -81,10 +81,18 @@ class Model(Component):
         Raises
         ------
         CouplingError
-            If the model requests more than ``UPDATES_MAX`` updates.
+            If the model ends the simulation, requests an event at a given time or more than
+            ``UPDATES_MAX`` updates.
         """
         for _ in range(UPDATES_MAX):
-            if not self.call("updateDiscreteStates")[0]:
+            more, ended, _, _, scheduled, next_time = self.call("updateDiscreteStates")
+            self.check_not_terminated(ended)
+            if scheduled:
+                raise CouplingError(
+                    f"{self.name} requests an event at {next_time:g} s: events at given times are "
+                    "not supported here; use co-simulation"
+                )
+            if not more:
                 break
         else:
             raise CouplingError(
@@ -92,6 +100,11 @@ class Model(Component):
                 "discrete states: its events do not end; check its parameters"
             )
         self.call("enterContinuousTimeMode")
+
+    def check_not_terminated(self, terminated: bool) -> None:
+        """Raise a CouplingError if the model has ended the simulation."""
+        if terminated:
+            raise CouplingError(f"{self.name} terminated the simulation at {self.time:g} s")
 
     def put(self, time: float, x: Real) -> None:
         """Set time and states."""
@@ -214,7 +227,8 @@ class OneSolver:
         y: Real = inside(self.time)
         self.put(self.time, y)
         self.z = y[self.model.states :]
-        requested, _ = self.model.call("completedIntegratorStep")
+        requested, terminated = self.model.call("completedIntegratorStep")
+        self.model.check_not_terminated(terminated)
         self.event = bool(requested) or bool(crossed.any())
         return y
 
@@ -269,7 +283,8 @@ def simulate(
     Raises
     ------
     CouplingError
-        If a name is unknown, a function of the FMU fails or the solver fails.
+        If a name is unknown, a function of the FMU fails, the solver fails or the FMU ends the
+        simulation; ``columns`` of the error are the rows before.
     ParameterError
         If ``stop_time`` or ``step`` is not positive and finite.
     """
@@ -283,17 +298,24 @@ def simulate(
             states = {f"z[{k}]": float(x) for k, x in enumerate(own)}
             rows.append({"time": time, **model.get(record), **states})
 
-        note(0.0, one.z)
-        due = times[1:]
-        for inside in one.steps(times[-1]):
-            if inside is None:
-                note(one.time, one.z)
-                continue
-            while due and due[0] <= one.time:
-                y = inside(due[0])
-                one.put(due[0], y)
-                note(due.pop(0), y[model.states :])
-            if one.event:
-                one.put(one.time, inside(one.time))
-                note(one.time, one.z)
+        def follow() -> None:
+            note(0.0, one.z)
+            due = times[1:]
+            for inside in one.steps(times[-1]):
+                if inside is None:
+                    note(one.time, one.z)
+                    continue
+                while due and due[0] <= one.time:
+                    y = inside(due[0])
+                    one.put(due[0], y)
+                    note(due.pop(0), y[model.states :])
+                if one.event:
+                    one.put(one.time, inside(one.time))
+                    note(one.time, one.z)
+
+        try:
+            follow()
+        except CouplingError as error:
+            error.columns = structured(rows) if rows else None
+            raise
     return structured(rows)

@@ -16,6 +16,7 @@ Properties of the wrapper (0.7.0), and their consequences:
 """
 
 import functools
+import hashlib
 import json
 from collections.abc import Callable
 from typing import Any, ClassVar
@@ -140,15 +141,18 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]
 
     @staticmethod
     def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
-        return json.dumps(state).encode()
+        text = json.dumps(state).encode()
+        return hashlib.sha256(text).digest() + text
 
     @staticmethod
     def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
-        try:
-            data = json.loads(state)
-        except ValueError:
+        """Return a serialized state, or an empty one, which is rejected, if a byte has changed."""
+        size = hashlib.sha256().digest_size
+        digest, text = state[:size], state[size:]
+        if hashlib.sha256(text).digest() != digest:
             return {}
-        return data if isinstance(data, dict) else {}
+        data: dict[str, Any] = json.loads(text)
+        return data
 
     def log(
         self,

@@ -233,7 +233,7 @@ static void pack_blocks(System *system) {
             system->own[i] = system->H[i * d + i].re + system->J[i];
         }
     }
-    pad(system->n, system->q0, system->straight);
+    pad(system->n, system->rest, system->straight);
 }
 
 /* Add the first and second moments of one mass point, for the directions that move it. */
@@ -316,24 +316,34 @@ static const char *part_of(const Mechanism *m, int j) {
     return m->steps[i].name;
 }
 
+/* The least ratio of the inertia of a coordinate to the largest one. */
+static double least_ratio(const Mechanism *m, int j) {
+    return m->coordinates[j].body != GROUND ? INERTIA_RATIO_MIN : FLEXURE_INERTIA_RATIO_MIN;
+}
+
 static bool check_ratio(const System *system, const double *M, Problem *problem) {
+    const Mechanism *m = system->mechanism;
     int n = system->n, light = 0, heavy = 0;
+    double limit = least_ratio(m, 0);
     for (int i = 1; i < n; i++) {
-        light = M[i * n + i] < M[light * n + light] ? i : light;
+        double own = least_ratio(m, i);
         heavy = M[i * n + i] > M[heavy * n + heavy] ? i : heavy;
+        if (M[i * n + i] / own < M[light * n + light] / limit) {
+            light = i;
+            limit = own;
+        }
     }
     double least = M[light * n + light], most = M[heavy * n + heavy];
-    if (!(0.0 < least && least < INERTIA_RATIO_MIN * most)) {
+    if (!(0.0 < least && least < limit * most)) {
         return true;
     }
-    const Mechanism *m = system->mechanism;
     return fail(problem,
                 "the inertia of %s %s, %.3g kg m2, is less than %g of that of %s %s, %.3g kg m2, so "
                 "that round-off would change the motion: check the units of masses, inertias, "
                 "densities, lengths and coordinates (numbers without a unit are in SI), or make "
                 "the light part heavier",
                 m->coordinates[light].body != GROUND ? "body" : "flexure", part_of(m, light), least,
-                INERTIA_RATIO_MIN, m->coordinates[heavy].body != GROUND ? "body" : "flexure",
+                limit, m->coordinates[heavy].body != GROUND ? "body" : "flexure",
                 part_of(m, heavy), most);
 }
 
@@ -517,6 +527,7 @@ static void clear(System *system) {
     system->p = system->spring_count = system->corner_count = 0;
     memset(system->grounded, 0, (size_t)system->even * sizeof *system->grounded);
     memset(system->q0, 0, n * sizeof *system->q0);
+    memset(system->rest, 0, n * sizeof *system->rest);
     memset(system->J, 0, d * sizeof *system->J);
     for (int k = 0; k < system->mechanism->map.count; k++) {
         system->factors[k] = 1.0; /* Beams set their own. */
@@ -534,6 +545,9 @@ static void clear(System *system) {
 static void add_arrays(System *system, Scratch *scratch) {
     const Release *release = &system->mechanism->release;
     Complex *e0 = system->e0;
+    for (int j = 0; j < system->n; j++) {
+        system->rest[j] += system->q0[j]; /* The initial strains are there already. */
+    }
     directions(system, system->q0, e0);
     for (int body = 1; body <= system->b; body++) {
         add_body(system, body, scratch);

@@ -60,12 +60,21 @@ static bool cut_flexure(const System *system, const Flexure *flexure, Segments *
                     section.EI, section.mass * L, section.EA, pieces, problem);
 }
 
-/* Set the angle of a link and, if it stretches, its axial spring; return the next direction. */
-static int lay_link(System *system, Complex direction, double length, double axial, bool stretching,
-                    int j) {
+/* Return the strain without a force. */
+static double initial_strain(const System *system, const FlexureType *kind) {
+    return has_dimension(kind, DIMENSION_INITIAL_STRAIN)
+               ? evaluate(kind->dimensions[DIMENSION_INITIAL_STRAIN], system->values)
+               : 0.0;
+}
+
+/* Set the angle of a link and, if it stretches, its axial spring; return the next direction.
+ * blocked: the pressure of the link that is kept at its drawn length [N]. */
+static int lay_link(System *system, Complex direction, double length, double axial, double blocked,
+                    bool stretching, int j) {
     system->q0[angle_of(system, j)] = phase(direction);
     if (stretching) {
         add_spring(system, axial * (length * length), FIXED, angle_of(system, j + 1));
+        system->rest[angle_of(system, j + 1)] = blocked / (axial * length);
     }
     return stretching ? j + 2 : j + 1;
 }
@@ -91,10 +100,12 @@ static bool walk_links(System *system, const Step *step, Scratch *scratch, Probl
     int *owners = take_integers(scratch, pieces.n + 2), next = step->first_direction;
     FreeBody *free_body = begin_free_body(system, step);
     owners[0] = system->origins[span.root].j;
+    const FlexureType *kind = kind_of(system->mechanism, step->flexure);
+    double blocked = initial_strain(system, kind) * section_of(system, kind).EA;
     for (int i = 1; i <= pieces.n; i++) {
         owners[i] = next;
         next = lay_link(system, direction, pieces.lengths[i], pieces.axial[i - 1],
-                        is_stretch(system, next + 1), next);
+                        blocked, is_stretch(system, next + 1), next);
     }
     int last_one = owners[pieces.n + 1] = step->closes ? system->origins[span.far].j : next;
     for (int i = 0; i <= pieces.n; i++) {
@@ -307,6 +318,7 @@ static bool walk_beam(System *system, const Step *step, Scratch *scratch, Proble
     }
     if (kind->axial) {
         add_spring(system, beam.axial_rate, FIXED, at.strain);
+        system->rest[at.strain] = initial_strain(system, kind);
     }
     return true;
 }

@@ -232,7 +232,7 @@ static bool resting_multipliers(const System *system, const double *q, const Com
     jacobian(&held, e, rows);
     gravity_row(system, w);
     for (int j = 0; j < n; j++) {
-        turned[j] = q[j] - system->q0[j];
+        turned[j] = q[j] - system->rest[j];
     }
     springs(n, system->K, turned, right);
     add_loads(system, w, e, right);

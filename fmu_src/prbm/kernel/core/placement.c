@@ -39,6 +39,7 @@ PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memor
     result.f = (int)f;
     result.b = (int)b;
     result.q0 = place(memory, n, sizeof(double));
+    result.rest = place(memory, n, sizeof(double));
     result.e0 = place(memory, d, sizeof(Complex));
     result.J = place(memory, d, sizeof(double));
     result.K = place(memory, n * n, sizeof(double));

@@ -133,7 +133,7 @@ PRBM SectionState section_state(const Equations *eq, const Complex *e, const dou
                        take_complex(scratch, system->b + 1, 1),
                        take_complex(scratch, m->flexure_count, 1)};
     for (int j = 0; j < system->n; j++) {
-        strained[j] = angle[j] - system->q0[j] + eq->beta * v[j];
+        strained[j] = angle[j] - system->rest[j] + eq->beta * v[j];
     }
     point_loads_at(eq, e, v, found->a, at.loads, scratch);
     at.on[GROUND] = complex_of(0.0, 0.0);

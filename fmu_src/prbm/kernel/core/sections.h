@@ -21,7 +21,7 @@ typedef struct {
 typedef struct {
     const Complex *e;       /* (d,) */
     const double *q;        /* (n,) */
-    const double *strained; /* (n,) q - q0 + beta v */
+    const double *strained; /* (n,) q - rest + beta v */
     Complex *loads;         /* (p,) of the mass points */
     Complex *on;            /* (b + 1,) sums of the forces on the bodies, the ground's first */
     Complex *far;           /* (flexures,) forces on the far ends */

@@ -90,6 +90,7 @@ typedef struct {
     const System *system;
     Rows rows;
     Complex *w; /* (d,) spread */
+    double fraction; /* of the initial strains */
 } Balance;
 
 /* Compute the residual torques and constraints at (q, lam), and the constraint rows. */
@@ -100,7 +101,8 @@ static void unbalanced(const Balance *balance, const double *state, const Comple
     int n = system->n, r = balance->rows.count;
     double *turned = take(scratch, (size_t)n);
     for (int j = 0; j < n; j++) {
-        turned[j] = state[j] - system->q0[j];
+        double strain = system->rest[j] - system->q0[j];
+        turned[j] = state[j] - system->q0[j] - balance->fraction * strain;
     }
     springs(n, system->K, turned, torque);
     add_loads(system, balance->w, e, torque);
@@ -179,7 +181,8 @@ static Balance balance_at(const System *system, bool held, double displacement, 
     int d = system->d, r = system->r;
     Complex *B = take_complex(scratch, r + 1, d);
     double *c = take(scratch, (size_t)r + 1);
-    Balance balance = {system, plain_rows(system, r + held, B, c), take_complex(scratch, 1, d)};
+    Balance balance = {system, plain_rows(system, r + held, B, c), take_complex(scratch, 1, d),
+                       fraction};
     stack_holding(system, fraction * displacement, B, c);
     field_row(d, system->S, scaled(fraction, system->gravity), balance.w);
     spread(system, 1, balance.w, balance.w);
@@ -264,6 +267,14 @@ static bool displaceable(const System *system, double displacement, Scratch *scr
 
 static bool heavy(const System *system) {
     return system->gravity.re != 0.0 || system->gravity.im != 0.0;
+}
+
+static bool strained(const System *system) {
+    bool found = false;
+    for (int j = 0; j < system->n; j++) {
+        found = found || system->rest[j] != system->q0[j];
+    }
+    return found;
 }
 
 /* Return whether the weight is far beyond what the springs can carry. */
@@ -396,7 +407,8 @@ PRBM bool equilibrium(const System *system, bool held, double displacement, Equi
     int n = system->n, r = system->r;
     double *state = take(scratch, (size_t)n + (size_t)r + 1);
     straighten(system, true, state);
-    bool straight = !heavy(system) && !(held && displacement != 0.0) && drawn_closed(system, scratch);
+    bool straight = !heavy(system) && !strained(system) && !(held && displacement != 0.0) &&
+                    drawn_closed(system, scratch);
     bool found = straight || ((!held || displaceable(system, displacement, scratch, problem)) &&
                               load_fully(system, held, displacement, state, scratch, problem));
     copy(n, state, shape->q);

@@ -101,6 +101,7 @@ typedef struct {
     bool mapped;              /* whether the map to the directions is not the identity */
     double *factors;          /* (count,) of the map */
     double *q0, *J, *K;       /* (n,), (d,), (n, n) */
+    double *rest;             /* (n,) coordinates at which no spring has a force */
     Complex *e0;              /* (d,) directions of the straight shape */
     Complex *H, *A, *c;       /* (d, d), (p, d), (p,) */
     double *m;                /* (p,) */
@@ -137,7 +138,7 @@ typedef struct {
     Block *mass_blocks;       /* of M: the same, unless mapped */
     Complex *coupling;        /* the blocks of H, one after the other */
     double *own;              /* (d,) the diagonal of the mass matrix of the directions */
-    double *straight;         /* (even,) q0 */
+    double *straight;         /* (even,) rest */
     double *calculated;       /* gamma0 of the flexure types with several pivots */
     Complex anchor, gravity;
     int assembly;             /* the number of assemblies so far */

@@ -93,12 +93,15 @@ static void read_profile(Reader *reader, FlexureType *t) {
     const uint32_t notch = 1u << DIMENSION_END_THICKNESS | 1u << DIMENSION_NOTCH_RADIUS |
                            1u << DIMENSION_NOTCH_DEPTH;
     const uint32_t line = 1u << DIMENSION_CURVATURE | 1u << DIMENSION_RISE;
-    uint32_t others = t->given & ~line, waist = 1u << DIMENSION_WAIST_LENGTH;
-    bool leaf = others == 0u, notched = (t->given & ~waist) == notch;
+    const uint32_t strain = 1u << DIMENSION_INITIAL_STRAIN;
+    uint32_t given = t->given & ~strain;
+    uint32_t others = given & ~line, waist = 1u << DIMENSION_WAIST_LENGTH;
+    bool leaf = others == 0u, notched = (given & ~waist) == notch;
     bool fits = t->profile == PROFILE_LEAF    ? leaf
                 : t->profile == PROFILE_TAPER ? others == taper
                                               : notched;
-    if (!fits || (t->given & line) == line || (t->order == 0 && t->given != 0u)) {
+    if (!fits || (given & line) == line || (t->order == 0 && given != 0u) ||
+        (given != t->given && !t->axial)) {
         reader->wrong = reader->wrong ? reader->wrong : "a flexure type with wrong dimensions";
     }
 }

@@ -107,7 +107,20 @@ PRBM int completed_step(Instance *instance, bool *event) {
 
 /* --- directional derivatives ------------------------------------------------------------------ */
 
-/* Add the seed of a known.  Log an error and return false if it is not an input or a state. */
+/* Return why there is no derivative with respect to a parameter; NULL if there is one.  It exists in
+ * the modes in which the parameter may change. */
+static const char *why_constant(const Instance *instance, int slot) {
+    if (instance->mode == MODE_INITIALIZATION) {
+        return NULL;
+    }
+    if (instance->mode != MODE_EVENT) {
+        return "parameters change in Initialization Mode and, if they are tunable, in Event Mode";
+    }
+    bool tunable = instance->mechanism->parameters[slot].tunable;
+    return tunable ? NULL : "fixed parameters change in Initialization Mode only";
+}
+
+/* Add the seed of a known.  Log an error and return false if it is none in this mode. */
 static bool seeded(Instance *instance, uint32_t reference, double seed) {
     const Mechanism *mechanism = instance->mechanism;
     const Variable *variable = find_variable(mechanism, reference);
@@ -118,14 +131,22 @@ static bool seeded(Instance *instance, uint32_t reference, double seed) {
         return false;
     }
     int slot = variable->slot, state = instance->state_of[slot];
-    if (is_input(mechanism, slot)) {
+    const char *why = is_parameter(mechanism, slot) ? why_constant(instance, slot) : NULL;
+    if (why) {
+        refuse(instance, FMU_ERROR, "there is no derivative with respect to %s: %s", variable->name,
+               why);
+        return false;
+    }
+    if (is_parameter(mechanism, slot)) {
+        instance->dp[slot] += seed;
+    } else if (is_input(mechanism, slot)) {
         instance->du[slot - mechanism->slots.inputs] += seed;
     } else if (state >= 0 && instance->mode != MODE_INITIALIZATION) {
         instance->dx[state] += seed;
     } else {
         refuse(instance, FMU_ERROR, "there is no derivative with respect to %s: %s", variable->name,
-               state >= 0 ? "only inputs are knowns in Initialization Mode"
-                          : "the knowns are inputs and states");
+               state >= 0 ? "states are no knowns in Initialization Mode"
+                          : "the knowns are inputs, states and parameters");
         return false;
     }
     return true;
@@ -151,6 +172,65 @@ static int differentiable(const Instance *instance, uint32_t reference) {
     return variable->slot;
 }
 
+/* Change a parameter, from the state that keep has saved. */
+static bool shift(Instance *instance, int slot, double x, Problem *problem) {
+    go_back(instance);
+    if (instance->mode == MODE_INITIALIZATION) {
+        simulation_unstart(instance->simulation);
+    }
+    return simulation_set(instance->simulation, slot, x, problem) &&
+           (simulation_started(instance->simulation) || start_instance(instance, problem));
+}
+
+/* Compute the unknowns at another value of a parameter, by slot. */
+static bool values_at(Instance *instance, int slot, double x, const uint32_t *unknowns,
+                      size_t count, double *values, Problem *problem) {
+    bool ok = shift(instance, slot, x, problem);
+    for (size_t i = 0; ok && i < count; i++) {
+        int unknown = find_variable(instance->mechanism, unknowns[i])->slot;
+        ok = simulation_get(instance->simulation, unknown, values + unknown, problem);
+    }
+    return ok;
+}
+
+/* Add the derivatives with respect to a parameter, by a difference: a central one, or a one-sided
+ * one beside a bound. */
+static bool add_difference(Instance *instance, int slot, const uint32_t *unknowns, size_t count,
+                           double *sensitivity, Problem *problem) {
+    double *high = instance->dvalues, *low = instance->shifted, x = 0.0;
+    (void)simulation_get(instance->simulation, slot, &x, problem);
+    double step = x != 0.0 ? DIFFERENCE_RTOL * (x < 0.0 ? -x : x) : DIFFERENCE_ATOL;
+    double above = step, below = -step;
+    bool ok = values_at(instance, slot, x + above, unknowns, count, high, problem);
+    if (!ok) {
+        above = 0.0;
+        ok = values_at(instance, slot, x, unknowns, count, high, problem);
+    }
+    if (ok && !values_at(instance, slot, x + below, unknowns, count, low, problem)) {
+        below = 0.0;
+        ok = above > 0.0 && values_at(instance, slot, x, unknowns, count, low, problem);
+    }
+    go_back(instance);
+    for (size_t i = 0; ok && i < count; i++) {
+        int unknown = find_variable(instance->mechanism, unknowns[i])->slot;
+        sensitivity[i] += instance->dp[slot] * (high[unknown] - low[unknown]) / (above - below);
+    }
+    return ok;
+}
+
+/* Add the derivatives along the change dp of the parameters. */
+static bool add_differences(Instance *instance, const uint32_t *unknowns, size_t count,
+                            double *sensitivity, Problem *problem) {
+    keep(instance);
+    for (int p = 0; p < instance->mechanism->parameter_count; p++) {
+        if (instance->dp[p] != 0.0 &&
+            !add_difference(instance, p, unknowns, count, sensitivity, problem)) {
+            return false;
+        }
+    }
+    return true;
+}
+
 PRBM int directional_derivative(Instance *instance, const uint32_t *unknowns, size_t unknown_count,
                                 const uint32_t *knowns, size_t known_count, const double *seed,
                                 double *sensitivity) {
@@ -160,6 +240,7 @@ PRBM int directional_derivative(Instance *instance, const uint32_t *unknowns, si
     }
     memset(instance->dx, 0, (size_t)instance->states * sizeof(double));
     memset(instance->du, 0, (size_t)instance->mechanism->input_count * sizeof(double));
+    memset(instance->dp, 0, (size_t)instance->mechanism->parameter_count * sizeof(double));
     for (size_t i = 0; i < known_count; i++) {
         if (!seeded(instance, knowns[i], seed[i])) {
             return FMU_ERROR;
@@ -176,12 +257,16 @@ PRBM int directional_derivative(Instance *instance, const uint32_t *unknowns, si
                       "%s", problem.text);
     }
     for (size_t i = 0; i < unknown_count; i++) {
-        const Variable *unknown = find_variable(instance->mechanism, unknowns[i]);
-        sensitivity[i] = instance->dvalues[unknown->slot];
+        sensitivity[i] = instance->dvalues[find_variable(instance->mechanism, unknowns[i])->slot];
+    }
+    if (!add_differences(instance, unknowns, unknown_count, sensitivity, &problem)) {
+        return refuse(instance, FMU_DISCARD, "%s", problem.text);
+    }
+    for (size_t i = 0; i < unknown_count; i++) {
         if (!finite_number(sensitivity[i])) {
             return refuse(instance, FMU_DISCARD, "the derivative of %s is not a finite number: the "
                                                  "seed or the states are too large",
-                          unknown->name);
+                          find_variable(instance->mechanism, unknowns[i])->name);
         }
     }
     return FMU_OK;

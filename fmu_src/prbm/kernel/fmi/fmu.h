@@ -135,7 +135,9 @@ struct Instance {
     int *state_of;          /* (slots.count,): index of the state in a slot, or -1. */
     double *before, *after; /* Saved states of the simulation: before a call, and to restore. */
     double *x, *dx, *du;    /* (states,), (states,), (inputs,) */
+    double *dp;             /* (parameters,) */
     double *dvalues;        /* (slots.count,) */
+    double *shifted;        /* (slots.count,): values at other parameters */
 };
 
 /* A copy of an instance's state as bytes, in the same format on every platform. */
@@ -194,6 +196,8 @@ PRBM bool has_rejected(const Instance *instance, int status);
 PRBM double impact_count(const Instance *instance, int stop);
 PRBM void acknowledge(Instance *instance);
 PRBM bool started(Instance *instance);
+/* Start co-simulation or model exchange. */
+PRBM bool start_instance(Instance *instance, Problem *problem);
 
 /* --- values.c --------------------------------------------------------------------------------- */
 

@@ -132,7 +132,9 @@ static Instance *place_instance(Memory *memory, const Request *request, const Me
     it->x = place(memory, states, sizeof(double));
     it->dx = place(memory, states, sizeof(double));
     it->du = place(memory, (size_t)mechanism->input_count, sizeof(double));
+    it->dp = place(memory, (size_t)mechanism->parameter_count, sizeof(double));
     it->dvalues = place(memory, slots, sizeof(double));
+    it->shifted = place(memory, slots, sizeof(double));
     return instance;
 }
 
@@ -305,9 +307,8 @@ PRBM void acknowledge(Instance *instance) {
     }
 }
 
-/* Start co-simulation or model exchange.  Log a warning if the tolerance of co-simulation is too
- * loose to be used. */
-static bool start(Instance *instance, Problem *problem) {
+/* Log a warning if the tolerance of co-simulation is too loose to be used. */
+PRBM bool start_instance(Instance *instance, Problem *problem) {
     Simulation *simulation = instance->simulation;
     bool exchange = instance->kind == MODEL_EXCHANGE;
     if (!simulation_start(simulation, instance->start_time, instance->tolerance, exchange,
@@ -343,7 +344,7 @@ PRBM bool started(Instance *instance) {
         refuse(instance, FMU_ERROR, "the instance was never initialized: " TO_RESET);
         return false;
     }
-    if (!start(instance, &problem)) {
+    if (!start_instance(instance, &problem)) {
         refuse(instance, FMU_ERROR, "%s", problem.text);
         return false;
     }

@@ -24,19 +24,26 @@ PRBM bool check_depth(const Simulation *sim, int stop, double depth, double time
 /* An indentation and a force. */
 enum { PEAK_DEPTH, PEAK_FORCE, PEAK_VALUES };
 
-/* Compute the indentation and the force of a stop at a time of the latest step. */
-static void contact_at(Simulation *sim, int stop, double t, double value[PEAK_VALUES]) {
+/* Compute the indentation and the force of a stop at a time and a state. */
+static void contact_in(Simulation *sim, int stop, double t, const double *y,
+                       double value[PEAK_VALUES]) {
     Located *located = &sim->stepping.located;
     const System *system = system_of(sim);
     const Equations *equations = &sim->equations;
-    arc_at(sim, t, located->y);
-    directions(system, located->y, located->e);
-    const double *extra = extra_states(sim, located->y), *v = located->y + system->n;
+    directions(system, y, located->e);
+    const double *extra = extra_states(sim, y), *v = y + system->n;
     double depth = -gap(equations, stop, t, located->e, extra);
     double depth_rate = -gap_rate(equations, stop, t, located->e, v, extra);
     value[PEAK_DEPTH] = depth;
     value[PEAK_FORCE] = contact_force(&equations->laws[stop], &equations->contacts.touching[stop],
                                       depth, depth_rate);
+}
+
+/* The same at a time of the latest step. */
+static void contact_at(Simulation *sim, int stop, double t, double value[PEAK_VALUES]) {
+    double *y = sim->stepping.located.y;
+    arc_at(sim, t, y);
+    contact_in(sim, stop, t, y, value);
 }
 
 static double clipped(double x, double low, double high) {
@@ -84,11 +91,33 @@ PRBM void peaks_until(Simulation *sim, int stop, double time, double *depth, dou
     double first[3][PEAK_VALUES];
     *depth = latched->indentation;
     *force = latched->peak_force;
-    if (is_pressed(&sim->state.touching[stop]) && arc->valid && end > start) {
+    if (!is_pressed(&sim->state.touching[stop]) || sim->state.mode.exchange) {
+        return;
+    }
+    if (!arc->valid) {
+        contact_in(sim, stop, sim->state.front_time, sim->state.front, first[0]);
+        *depth = greater(*depth, first[0][PEAK_DEPTH]);
+        *force = greater(*force, first[0][PEAK_FORCE]);
+    } else if (end > start) {
         contact_around(sim, stop, 0.5 * (start + end), 0.5 * (end - start), first);
         *depth = greater(*depth, largest_value(sim, stop, PEAK_DEPTH, start, end, first));
         *force = greater(*force, largest_value(sim, stop, PEAK_FORCE, start, end, first));
     }
+}
+
+static double *dent_of(const Simulation *sim, int stop) {
+    int order = sim->configuration.mechanism->stops[stop].extra / EXTRA_STATES;
+    return sim->state.dents + DENT_NUMBERS * order;
+}
+
+PRBM Dent latest_dent(const Simulation *sim, int stop) {
+    Dent dent;
+    memcpy(&dent, dent_of(sim, stop), sizeof dent);
+    return dent;
+}
+
+PRBM void store_dent(Simulation *sim, int stop, const Dent *dent) {
+    memcpy(dent_of(sim, stop), dent, sizeof *dent);
 }
 
 static Dent dent_now(Simulation *sim, int stop, double gap_now, double rate,
@@ -99,7 +128,8 @@ static Dent dent_now(Simulation *sim, int stop, double gap_now, double rate,
     const Touching *touching = &eq->contacts.touching[stop];
     const double *front = sim->state.front;
     double t = sim->state.front_time;
-    Dent dent = {1.0, t, -gap_now, rate, at->pressure[stop], 0.0};
+    Dent last = latest_dent(sim, stop);
+    Dent dent = {1.0, t, -gap_now, rate, at->pressure[stop], 0.0, last.deepens, last.grows};
     if (touching->phase != PHASE_FREE) {
         double bend = -gap_acceleration(eq, stop, t, directions_at(sim, front),
                                         front + system_of(sim)->n, at);
@@ -130,10 +160,7 @@ PRBM bool latch_present(Simulation *sim, const Evaluation *at, bool smooth, Prob
     for (int k = 0; ok && k < sim->equations.pressed_count; k++) {
         int i = sim->equations.pressed[k];
         Latched *latched = &sim->state.latched[i];
-        int order = sim->configuration.mechanism->stops[i].extra / EXTRA_STATES;
-        double *stored = sim->state.dents + DENT_NUMBERS * order;
-        Dent last, now = dent_now(sim, i, gaps[i], -rates[i], at);
-        memcpy(&last, stored, sizeof last);
+        Dent last = latest_dent(sim, i), now = dent_now(sim, i, gaps[i], -rates[i], at);
         double h = now.time - last.time;
         if (smooth && last.known > 0.0 && h > 0.0) {
             double depth = largest_of_cubic(h, last.depth, last.depth_rate, now.depth, -rates[i]);
@@ -144,7 +171,7 @@ PRBM bool latch_present(Simulation *sim, const Evaluation *at, bool smooth, Prob
         }
         latched->indentation = greater(latched->indentation, now.depth);
         latched->peak_force = greater(latched->peak_force, now.force);
-        memcpy(stored, &now, sizeof now);
+        store_dent(sim, i, &now);
         ok = check_depth(sim, i, now.depth, now.time, problem);
     }
     return ok;

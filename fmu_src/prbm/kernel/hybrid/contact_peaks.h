@@ -10,6 +10,9 @@ PRBM bool check_depth(const Simulation *sim, int stop, double depth, double time
 /* Add force and indentation at the front to the maxima; at: an evaluation there.  If the motion is
  * smooth since the last sample, cubics through both give the maxima between them. */
 PRBM bool latch_present(Simulation *sim, const Evaluation *at, bool smooth, Problem *problem);
+/* The latest sample of a compliant stop. */
+PRBM Dent latest_dent(const Simulation *sim, int stop);
+PRBM void store_dent(Simulation *sim, int stop, const Dent *dent);
 /* Compute the largest indentation and force of a stop up to a time of the latest step. */
 PRBM void peaks_until(Simulation *sim, int stop, double time, double *depth, double *force);
 /* Add the maxima up to a time of the latest step to the latched values. */

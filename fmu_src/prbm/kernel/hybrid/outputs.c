@@ -191,7 +191,7 @@ static void output_energies(Simulation *sim) {
     double *out = sim->present.outputs + system->mechanism->slots.energies;
     double *deflection = take(&sim->scratch, (size_t)n);
     for (int j = 0; j < n; j++) {
-        deflection[j] = sim->present.y[j] - system->q0[j];
+        deflection[j] = sim->present.y[j] - system->rest[j];
     }
     out[ENERGY_ELASTIC] = elastic_energy(n, system->K, deflection);
     for (int i = 0; system->mechanism->compliant_count > 0 && i < system->s; i++) {

@@ -58,9 +58,10 @@ typedef struct {
 } Node;
 
 /* Indentation and force of a stop, and their rates, at the end of a step of model exchange.  known:
- * whether there has been one. */
+ * whether there has been one; deepens, grows: signs of the rates of indentation and force after the
+ * latest event, 0 before the first. */
 typedef struct {
-    double known, time, depth, depth_rate, force, force_rate;
+    double known, time, depth, depth_rate, force, force_rate, deepens, grows;
 } Dent;
 
 enum { DENT_NUMBERS = sizeof(Dent) / sizeof(double) };
