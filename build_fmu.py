@@ -9,6 +9,6 @@ from pathlib import Path
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parent / "fmu_src"))
 
-    from prbm.commands.build_fmu import main
+    from prbm.__main__ import build
 
-    sys.exit(main())
+    sys.exit(build())

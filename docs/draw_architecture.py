@@ -30,7 +30,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "fmu_src" / "prbm"
 PICTURE = ROOT / "docs" / "figures" / "architecture.png"
 ABOUT = {
-    "commands": "the command lines prbm and prbm-build-fmu",
+    "commands": "the command line prbm",
     "validation": "the results of the thesis, computed again",
     "plots": "figures, pictures and films",
     "systems": "coupled FMUs: master, SSP, containers, model exchange",

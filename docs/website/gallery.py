@@ -98,7 +98,7 @@ hide-toc: true
 ```
 
 `prbm explore {name}` writes <a href="../{ALONE}/{name}.html">this page as one file</a>, with the
-equations and all variables. `prbm-build-fmu --model {name}` builds its FMUs.
+equations and all variables. `prbm build {name}` builds its FMUs.
 
 ## Mechanism file
 

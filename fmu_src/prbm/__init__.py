@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .analysis.linear_model import linearize as linearize
     from .analysis.static_shape import equilibrium as equilibrium
+    from .analysis.static_shape import modes as modes
     from .base.errors import EquilibriumError as EquilibriumError
     from .base.errors import MechanismError as MechanismError
     from .base.errors import ParameterError as ParameterError
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from .cad.importing import read_drawing as read_drawing
     from .files.mechanism_file import load as load
     from .mechanism.description import Mechanism
+    from .mechanism.flexure import register_model as register_model
     from .plots.shown import Result, simulate
     from .runs.engine import simulation as Simulation
     from .runs.result import ResultError as ResultError
@@ -46,7 +48,9 @@ __all__ = [
     "equilibrium",
     "linearize",
     "load",
+    "modes",
     "read_drawing",
+    "register_model",
     "simulate",
     "study",
 ]
@@ -66,7 +70,9 @@ _MODULES = {
     "equilibrium": ("analysis.static_shape", "equilibrium"),
     "linearize": ("analysis.linear_model", "linearize"),
     "load": ("files.mechanism_file", "load"),
+    "modes": ("analysis.static_shape", "modes"),
     "read_drawing": ("cad.importing", "read_drawing"),
+    "register_model": ("mechanism.flexure", "register_model"),
     "simulate": ("plots.shown", "simulate"),
     "study": ("sweeps.study", "study"),
 }

@@ -1,12 +1,12 @@
-"""Entry point of the command ``prbm``; it reports a missing package in one sentence."""
+"""Entry points of the commands; they report a missing package in one sentence."""
 
 import sys
 
 MISTAKE, INTERRUPTED = 2, 130
 
 
-def main() -> int:
-    """Run the command; return its exit status."""
+def main(*words: str) -> int:
+    """Run the command ``prbm`` with words before those of the user; return its exit status."""
     try:
         from .commands.program import escape_output, limit_threads
 
@@ -14,7 +14,7 @@ def main() -> int:
         escape_output()
         from .commands.command_line import main as command  # imported here, to catch Ctrl-C
 
-        return command()
+        return command([*words, *sys.argv[1:]])
     except ModuleNotFoundError as error:
         from .commands.missing import missing_package
 
@@ -23,6 +23,11 @@ def main() -> int:
     except KeyboardInterrupt:
         print("prbm: interrupted", file=sys.stderr)
         return INTERRUPTED
+
+
+def build() -> int:
+    """Run ``prbm build`` under its former name, ``prbm-build-fmu``; return its exit status."""
+    return main("build")
 
 
 if __name__ == "__main__":

@@ -20,13 +20,17 @@ from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 
 from fmu_host import simulate_fmu
+from prbm import __main__ as entry
 from prbm.base import atomic
 from prbm.base.errors import MechanismError
-from prbm.commands import build_fmu as command
 from prbm.commands import building as cli
 from prbm.commands import fmu_report as report
+from prbm.commands import program
+from prbm.commands.command_line import main, parser
+from prbm.commands.program import FAILED, INTERRUPTED, MISTAKE, OK
 from prbm.drawing.icon import icon
 from prbm.files.mechanism_file import read_mechanism, shipped
+from prbm.files.settings import UserMistake
 from prbm.fmu import python_fmu
 from prbm.fmu.description import Heading, model_description
 from prbm.fmu.start import interface, start
@@ -48,9 +52,9 @@ def build(folder: Path, *options: str, **environment: str) -> subprocess.Complet
     )  # fmt: skip
 
 
-@pytest.fixture(autouse=True)
-def _program_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys, "argv", ["build_fmu.py"])
+def run(*words: str) -> int:
+    """Run the command in this process; return its status."""
+    return main(["build", *words])
 
 
 @pytest.mark.native
@@ -103,7 +107,7 @@ SELECTED = {
 @pytest.mark.parametrize("options", SELECTED)
 def test_options_select_the_kinds_of_fmus(options, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert cli.main([*options.split(), "--model", "PRBDM"]) == cli.OK
+    assert run(*options.split(), "--model", "PRBDM") == OK
     assert {p.name for p in (tmp_path / "dist").iterdir()} == SELECTED[options]
 
 
@@ -127,10 +131,10 @@ def _no_compiler(monkeypatch) -> None:
 @pytest.mark.usefixtures("_no_compiler")
 def test_without_a_compiler_only_the_python_fmus_are_built(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert cli.main(["--model", "PRBDM"]) == cli.FAILED
+    assert run("--model", "PRBDM") == FAILED
     printed = capsys.readouterr()
     assert [p.name for p in (tmp_path / "dist").rglob("*.fmu")] == ["PRBDM.fmu"]
-    assert printed.err.startswith("build_fmu.py: only the Python FMUs were built: the kernel needs")
+    assert printed.err.startswith("prbm build: only the Python FMUs were built: the kernel needs")
     assert "pip install ziglang" in printed.err
     assert printed.err.count("\n") == 1
 
@@ -144,7 +148,7 @@ def test_the_reason_for_a_page_without_simulation_is_a_sentence(tmp_path, monkey
         lambda name: None if name == "ziglang" else found(name),
     )
     monkeypatch.setattr(compiler, "prebuilt", lambda *arguments: None)
-    assert cli.main(["--model", "PRBDM", "--fmi", "3", "--out", str(tmp_path)]) == cli.OK
+    assert run("--model", "PRBDM", "--fmi", "3", "--out", str(tmp_path)) == OK
     *stages, written = capsys.readouterr().out.splitlines()
     (reason,) = [line for line in stages if not line.endswith(" ...")]
     assert reason.startswith("fmi3/PRBDM: the documentation has no simulation: a page that")
@@ -156,7 +160,7 @@ def test_the_reason_for_a_page_without_simulation_is_a_sentence(tmp_path, monkey
 @pytest.mark.parametrize("options", ["--flavour native", "--fmi 2", "--clock", "--platform host"])
 def test_selecting_native_fmus_without_a_compiler_fails(options, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert cli.main([*options.split(), "--model", "PRBDM"]) == cli.MISTAKE
+    assert run(*options.split(), "--model", "PRBDM") == MISTAKE
     assert "pip install ziglang" in capsys.readouterr().err
     assert [*tmp_path.iterdir()] == []
 
@@ -165,7 +169,7 @@ def test_fmus_for_another_platform_cannot_be_simulated(tmp_path, monkeypatch, ca
     monkeypatch.chdir(tmp_path)
     here = compiler.this_platform().name
     other = next(name for name in compiler.PLATFORMS if name != here)
-    assert cli.main(["--platform", other, "--simulate"]) == cli.MISTAKE
+    assert run("--platform", other, "--simulate") == MISTAKE
     assert f"FMUs for {other} do not run on this machine" in capsys.readouterr().err
     assert [*tmp_path.iterdir()] == []
 
@@ -191,7 +195,8 @@ def test_an_installed_wheel_has_the_kernel(tmp_path):
         sys.executable,
         "-I",
         "-m",
-        "prbm.commands.build_fmu",
+        "prbm",
+        "build",
         "--flavour",
         "native",
         "--model",
@@ -206,7 +211,7 @@ def test_an_installed_wheel_has_the_kernel(tmp_path):
 def test_platforms_have_the_names_of_fmi_2_and_3():
     def named(*texts: str) -> tuple[str, ...]:
         arguments = [part for text in texts for part in ("--platform", text)]
-        return cli.selected_platforms(cli.parser().parse_args(arguments))
+        return cli.selected_platforms(parser().parse_args(["build", *arguments]))
 
     assert named() == ("host",)
     assert named("win64,x86_64-windows", "aarch64-darwin", "darwin64") == (
@@ -252,7 +257,7 @@ def test_no_file_is_written_if_one_mechanism_fails(tmp_path, monkeypatch, capfd)
     """The 2R guide, the second mechanism, has no equilibrium under a weight that buckles it."""
     monkeypatch.chdir(tmp_path)
     options = ["--set", "gravity.x=0", "--set", "gravity.y=-100"]
-    assert cli.main([*GUIDES, *options]) == cli.MISTAKE
+    assert run(*GUIDES, *options) == MISTAKE
     printed = capfd.readouterr()
     assert "python/PRBDM: packing" in printed.out
     assert "PRBDM2R: release.displacement = -0.018 m cannot be reached" in printed.err
@@ -277,10 +282,13 @@ def test_the_copy_of_pythonfmu_in_an_fmu_that_ran_before_is_not_packed(
 
 def test_a_parameter_of_one_mechanism_is_rejected_before_the_build(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert cli.main([*GUIDES, "--set", "flexure.gamma=0.8"]) == cli.MISTAKE
+    assert run(*GUIDES, "--set", "flexure.gamma=0.8") == MISTAKE
     printed = capsys.readouterr()
     assert printed.out == ""
-    assert "no such parameter or input in PRBDM2R; add --model PRBDM " in printed.err
+    assert (
+        "no such parameter or input in PRBDM2R; name only mechanisms that have it: PRBDM\n"
+        in printed.err
+    )
 
 
 def test_ctrl_c_during_the_build_leaves_no_file(tmp_path, monkeypatch, capsys):
@@ -289,8 +297,8 @@ def test_ctrl_c_during_the_build_leaves_no_file(tmp_path, monkeypatch, capsys):
 
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(python_fmu, "zipped", interrupted)
-    assert cli.main(["--model", "PRBDM"]) == cli.INTERRUPTED
-    assert capsys.readouterr().err == "build_fmu.py: interrupted\n"
+    assert run("--model", "PRBDM") == INTERRUPTED
+    assert capsys.readouterr().err == "prbm build: interrupted\n"
     assert [*tmp_path.iterdir()] == []
 
 
@@ -327,21 +335,21 @@ EPOCHS = {"999999999999999999": None, "soon": None, "86400": "1970-01-02T00:00:0
 def test_mistakes_are_one_sentence_and_status_2(command, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "file").write_text("a file where a folder is needed", encoding="utf-8")
-    assert cli.main(command.split()) == cli.MISTAKE
+    assert run(*command.split()) == MISTAKE
     error = capsys.readouterr().err
     assert MISTAKES[command] in error
-    assert error.startswith("build_fmu.py: ")
+    assert error.startswith("prbm build: ")
     assert error.count("\n") == 1
     assert [*tmp_path.iterdir()] == [tmp_path / "file"]
 
 
 def test_start_values_may_have_units():
-    options = cli.parser().parse_args(["--model", "PRBDM", "--set", "stop.position=-2 mm"])
+    options = parser().parse_args(["build", "--model", "PRBDM", "--set", "stop.position=-2 mm"])
     assert cli.start_values(cli.mechanisms(options), options.changes) == {"stop.position": -0.002}
 
 
 def test_list_prints_the_shipped_mechanisms(capsys):
-    assert cli.main(["--list"]) == cli.OK
+    assert run("--list") == OK
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines] == [*shipped()]
     assert all(len(line) < 120 for line in lines)
@@ -376,7 +384,7 @@ def test_source_date_epoch_sets_the_date(epoch, mechanisms, tmp_path, monkeypatc
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("SOURCE_DATE_EPOCH", epoch)
     if EPOCHS[epoch] is None:
-        assert command.main() == cli.MISTAKE
+        assert run() == MISTAKE
         assert f"SOURCE_DATE_EPOCH = {epoch!r} must be a number" in capsys.readouterr().err
         assert [*tmp_path.iterdir()] == []
     else:
@@ -411,7 +419,7 @@ def test_the_module_name_depends_on_the_script(mechanisms, monkeypatch):
 def test_a_folder_with_the_name_of_an_output_file_is_reported(name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "dist" / "python" / name).mkdir(parents=True)
-    assert cli.main(["--model", "PRBDM", "--simulate"]) == cli.MISTAKE
+    assert run("--model", "PRBDM", "--simulate") == MISTAKE
     printed = capsys.readouterr()
     assert printed.out == ""
     assert f"{name}: it is a folder" in printed.err
@@ -419,32 +427,40 @@ def test_a_folder_with_the_name_of_an_output_file_is_reported(name, tmp_path, mo
 
 @pytest.mark.slow
 def test_an_unwritable_figure_is_reported_after_the_summary(fmus, tmp_path, capsys):
-    assert report.main([str(fmus["PRBDM"]), str(tmp_path)]) == cli.MISTAKE
+    assert report.main([str(fmus["PRBDM"]), str(tmp_path)]) == MISTAKE
     printed = capsys.readouterr()
     assert "impacts at stop" in printed.out
     assert f"cannot write the figure {tmp_path}: " in printed.err
 
 
-@pytest.mark.parametrize(
-    ("typed", "named"),
-    [
-        ("/clone/build_fmu.py", "build_fmu.py"),
-        ("/venv/bin/prbm-build-fmu", "prbm-build-fmu"),
-        ("prbm-build-fmu.exe", "prbm-build-fmu"),
-        (command.__file__, "python -m prbm.commands.build_fmu"),
-    ],
-)
-def test_messages_begin_with_the_typed_program_name(typed, named, monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", [typed])
-    assert cli.main(["--bogus"]) == cli.MISTAKE
-    assert capsys.readouterr().err.startswith(f"{named}: unrecognized arguments: --bogus")
+@pytest.mark.parametrize("option", ["--list", "--schema", "--version"])
+def test_the_former_name_is_the_same_command(option, monkeypatch, capsys):
+    printed = []
+    for entry_point, words in ((entry.main, ["prbm", "build"]), (entry.build, ["prbm-build-fmu"])):
+        monkeypatch.setattr(sys, "argv", [*words, option])
+        assert entry_point() == OK
+        printed.append(capsys.readouterr().out)
+    assert printed[0] == printed[1] != ""
 
 
-def test_version_is_printed(capsys):
-    with pytest.raises(SystemExit) as end:
-        cli.main(["--version"])
-    assert end.value.code == 0
-    assert re.fullmatch(r"prbm-impact \d+\.\d+\.\d+\n", capsys.readouterr().out)
+def test_names_files_and_options_select_mechanisms_once(tmp_path):
+    path = tmp_path / "mine.toml"
+    text = shipped()["PRBDM"].read_text(encoding="utf-8")
+    path.write_text(text.replace('name = "PRBDM"', 'name = "Mine"'), encoding="utf-8")
+
+    def names(*words: str) -> list[str]:
+        return [m.name for m in cli.mechanisms(parser().parse_args(["build", *words]))]
+
+    assert names("PRBDM2R", str(path), "PRBDM2R", "--model", "PRBDM") == [
+        "PRBDM2R",
+        "Mine",
+        "PRBDM",
+    ]
+    assert names("--mechanism", str(path)) == ["Mine"]
+    assert names() == [*shipped()]
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(UserMistake, match="two mechanisms have the name PRBDM"):
+        names("PRBDM", str(path))
 
 
 def summary_of(mechanisms, tmp_path, **changes: float) -> str:
@@ -485,8 +501,7 @@ def test_ctrl_c_ends_a_simulation_without_a_summary(fmus, tmp_path, moment):
     fmu.write_bytes(fmus["PRBDM2R"].read_bytes())
     code = (
         "import sys; from pathlib import Path; from prbm.commands import building as cli\n"
-        "sys.argv = ['build_fmu.py']\n"
-        "try: cli._simulate([Path(sys.stdin.read())])\n"
+        "try: cli._simulate([Path(sys.stdin.read())], 'prbm build')\n"
         "except KeyboardInterrupt: print('interrupted')"
     )
     with subprocess.Popen(
@@ -517,8 +532,8 @@ def test_ctrl_c_ends_the_processes_of_a_build(tmp_path, moment):
         time.sleep(moment)
         os.killpg(process.pid, signal.SIGINT)
         errors = process.stderr.read()
-    assert process.returncode == cli.INTERRUPTED
-    assert errors == "build_fmu.py: interrupted\n"
+    assert process.returncode == INTERRUPTED
+    assert errors == "prbm build: interrupted\n"
     assert list(tmp_path.rglob("*.fmu")) == []
 
 
@@ -568,25 +583,26 @@ def test_titles_are_escaped_in_script_and_xml(tmp_path):
 @pytest.mark.parametrize("wrong", ["999999999999999999", "soon"])
 def test_an_invalid_date_is_reported_before_scipy_is_imported(tmp_path, wrong):
     done = build(tmp_path, "--list", SOURCE_DATE_EPOCH=wrong)
-    assert done.returncode == cli.MISTAKE
+    assert done.returncode == MISTAKE
     assert done.stderr.count("\n") == 1
     assert f"SOURCE_DATE_EPOCH = {wrong!r}" in done.stderr
 
 
 def test_ctrl_c_during_the_imports_has_no_traceback(monkeypatch, capsys):
-    def interrupted() -> str:
+    def interrupted() -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(command, "date", interrupted)
-    assert command.main() == cli.INTERRUPTED
-    assert capsys.readouterr().err == "build_fmu.py: interrupted\n"
+    monkeypatch.setattr(program, "limit_threads", interrupted)
+    assert entry.build() == INTERRUPTED
+    assert capsys.readouterr().err == "prbm: interrupted\n"
 
 
 def test_a_missing_package_is_named(monkeypatch, capsys):
     monkeypatch.delitem(sys.modules, "prbm.commands.building")
     monkeypatch.delattr(sys.modules["prbm.commands"], "building")
     monkeypatch.setitem(sys.modules, "prbm.base.atomic", None)
-    assert command.main() == cli.MISTAKE
+    monkeypatch.setattr(sys, "argv", ["prbm-build-fmu"])
+    assert entry.build() == MISTAKE
     assert "the Python package prbm is missing; install it with" in capsys.readouterr().err
 
 

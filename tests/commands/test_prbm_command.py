@@ -21,6 +21,7 @@ from prbm.__main__ import main as started
 from prbm.base import atomic as files
 from prbm.commands import command_line as cli
 from prbm.commands import systems
+from prbm.commands.output import RowFile
 from prbm.files.mechanism_file import load, shipped
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.statics import free_displacement
@@ -30,9 +31,10 @@ from support import ROOT, SUPPORT
 
 PAGE = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")
 COMMANDS = (
-    "list", "parameters", "modes", "equilibrium", "linearize", "simulate", "stress", "shock", "fit",
-    "impact-map", "contact", "sweep", "study", "import", "export", "picture", "animate", "explore",
-    "modelica", "ssp", "validate", "measure youngs-modulus", "measure calibration",
+    "list", "new", "parameters", "modes", "equilibrium", "linearize", "simulate", "stress", "shock",
+    "fit", "impact-map", "contact", "sweep", "study", "import", "export", "picture", "animate",
+    "explore", "build", "modelica", "ssp", "validate", "measure youngs-modulus",
+    "measure calibration",
     "measure frequency", "measure restitution", "completion",
 )  # fmt: skip
 
@@ -84,6 +86,33 @@ def test_a_study_writes_its_samples_and_prints_its_optimum(capsys):
     assert "it reaches the end of the samples" in printed
     with Image.open("PRBDM-study.png") as image:
         assert image.format == "PNG"
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_study_without_an_optimum_has_written_its_rows(workers, capsys):
+    line = "study PRBDM --vary 'stop.position=0:2 mm:3' --of stop.gap --minimise settling"
+    line += f" --stop-time 1ms --step 1ms --workers {workers} --out ."
+    assert run(line) == cli.MISTAKE
+    printed = capsys.readouterr().err
+    assert "no simulation has a value of settling" in printed
+    assert "PRBDM-study.csv has the 3 completed rows" in printed
+    assert table("PRBDM-study.csv")["stop.position [m]"] == ["0.0", "0.001", "0.002"]
+
+
+def test_an_interrupted_study_keeps_the_rows_before_the_interruption(monkeypatch, capsys):
+    add, rows = RowFile.add, []
+
+    def interrupted(self: RowFile, heads: list[str], row: list[object]) -> None:
+        if len(rows) == 2:
+            raise KeyboardInterrupt
+        rows.append(row)
+        add(self, heads, row)
+
+    monkeypatch.setattr(RowFile, "add", interrupted)
+    line = "study PRBDM --vary 'stop.position=0:3 mm:4' --of stop.gap --workers 1"
+    assert run(f"{line} --stop-time 1ms --step 1ms --out .") == cli.INTERRUPTED
+    assert "interrupted; PRBDM-study.csv has the 2 completed rows" in capsys.readouterr().err
+    assert table("PRBDM-study.csv")["stop.position [m]"] == ["0.0", "0.001"]
 
 
 @pytest.mark.slow
@@ -866,7 +895,7 @@ def test_ctrl_c_ends_a_simulation_without_a_traceback():
 def test_errors_during_the_imports_are_reported_in_one_sentence(
     raised, sentence, status, monkeypatch, capsys
 ):
-    def ends() -> int:
+    def ends(_: object) -> int:
         raise raised
 
     monkeypatch.setattr(cli, "main", ends)

@@ -10,10 +10,10 @@ import pytest
 
 from prbm import __main__
 from prbm.base.threads import THREAD_LIMITS
-from prbm.commands import build_fmu, program
+from prbm.commands import program
 
 
-@pytest.mark.parametrize("main", [__main__.main, build_fmu.main])
+@pytest.mark.parametrize("main", [__main__.main, __main__.build])
 @pytest.mark.parametrize("given", [None, "3"])
 def test_threads_of_linear_algebra_default_to_one(main, given, monkeypatch, capsys):
     for name in THREAD_LIMITS:
@@ -27,7 +27,7 @@ def test_threads_of_linear_algebra_default_to_one(main, given, monkeypatch, caps
     assert {os.environ[name] for name in THREAD_LIMITS} == {given or "1"}
 
 
-@pytest.mark.parametrize("main", [__main__.main, build_fmu.main])
+@pytest.mark.parametrize("main", [__main__.main, __main__.build])
 def test_characters_that_the_output_cannot_encode_are_printed_as_escapes(main, monkeypatch):
     printed = io.BytesIO()
     monkeypatch.setattr("sys.stdout", io.TextIOWrapper(printed, encoding="ascii"))
@@ -43,16 +43,8 @@ def test_characters_that_the_output_cannot_encode_are_printed_as_escapes(main, m
     "arguments",
     [
         ["prbm", "list"],
-        ["prbm.commands.build_fmu", "--list"],
-        [
-            "prbm.commands.build_fmu",
-            "--flavour",
-            "python",
-            "--model",
-            "PRBDM",
-            "--model",
-            "PRBDM2R",
-        ],
+        ["prbm", "build", "--list"],
+        ["prbm", "build", "--flavour", "python", "PRBDM", "PRBDM2R"],
     ],
 )
 def test_a_reader_that_closes_the_pipe_ends_a_command_without_a_message(arguments, tmp_path):

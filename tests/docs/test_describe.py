@@ -14,7 +14,6 @@ from prbm.analysis.adequacy import Cause, Impact, Quantity, check
 from prbm.files.mechanism_file import read_mechanism
 from support import ROOT
 
-PROGRAMS = {"prbm": "prbm", "prbm-build-fmu": "prbm.commands.build_fmu"}
 PAGE = (ROOT / "docs" / "describe-your-mechanism.md").read_text(encoding="utf-8")
 
 
@@ -65,8 +64,7 @@ def test_commands_and_code_of_the_page_print_its_results(
     paths = os.pathsep.join([str(ROOT / "fmu_src"), *os.environ.get("PYTHONPATH", "").split(":")])
     for block in blocks("sh"):
         for line in block.splitlines():
-            program, *words = shlex.split(line)
-            command = [sys.executable, "-m", PROGRAMS[program], *words]
+            command = [sys.executable, "-m", *shlex.split(line)]
             subprocess.run(command, check=True, env=os.environ | {"PYTHONPATH": paths})
     with (
         Image.open("lever.png") as drawn,

@@ -6,6 +6,7 @@ import shutil
 
 import pytest
 
+from prbm.base.version import __version__
 from prbm.commands.command_line import main
 from support import ROOT
 
@@ -19,7 +20,7 @@ def blocks(text: str) -> list[str]:
 
 @pytest.fixture
 def _built(fmus, native, tmp_path, monkeypatch) -> None:
-    """Change to a folder with the FMUs of the guides, in the folders of ``prbm-build-fmu``."""
+    """Change to a folder with the FMUs of the guides, in the folders of ``prbm build``."""
     paths = {("python", name): path for name, path in fmus.items()}
     paths |= {(f"fmi{fmi}", name): path for (name, fmi), path in native.items()}
     for (folder, name), path in paths.items():
@@ -86,3 +87,7 @@ def test_two_commands_set_up_the_development():
     assert len(lines) == 2
     assert "build_fmu.py --simulate" in lines[0]
     assert "pytest" in lines[1]
+
+
+def test_the_named_wheel_has_the_present_version():
+    assert re.findall(r"prbm_impact-([\d.]+)-py3-none-any\.whl", README) == [__version__]

@@ -19,7 +19,8 @@ import pytest
 
 from mechanism_mistakes import CHANGES, CONTENTS, EXAMPLE
 from prbm.base.errors import MechanismError, PrbmError
-from prbm.commands import building as cli
+from prbm.commands.command_line import main
+from prbm.commands.program import MISTAKE, OK
 from prbm.files import record_units, units
 from prbm.files.mechanism_file import read_mechanism, schema, shipped
 from prbm.files.schema import MechanismTable
@@ -322,12 +323,12 @@ def rejection(path: Path, capsys) -> str:
     """Return the message of the build command about an invalid file; check status and format."""
     folder = next(folder for folder in path.parents if folder.is_dir())
     before = [*folder.iterdir()]
-    assert cli.main(["--mechanism", str(path), "--out", str(folder / "dist")]) == cli.MISTAKE
+    assert main(["build", "--mechanism", str(path), "--out", str(folder / "dist")]) == MISTAKE
     output = capsys.readouterr()
     assert output.out == ""
     first, *others = output.err.splitlines()
     command, _, first = first.partition(": ")
-    assert command == "build_fmu.py"
+    assert command == "prbm build"
     for line in (first, *others):
         assert line.startswith(f"{path}: ")
         assert len(line) < len(str(path)) + 700
@@ -338,11 +339,6 @@ def rejection(path: Path, capsys) -> str:
         assert not others
     assert [*folder.iterdir()] == before
     return output.err
-
-
-@pytest.fixture(autouse=True)
-def _program_name(monkeypatch):
-    monkeypatch.setattr(sys, "argv", ["build_fmu.py"])
 
 
 @pytest.mark.parametrize("mistake", CHANGES)
@@ -543,7 +539,7 @@ def test_the_schema_has_unit_bounds_and_description_of_every_key():
 
 
 def test_the_command_prints_the_schema(capsys):
-    assert cli.main(["--schema"]) == cli.OK
+    assert main(["build", "--schema"]) == OK
     assert json.loads(capsys.readouterr().out) == schema()
 
 

@@ -13,7 +13,7 @@ from lxml import etree
 
 from prbm.base.errors import ParameterError
 from prbm.commands import building
-from prbm.commands.command_line import main
+from prbm.commands.command_line import main, parser
 from prbm.commands.program import MISTAKE, OK
 from prbm.files.mechanism_file import read_mechanism, shipped
 from prbm.files.settings import units_of
@@ -152,7 +152,7 @@ def test_fmus_contain_the_set_of_their_start_values(tmp_path):
     """A set applied with FMPy to an FMU gives the motion of an FMU that is built with it."""
     guide = read_mechanism(shipped()["PRBDM"])
     path = written(tmp_path, parameter_set(guide, interface(guide, CHANGES)))
-    options = building.parser().parse_args(["--model", "PRBDM", "--parameters", str(path)])
+    options = parser().parse_args(["build", "PRBDM", "--parameters", str(path)])
     changes = building.start_values(building.mechanisms(options), [], options.parameters)
     assert {name: changes[name] for name in CHANGES} == CHANGES
     plain, changed = tmp_path / "plain.fmu", tmp_path / "changed.fmu"

@@ -83,7 +83,8 @@ def test_a_second_export_takes_the_library_from_the_cache(cache, monkeypatch):
     monkeypatch.setattr(compiler, "_loaded", {})  # The memory of a new process is empty.
     monkeypatch.setattr(compiler, "compiled", lambda *_: pytest.fail("compiled again"))
     assert libraries([HOST], messages.append) == first
-    assert messages == [f"compiling the kernel for {this_platform().name} with cc"]
+    (message,) = messages
+    assert message.startswith(f"compiling the kernel for {this_platform().name} with cc, once")
     assert len(entries(cache)) == 1
 
 
@@ -144,8 +145,8 @@ def test_the_next_compiler_is_used_if_one_fails(cache, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", f"{folder}{os.pathsep}{os.environ['PATH']}")
     messages: list[str] = []
     assert only(libraries([HOST], messages.append))
-    assert messages[0].endswith("with cc")
-    assert messages[1].endswith("with gcc")
+    assert "with cc, once" in messages[0]
+    assert "with gcc, once" in messages[1]
 
 
 def test_a_compiler_that_writes_no_file_is_an_error(cache, tmp_path, monkeypatch):

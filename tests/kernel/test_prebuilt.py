@@ -31,6 +31,27 @@ def test_a_library_is_not_used_after_a_change_of_the_source(package):
     assert prebuilt.prebuilt(NAME, {"a.c": SOURCES["a.c"]}) is None
 
 
+def test_a_library_that_the_package_does_not_list_is_missing_and_not_damaged(package):
+    assert prebuilt.prebuilt("aarch64-linux/prbm_fmu.so", SOURCES) is None
+
+
+def test_a_library_compiled_during_the_installation_serves_this_machine_alone(
+    tmp_path, monkeypatch
+):
+    """It may need the C library of this machine, and so is not one for the platform."""
+    here = this_platform()
+    assert here is not None
+    made = {f"host/prbm_fmu{here.suffix}": b"own"}
+    for name, content in prebuilt.package_files(made, "cc", compiler.kernel()).items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes(content)
+    monkeypatch.setattr(prebuilt, "files", lambda _: tmp_path)
+    monkeypatch.setattr(compiler, "_library", lambda *_: b"compiled")
+    monkeypatch.delenv("CC", raising=False)
+    assert libraries(["host"]) == {here: b"own"}
+    assert libraries([here.name]) == {here: b"compiled"}
+
+
 def test_a_package_without_libraries_has_none(tmp_path, monkeypatch):
     monkeypatch.setattr(prebuilt, "files", lambda _: tmp_path)
     assert prebuilt.prebuilt(NAME, SOURCES) is None

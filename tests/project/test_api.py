@@ -25,7 +25,9 @@ PUBLIC = [
     "equilibrium",
     "linearize",
     "load",
+    "modes",
     "read_drawing",
+    "register_model",
     "simulate",
     "study",
 ]

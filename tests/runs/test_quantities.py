@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from prbm.files.mechanism_file import load
 from prbm.runs.headline import headline
-from prbm.runs.quantities import QUANTITIES, SETTLED_ENERGY_RTOL, settling
+from prbm.runs.quantities import QUANTITIES, SETTLED_ENERGY_RTOL, settling, settling_estimate
 from prbm.runs.run import simulate
 
 DECAY, OMEGA = 4.0, 30.0  # 1/s, rad/s
@@ -128,3 +129,22 @@ def test_a_vibration_beside_a_body_at_rest_is_explained(mechanisms):
 def test_needed_variables_are_reported():
     assert QUANTITIES["settling"].lacking(["energy.kinetic"]) == "mode.frequency"
     assert QUANTITIES["impacts"].lacking(["stop.impact_count"]) == ""
+
+
+@pytest.mark.parametrize("zeta", [0.01, 0.02])
+def test_the_settling_time_is_estimated_from_a_part_of_the_decay(zeta):
+    """A longer run of the same vibration settles at the estimated time."""
+    guide = load("PRBDM")
+    values = {"damping.zeta": zeta, "stop.position": 0.05, "gravity.x": 0.0}
+    short = simulate(guide, values, stop_time=2.0, step=2e-3).columns
+    long = simulate(guide, values, stop_time=40.0, step=2e-3).columns
+    assert np.isnan(settling(short))
+    assert settling_estimate(short, 0.0) == pytest.approx(settling(long), rel=0.03)
+
+
+def test_without_damping_or_time_there_is_no_estimate():
+    guide = load("PRBDM")
+    values = {"damping.beta": 0.0, "stop.position": 0.05}
+    free = simulate(guide, values, stop_time=3.0, step=1e-3).columns
+    assert settling_estimate(free, 0.0) > 1e3
+    assert np.isnan(settling_estimate(free, 2.9))

@@ -48,7 +48,7 @@ DTYPES = {
 
 
 ENUMERATIONS = (
-    "BeamKind",
+    "BranchCode",
     "ContactMode",
     "Phase",
 )  # Those that are types of arguments or of structure members.
@@ -379,8 +379,12 @@ class KernelSystem:
         return array(self.structure.blocks, self.structure.block_count, 3, kind="int")[:, :2]
 
     def mass_blocks(self) -> np.ndarray:
-        """Return start, size and the row apart of each block of the mass matrix."""
+        """Return start, size and split of each block of the mass matrix."""
         return array(self.structure.mass_blocks, self.structure.mass_block_count, 3, kind="int")
+
+    def last(self) -> np.ndarray:
+        """Return the last column of each row of the mass matrix, counted in its block."""
+        return array(self.structure.last, self.structure.n, kind="int")
 
     def frame(self, group: str, i: int) -> tuple[int, int, complex, complex, np.ndarray]:
         """Return ``(j, arm, c, drawn, A)`` of the i-th point of a group, fixed to a body.

@@ -30,7 +30,7 @@ from prbm.sweeps import sweep as sweeps
 from prbm.sweeps.outputs import Output, evaluate, parse_output, reduce
 from prbm.sweeps.results import OWN
 from prbm.sweeps.runs import Job, Runner
-from prbm.sweeps.sweep import SweepError, samples, sweep
+from prbm.sweeps.sweep import SweepError, samples, summary, sweep
 from signals import interruptible
 from support import SUPPORT
 
@@ -617,6 +617,20 @@ def test_the_command_runs_an_fmu_of_another_tool(words):
     name = words[-1] if words else "value"
     np.testing.assert_allclose(found[name], [1.0, 2.0], rtol=1e-12)
     assert [*found["status"]] == ["ok", "ok"]
+
+
+def test_the_summary_names_outputs_without_values():
+    nan = float("nan")
+    found = pd.DataFrame(
+        {"row": [0, 1, 2], "settling": [nan] * 3, "gap": [1.0, nan, nan], "x": [1.0, 2.0, nan],
+         "status": ["ok", "ok", "failed"], "message": ["", "", "no"]}
+    )  # fmt: skip
+    assert summary(found, "out.csv").splitlines() == [
+        "3 runs, 1 failed: out.csv",
+        "row 2 failed: no",
+        "settling: no value in 2 of 2 complete runs; simulate longer, or check the condition",
+        "gap: no value in 1 of 2 complete runs; simulate longer, or check the condition",
+    ]
 
 
 @pytest.mark.slow

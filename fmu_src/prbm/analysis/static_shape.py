@@ -6,11 +6,11 @@ from functools import cached_property
 from typing import NamedTuple
 
 from ..base.errors import ParameterError
-from ..mechanics import statics
+from ..mechanics import modal, statics
 from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble
 from ..mechanics.body_compliance import compliance_matrix
-from ..mechanics.modal import Modes, modes
+from ..mechanics.modal import Modes
 from ..mechanics.statics import Equilibrium, holding_stiffness
 from ..mechanics.stress import Stress, static_stresses
 from ..mechanics.system import BodyFrame, System
@@ -65,7 +65,7 @@ class StaticShape:
     @cached_property
     def modes(self) -> Modes:
         """Modes about the shape, with all loads and the holding force as dead loads."""
-        return modes(self.system, self.shape)
+        return modal.modes(self.system, self.shape)
 
     @property
     def stable(self) -> bool:
@@ -160,3 +160,23 @@ def equilibrium(
     system = assemble(mechanism, mechanism.values(dict(values or {})))
     shape = statics.equilibrium(system, held, loads)
     return StaticShape(system, shape, held is not None, dict(loads or {}))
+
+
+def modes(
+    mechanism: Mechanism,
+    values: Mapping[str, float] | None = None,
+    *,
+    loads: Mapping[str, float] | None = None,
+    held: float | None = None,
+) -> Modes:
+    """Return the modes of a mechanism about a static shape, without stops.
+
+    Arguments and errors are those of :func:`equilibrium`.
+
+    Examples
+    --------
+    >>> import prbm
+    >>> prbm.modes(prbm.load("GuideBeam")).frequency[:2].round(2).tolist()  # Hz
+    [4.91, 130.98]
+    """
+    return equilibrium(mechanism, values, loads=loads, held=held).modes

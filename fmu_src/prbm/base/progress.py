@@ -2,8 +2,10 @@
 
 import math
 import sys
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TextIO
 
 Progress = Callable[[float], object]
@@ -11,6 +13,7 @@ Progress = Callable[[float], object]
 DELAY = 1.0  # A shorter computation reports nothing [s].
 LINE_INTERVAL = 5.0  # Least time between two lines or messages [s].
 TERMINAL_INTERVAL = 0.1  # Least time between two updates of a line on a terminal [s].
+STEADY = 0.8  # Part of an estimated duration in which the reported fraction grows evenly.
 WIDTH = 24  # Characters of the line on a terminal.
 CLEAR = f"\r{'':{WIDTH}}\r"
 
@@ -75,6 +78,53 @@ def messages(
             write(f"{fraction:4.0%}{done}{_remaining(now - first[0], fraction, first[1])}")
 
     return report
+
+
+def estimated(elapsed: float, duration: float) -> float:
+    """Return the completed fraction of a task that takes about ``duration`` [s].
+
+    It grows with time, and stays below 1 if the task takes longer.
+
+    Examples
+    --------
+    >>> [round(estimated(t, 10.0), 2) for t in (0.0, 4.0, 8.0, 10.0, 20.0)]
+    [0.0, 0.4, 0.8, 0.93, 1.0]
+    """
+    part = elapsed / duration
+    rest = 1.0 - STEADY
+    return part if part < STEADY else 1.0 - rest * math.exp((STEADY - part) / rest)
+
+
+@contextmanager
+def waiting(duration: float, stream: TextIO | None = None) -> Iterator[None]:
+    """Report the remaining time of a task that cannot report its progress, on a terminal only.
+
+    Parameters
+    ----------
+    duration : float
+        Approximate time of the task, the ``with`` block [s].
+    stream : text stream or None
+        Destination (default: standard error).
+    """
+    out = sys.stderr if stream is None else stream
+    if out is None or not out.isatty():
+        yield
+        return
+    ended, report, begin = threading.Event(), reporter(out), time.monotonic()
+
+    def update() -> None:
+        while not ended.wait(TERMINAL_INTERVAL):
+            report(estimated(time.monotonic() - begin, duration))
+
+    report(0.0)
+    thread = threading.Thread(target=update, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
+        print(CLEAR, end="", file=out, flush=True)
 
 
 def _remaining(elapsed: float, fraction: float, first: float) -> str:

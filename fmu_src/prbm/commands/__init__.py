@@ -1,1 +1,1 @@
-"""The command lines ``prbm`` and ``prbm-build-fmu``, one module per command."""
+"""The command line ``prbm``, one module per command."""

@@ -1,4 +1,4 @@
-"""The command that builds FMUs and, with ``--simulate``, simulates them."""
+"""``prbm build``: build FMUs and, with ``--simulate``, simulate them."""
 
 import argparse
 import importlib.util
@@ -12,13 +12,11 @@ from dataclasses import dataclass
 from functools import reduce
 from operator import or_
 from pathlib import Path
-from typing import NoReturn
 
 from ..base.atomic import check_no_folder, check_writable, write
 from ..base.errors import PrbmError
 from ..base.processes import executor, process_count
-from ..base.version import __version__
-from ..files.mechanism_file import read_mechanism, schema, shipped
+from ..files.mechanism_file import load, read_mechanism, schema, shipped
 from ..files.settings import UserMistake, assigned, units_of
 from ..fmu import native_fmu, python_fmu
 from ..fmu.export import Export
@@ -28,9 +26,8 @@ from ..kernel.compiler import ALL, HOST, PLATFORMS, CompilerError, this_platform
 from ..mechanism.description import Mechanism
 from ..runs.engine import PYTHON as PYTHON_ENGINE
 from ..runs.experiment import experiment
-from .arguments import ProposingParser
 from .missing import missing_package
-from .program import FAILED, INTERRUPTED, MISTAKE, OK, command_name
+from .program import FAILED, INTERRUPTED, MISTAKE, OK
 
 TERMINATION_TIMEOUT = 2.0  # Time for the process of a simulation to end after Ctrl-C [s].
 REPORT_SCRIPT = f"""
@@ -56,98 +53,21 @@ NATIVE = {"2": Flavour("fmi2", 2), "3": Flavour("fmi3", 3)}
 CLOCKED = Flavour("fmi3-clock", 3, clock=True)
 
 
-class _Parser(ProposingParser):
-    """A parser that raises a mistake as :class:`UserMistake`."""
-
-    def error(self, message: str) -> NoReturn:
-        raise UserMistake(f"{self.proposed(message)}; see {self.prog} --help")
-
-
-def parser() -> argparse.ArgumentParser:
-    """Return the parser of the command line."""
-    p = _Parser(
-        prog=command_name(),
-        description="Build Functional Mock-up Units (FMUs) of compliant mechanisms with impacts.",
-        epilog="Without options, all shipped mechanisms are built into dist/: as Python FMUs, and "
-        "as native FMUs of FMI 2.0 and 3.0 for this machine.",
-    )
-    mechanism = p.add_mutually_exclusive_group()
-    mechanism.add_argument(
-        "--model", action="append", metavar="NAME",
-        help="shipped mechanism, see --list; repeatable (default: all of them)",
-    )  # fmt: skip
-    mechanism.add_argument(
-        "--mechanism", type=Path, metavar="FILE.toml", help="mechanism file to build instead"
-    )
-    p.add_argument(
-        "--flavour", choices=("python", "native"),
-        help="python: readable source, needs Python with NumPy and SciPy where it runs; native: "
-        "compiled, needs no other software (default: both)",
-    )  # fmt: skip
-    p.add_argument("--fmi", choices=("2", "3"), help="version of FMI (default: both)")
-    p.add_argument(
-        "--platform", action="append", metavar="NAME",
-        help=f"platform of native FMUs: {HOST} (this machine), {ALL}, or some of "
-        f"{', '.join(PLATFORMS)}; repeatable; platforms other than {HOST} need the Python package "
-        f"ziglang (default: {HOST})",
-    )  # fmt: skip
-    p.add_argument(
-        "--clock", action="store_true",
-        help="build only the variant of FMI 3.0 whose stops have an output clock",
-    )  # fmt: skip
-    p.add_argument(
-        "--out", type=Path, default=Path("dist"), metavar="DIR",
-        help="output folder (default: dist)",
-    )  # fmt: skip
-    p.add_argument(
-        "--set", action="append", default=[], dest="changes", metavar="NAME=VALUE",
-        help='start value of a parameter or input, in SI or with a unit: "stop.position=1 mm"; '
-        "repeatable",
-    )  # fmt: skip
-    p.add_argument(
-        "--parameters", type=Path, metavar="FILE.ssv",
-        help="start values from a parameter set (SSV), as prbm parameters --out writes; --set has "
-        "priority",
-    )  # fmt: skip
-    p.add_argument(
-        "--simulate", action="store_true",
-        help="simulate each FMU with FMPy, print a summary and write a plot beside the FMU",
-    )  # fmt: skip
-    p.add_argument(
-        "--schema", action="store_true",
-        help="print the JSON schema of mechanism files, for editors, and exit",
-    )  # fmt: skip
-    p.add_argument("--list", action="store_true", help="list the shipped mechanisms and exit")
-    p.add_argument(
-        "--version", action="version", version=f"prbm-impact {__version__}",
-        help="print the version and exit",
-    )  # fmt: skip
-    return p
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; return its exit status."""
-    try:
-        options = parser().parse_args(arguments)
-        if options.list:
-            _list()
-            return OK
-        if options.schema:
-            print(json.dumps(schema(), indent=2))
-            return OK
-        plan = _plan(options)
-        built, missing = _build(plan)
-        status = _simulate(built) if options.simulate else OK
-        if missing:
-            print(f"{command_name()}: {missing}", file=sys.stderr)
-            status = max(status, FAILED)
-        return status
-    except PrbmError as error:
-        print(f"{command_name()}: {error}", file=sys.stderr)
-        return MISTAKE
-    except KeyboardInterrupt:
-        print(f"{command_name()}: interrupted", file=sys.stderr)
-        return INTERRUPTED
+def run_build(options: argparse.Namespace) -> int:
+    """Run ``prbm build``; return its exit status."""
+    if options.list:
+        _list()
+        return OK
+    if options.schema:
+        print(json.dumps(schema(), indent=2))
+        return OK
+    plan = _plan(options)
+    built, missing = _build(plan)
+    status = _simulate(built, options.prog) if options.simulate else OK
+    if missing:
+        print(f"{options.prog}: {missing}", file=sys.stderr)
+        status = max(status, FAILED)
+    return status
 
 
 def _list() -> None:
@@ -270,26 +190,35 @@ def _plan(options: argparse.Namespace) -> BuildPlan:
 
 
 def mechanisms(options: argparse.Namespace) -> list[Mechanism]:
-    """Return the selected mechanisms.
+    """Return the selected mechanisms, all shipped ones if none is selected.
 
     Raises
     ------
     UserMistake
-        If a name is unknown.
+        If a name is unknown, or two mechanisms have the same name.
     MechanismError
         If a file cannot be read or does not describe a mechanism.
     """
-    if options.mechanism is not None:
-        return [read_mechanism(options.mechanism)]
     files = shipped()
-    names = list(dict.fromkeys(options.model or files))
-    for name in names:
+    for name in options.model or ():
         if name not in files:
             raise UserMistake(
                 f"--model {name}: unknown mechanism; the shipped ones are {', '.join(files)}; "
-                "give your own with --mechanism FILE.toml"
+                "give your own as FILE.toml"
             )
-    return [read_mechanism(files[name]) for name in names]
+    words = dict.fromkeys([*options.mechanisms, *(options.model or ())])
+    chosen = [load(word) for word in words]
+    if options.mechanism is not None:
+        chosen.append(read_mechanism(options.mechanism))
+    found: dict[str, Mechanism] = {}
+    for mechanism in chosen or [read_mechanism(path) for path in files.values()]:
+        if mechanism.name in found:
+            raise UserMistake(
+                f"two mechanisms have the name {mechanism.name}, which is that of their FMU; build "
+                "them into different folders with --out"
+            )
+        found[mechanism.name] = mechanism
+    return [*found.values()]
 
 
 def start_values(
@@ -320,10 +249,10 @@ def start_values(
         having = [model for model in units if name in units[model]]
         lacking = [model for model in units if name not in units[model]]
         if lacking:
-            options = " ".join(f"--model {model}" for model in having)
+            options = " ".join(having)
             raise UserMistake(
-                f"{name}: no such parameter or input in {', '.join(lacking)}; add {options} "
-                "to build only mechanisms that have it"
+                f"{name}: no such parameter or input in {', '.join(lacking)}; name only mechanisms "
+                f"that have it: {options}"
             )
     return changes
 
@@ -409,7 +338,7 @@ def _progress(name: str) -> Callable[[str], None]:
     return lambda text: print(f"{name}: {text}{'' if text.endswith('.') else ' ...'}", flush=True)
 
 
-def _simulate(fmus: Sequence[Path]) -> int:
+def _simulate(fmus: Sequence[Path], program: str) -> int:
     """Simulate each FMU in a separate process; return the exit status."""
     source = str(Path(__file__).resolve().parents[2])
     paths = os.pathsep.join(filter(None, (source, os.environ.get("PYTHONPATH"))))
@@ -422,7 +351,7 @@ def _simulate(fmus: Sequence[Path]) -> int:
             raise KeyboardInterrupt
         if code != OK:
             reason = f"was ended by signal {-code}" if code < 0 else "failed"
-            print(f"{command_name()}: the simulation of {fmu} {reason}", file=sys.stderr)
+            print(f"{program}: the simulation of {fmu} {reason}", file=sys.stderr)
             status = max(status, code if code == MISTAKE else FAILED)
     return status
 

@@ -15,6 +15,7 @@ from pathlib import Path
 from ..base.errors import EquilibriumError, PrbmError, SimulationError
 from ..base.progress import CLEAR
 from ..base.version import __version__
+from ..fmu.date import date
 from ..mechanism.flexure import MODELS
 from .arguments import (
     ANIMATION_USAGE,
@@ -44,6 +45,7 @@ from .arguments import (
     study_arguments,
     sweep_arguments,
 )
+from .build_arguments import DETAILS, SUMMARY, build_arguments
 from .measure_arguments import measure_arguments
 from .program import (
     FAILED,
@@ -57,6 +59,7 @@ from .program import (
 from .remedies import in_options
 
 NEGATIVE = re.compile(r"-\.?\d")
+KINDS = ("guide", "lever", "gripper", "bistable", "pivot")
 METHODS = ("algebraic", "simulated", "fitted", "elements", "closed-form", "compliant")
 
 
@@ -73,7 +76,7 @@ def parser() -> argparse.ArgumentParser:
             "prbm simulate my_mechanism.toml",
         )
         + "\n\nResults are printed; --out DIR also writes tables (CSV) and figures (PNG) into a "
-        "folder.\nprbm-build-fmu builds FMUs of the same mechanisms.",
+        "folder.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
@@ -83,6 +86,7 @@ def parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     commands = p.add_subparsers(title="commands", metavar="COMMAND", parser_class=Parser)
     _list(commands)
+    _new(commands)
     _parameters(commands)
     _modes(commands)
     _equilibrium(commands)
@@ -101,6 +105,7 @@ def parser() -> argparse.ArgumentParser:
     _picture(commands)
     _animate(commands)
     _explore(commands)
+    _build(commands)
     _modelica(commands)
     _ssp(commands)
     _validate(commands)
@@ -120,6 +125,20 @@ def _list(commands: Commands) -> None:
         examples("prbm list"),
         details="Beams are the most accurate model of flexures (GuideBeam). PRBDM, PRBDM2R and "
         "PRBDM3R are the same guide by models with 1, 2 and 3 pivots, for comparison.",
+    )
+
+
+def _new(commands: Commands) -> None:
+    parser = add_command(
+        commands, "new", "new:write_template",
+        "write a commented mechanism file to start from",
+        examples("prbm new MyGuide", "prbm new MyPivot --kind pivot"),
+    )  # fmt: skip
+    parser.add_argument(
+        "name", metavar="NAME", help="name of the mechanism; the file is NAME.toml, a new one"
+    )
+    parser.add_argument(
+        "--kind", default=KINDS[0], choices=KINDS, help="kind of mechanism (default: %(default)s)"
     )
 
 
@@ -508,6 +527,18 @@ def _explore(commands: Commands) -> None:
     parameters_argument(parser)
 
 
+def _build(commands: Commands) -> None:
+    parser = add_command(
+        commands, "build", "building:run_build", SUMMARY,
+        examples(
+            "prbm build PRBDM2R",
+            "prbm build my_mechanism.toml --flavour native --platform all",
+        ),
+        details=DETAILS,
+    )  # fmt: skip
+    build_arguments(parser)
+
+
 def _modelica(commands: Commands) -> None:
     parser = add_command(
         commands, "modelica", "modelica:write_wrapper",
@@ -591,10 +622,11 @@ def _completion(commands: Commands) -> None:
     parser = add_command(
         commands, "completion", "completion:print_completion",
         "print a script for tab completion of commands, options and mechanisms",
-        examples("prbm completion bash"),
-        details='In bash, eval "$(prbm completion bash)" in ~/.bashrc switches it on.',
+        examples("prbm completion bash", "prbm completion fish"),
+        details='In bash and zsh, eval "$(prbm completion bash)" in ~/.bashrc switches it on, with '
+        "zsh in ~/.zshrc; in fish, prbm completion fish | source in config.fish.",
     )  # fmt: skip
-    parser.add_argument("shell", choices=("bash",), help="the shell")
+    parser.add_argument("shell", choices=("bash", "zsh", "fish"), help="the shell")
 
 
 # --- run --------------------------------------------------------------------------------------
@@ -619,10 +651,10 @@ def _run(words: Sequence[str]) -> int:
         return MISTAKE
     name = "prbm"
     try:
+        date()  # SciPy cannot be imported with an invalid date: numpy.f2py reads it, too.
         options = parser().parse_args(protected(words))
         name = options.prog
-        _function(options.run)(options)
-        return OK
+        return _function(options.run)(options) or OK
     except SystemExit:  # argparse has printed the help or the version
         return OK
     except ArgumentMistake as error:
@@ -652,10 +684,10 @@ def protected(words: Sequence[str]) -> list[str]:
     return [f" {word}" if NEGATIVE.match(word) else word for word in words]
 
 
-def _function(run: str) -> Callable[[argparse.Namespace], None]:
-    """Import and return the function named by module:function."""
+def _function(run: str) -> Callable[[argparse.Namespace], int | None]:
+    """Import and return the function named by module:function, which may return an exit status."""
     module, _, function = run.partition(":")
-    found: Callable[[argparse.Namespace], None] = getattr(
+    found: Callable[[argparse.Namespace], int | None] = getattr(
         importlib.import_module(f".{module}", __package__), function
     )
     return found

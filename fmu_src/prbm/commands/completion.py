@@ -1,13 +1,13 @@
-"""``prbm completion``: a script for tab completion in bash."""
+"""``prbm completion``: a script for tab completion in bash, zsh or fish."""
 
 import argparse
+import re
 from collections.abc import Iterator
 
 from ..files.mechanism_file import shipped
 from .command_line import parser
 
 SCRIPT = """\
-# Tab completion of prbm in bash: eval "$(prbm completion bash)"
 _prbm() {{
     local word="${{COMP_WORDS[COMP_CWORD]}}" previous="${{COMP_WORDS[COMP_CWORD-1]}}"
     local command="${{COMP_WORDS[1]}}" words="" files=""
@@ -30,18 +30,33 @@ _prbm() {{
         done < <(compgen -f -X "$files" -- "$word"; compgen -d -- "$word")
     fi
 }}
+_prbm_build() {{
+    COMP_WORDS=(prbm build "${{COMP_WORDS[@]:1}}")
+    COMP_CWORD=$((COMP_CWORD + 1))
+    _prbm
+}}
 complete -o default -F _prbm prbm
+complete -o default -F _prbm_build prbm-build-fmu
 """
-MECHANISM = ("mechanism", "files")  # Positional arguments that may be a mechanism.
+ZSH = """\
+autoload -U +X compinit && compinit
+autoload -U +X bashcompinit && bashcompinit
+"""  # Zsh then reads the script of bash.
+FISH = """\
+complete -c prbm -f
+complete -c prbm-build-fmu -w 'prbm build'
+"""
+MECHANISM = ("mechanism", "mechanisms", "files")  # Positional arguments that may be a mechanism.
 
 
 def print_completion(options: argparse.Namespace) -> None:
     """Print the script."""
-    print(script(parser()), end="")
+    scripts = {"bash": script, "zsh": lambda program: ZSH + script(program), "fish": fish_script}
+    print(scripts[options.shell](parser()), end="")
 
 
 def script(program: argparse.ArgumentParser) -> str:
-    """Return the script that completes the words of a command line.
+    """Return the script of bash that completes the words of a command line.
 
     It completes commands, options, choices of options, shipped mechanisms and mechanism files.
     """
@@ -59,6 +74,44 @@ def script(program: argparse.ArgumentParser) -> str:
     return SCRIPT.format(
         commands=" ".join(_words(program)), options="\n".join(options), choices="\n".join(choices)
     )
+
+
+def fish_script(program: argparse.ArgumentParser) -> str:
+    """Return the script of fish, which also shows the meaning of commands and options."""
+    lines = [FISH]
+    for name, command in ("", program), *_commands(program):
+        words = name.split()
+        seen = "; and ".join(f"__fish_seen_subcommand_from {word}" for word in words)
+        subcommands = [a for a in command._actions if isinstance(a, argparse._SubParsersAction)]
+        where = f'complete -c prbm -n "{seen or "__fish_use_subcommand"}"'
+        for group in subcommands:
+            missing = f"not __fish_seen_subcommand_from {' '.join(group.choices)}"
+            first = f"{seen}; and {missing}" if seen else "__fish_use_subcommand"
+            for choice in group._choices_actions:
+                lines.append(f'complete -c prbm -n "{first}" -a {choice.dest} -d {_fish(choice)}\n')
+        if _takes_mechanism(command):
+            names = " ".join(shipped())
+            lines.append(f"{where} -a '{names} (__fish_complete_suffix .toml)'\n")
+        for action in command._actions:
+            lines += [f"{where} {text}\n" for text in _fish_option(action)]
+    return "".join(lines)
+
+
+def _fish_option(action: argparse.Action) -> Iterator[str]:
+    """Yield the arguments of ``complete`` for an option, or for a choice of words."""
+    values = "" if isinstance(action.choices, dict) else " ".join(map(str, action.choices or ()))
+    names = [text for text in action.option_strings if text.startswith("--")]
+    if names and action.help != argparse.SUPPRESS:
+        argument = f" -x -a '{values}'" if values else "" if action.nargs == 0 else " -r -F"
+        yield f"-l {names[0][2:]}{argument} -d {_fish(action)}"
+    elif values and not action.option_strings:
+        yield f"-a '{values}'"
+
+
+def _fish(action: argparse.Action) -> str:
+    """Return the first phrase of a help text as a word of fish."""
+    text = re.split(r"[;:(,]", action.help or "")[0].replace("%%", "%").strip()
+    return "'" + text.replace("\\", "\\\\").replace("'", "\\'") + "'"
 
 
 def _escaped(name: str) -> str:

@@ -75,6 +75,45 @@ class Output:
             print(path)
 
 
+class RowFile:
+    """A table that is written row by row, so that it remains if the computation ends early.
+
+    Parameters
+    ----------
+    folder : Path or None
+        Output folder, which is created; None: no file is written.
+    name : str
+        Name of the file.  An earlier file of that name is replaced.
+    """
+
+    def __init__(self, folder: Path | None, name: str) -> None:
+        self.path = None if folder is None else folder / name
+        self.count = 0
+
+    def add(self, heads: Sequence[str], row: Sequence[object]) -> None:
+        """Write a row, after the heads if it is the first one."""
+        if self.path is None:
+            return
+        text = csv_text(heads, [row])
+        try:
+            if self.count == 0:
+                self.path.parent.mkdir(parents=True, exist_ok=True)
+            else:
+                text = text.partition("\n")[2]
+            with self.path.open("a" if self.count else "w", encoding="utf-8", newline="") as file:
+                file.write(text)
+        except OSError as error:
+            raise FileError(
+                f"cannot write {self.path}: {error.strerror}; choose another folder with --out"
+            ) from None
+        self.count += 1
+
+    @property
+    def kept(self) -> str:
+        """Phrase about the rows that have been written; empty if there are none."""
+        return f"{self.path} has the {self.count} completed rows" if self.count else ""
+
+
 def csv_text(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     """Return a table as CSV.
 

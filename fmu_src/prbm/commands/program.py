@@ -1,14 +1,12 @@
-"""Exit statuses, threads, output and names of the commands."""
+"""Exit statuses, threads and output of the commands."""
 
 import io
 import os
 import sys
-from pathlib import Path
 
 from ..base.threads import THREAD_LIMITS
 
 OK, FAILED, MISTAKE, INTERRUPTED = 0, 1, 2, 130
-BUILDER = "build_fmu"  # Module that python -m runs.
 
 
 def limit_threads() -> None:
@@ -54,11 +52,3 @@ def report_unwritable(name: str, error: OSError) -> int:
     except OSError:
         discard_output()
     return FAILED
-
-
-def command_name() -> str:
-    """Return the name of the running program as the user typed it."""
-    path = Path(sys.argv[0])
-    if path.resolve() == Path(__file__).resolve().with_name(f"{BUILDER}.py"):
-        return f"python -m {__package__}.{BUILDER}"
-    return path.stem if path.suffix == ".exe" else path.name

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..analysis.adequacy import Impact, Shape, Vibration, notes
+from ..analysis.fastest import fastest
 from ..base.progress import reporter
 from ..base.unit_text import frequency_text
 from ..files.mechanism_file import load
@@ -31,6 +32,7 @@ IMPACT_HEAD = (
     "energy lost [J]", "modal restitution [-]",
 )  # fmt: skip
 CONTACT_HEAD = ("peak force [N]", "indentation [m]", "contact duration [s]")
+SLOW = 5.0  # Computing time from which on a note says what sets the step [s].
 PEAKS_MAX = 6  # Printed peaks per signal.
 SPECTRUM_END = 1.5  # Upper end of a drawn spectrum, in multiples of its highest marked mode.
 
@@ -54,7 +56,8 @@ def run_simulation(options: argparse.Namespace) -> None:
         mechanism, values, inputs=inputs, stop_time=stop_time, step=step, tolerance=tolerance,
         progress=reporter(), engine=options.engine,
     )  # fmt: skip
-    print(f"simulated            {stop_time:g} s in {time.perf_counter() - begin:.2f} s")
+    spent = time.perf_counter() - begin
+    print(f"simulated            {stop_time:g} s in {spent:.2f} s")
     for line in headline(result, mechanism, result.start_values):
         print(line)
     columns = names(result.columns)
@@ -66,8 +69,22 @@ def run_simulation(options: argparse.Namespace) -> None:
     output.write()
     for sentence in _notes(result.mechanism, values):
         print(sentence)
+    if spent > SLOW:
+        print(_slow(result.mechanism, values))
     if options.spectrum is not None:
         _spectrum(options, result, values, duration)
+
+
+def _slow(mechanism: Mechanism, values: Mapping[str, float]) -> str:
+    """Return a note on the mode that sets the step of the integration."""
+    parameters = {p.name for p in mechanism.parameters}
+    found = fastest(mechanism, {n: x for n, x in values.items() if n in parameters})
+    if found is None:
+        return (
+            "note: the run is slow; prbm modes --count 99 prints the frequencies that it resolves"
+        )
+    mode = f"note: the run is slow: its steps resolve a mode of {frequency_text(found.frequency)}"
+    return f"{mode}; {found.parameter} changes this frequency most" if found.parameter else mode
 
 
 def _tolerance(text: str | None) -> float | None:

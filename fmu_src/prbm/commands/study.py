@@ -2,11 +2,12 @@
 
 import argparse
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.errors import ParameterError
 from ..base.names import unknown
 from ..base.progress import reporter
 from ..base.unit_text import prefixed_unit
@@ -25,7 +26,7 @@ from ..mechanism.description import Mechanism
 from ..runs.inputs import placeholders
 from ..sweeps.study import FLAT_RTOL, Optimum, Study, study
 from .duration import given_inputs
-from .output import Output, aligned
+from .output import Output, RowFile, aligned
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -46,13 +47,15 @@ def run_study(options: argparse.Namespace) -> None:
         {**units_of(mechanism), **dict.fromkeys(placeholders(inputs), "")}, options.vary
     )
     tolerance = optional_quantity(options.tolerance, "", "--tolerance")
-    found = study(
+    written = RowFile(options.out, f"{mechanism.name}-study.csv")
+    found = _reporting(written, lambda: study(
         mechanism, varied, options.of or [], minimise=options.minimise, maximise=options.maximise,
         values=values, inputs=inputs,
         stop_time=optional_quantity(options.stop_time, "s", "--stop-time"),
         step=optional_quantity(options.step, "s", "--step"), tolerance=tolerance,
         workers=options.workers, engine=options.engine, progress=reporter(),
-    )  # fmt: skip
+        rows=written.add,
+    ))  # fmt: skip
     columns = dict(zip(found.varied, found.points.T, strict=True)) | dict(found.outputs)
     _print_table(columns, found.units)
     failed = [message for message in found.messages if message]
@@ -63,11 +66,20 @@ def run_study(options: argparse.Namespace) -> None:
         verb = "least" if options.maximise is None else "largest"
         for line in _optimum_lines(found.optimum, found.units, verb):
             print(line)
-    head = [f"{name} [{found.units[name] or '-'}]" for name in columns]
-    rows = zip(*(x.tolist() for x in columns.values()), found.messages, strict=True)
-    output.table(f"{mechanism.name}-study.csv", [*head, "error"], list(rows))
     output.figure(f"{mechanism.name}-study.png", lambda: _figure(mechanism, found))
+    if written.path is not None:
+        print(written.path)
     output.write()
+
+
+def _reporting(written: RowFile, run: Callable[[], Study]) -> Study:
+    """Return a study; an error or Ctrl-C says which rows have been written."""
+    try:
+        return run()
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"interrupted; {written.kept}" if written.kept else "") from None
+    except ParameterError as error:
+        raise ParameterError(f"{error}; {written.kept}" if written.kept else str(error)) from None
 
 
 def _varied(units: Mapping[str, str], texts: Sequence[str]) -> dict[str, Real]:

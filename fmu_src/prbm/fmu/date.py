@@ -3,6 +3,8 @@
 import os
 from datetime import UTC, datetime
 
+from ..base.errors import ParameterError
+
 EPOCH = datetime(1980, 1, 1, tzinfo=UTC)  # Same as the time of the files in the archive.
 
 
@@ -13,14 +15,14 @@ def date() -> str:
 
     Raises
     ------
-    ValueError
+    ParameterError
         If SOURCE_DATE_EPOCH is not a number of seconds or is out of range.
     """
     epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
     try:
         moment = datetime.fromtimestamp(int(epoch), UTC) if epoch else EPOCH
     except (ValueError, OverflowError, OSError):
-        raise ValueError(
+        raise ParameterError(
             f"the environment variable SOURCE_DATE_EPOCH = {epoch[:30]!r} must be a number of "
             "seconds since 1970, before the year 10000; unset it to date FMUs 1980-01-01"
         ) from None

@@ -1,5 +1,6 @@
 """The page that simulates a mechanism in the browser, without an FMU."""
 
+import logging
 from collections.abc import Mapping
 
 from ..kernel.compiler import browser_module
@@ -7,6 +8,8 @@ from ..mechanism.description import Mechanism
 from .documentation import explorer_page
 from .export import Export
 from .native_fmu import described, simulated_part
+
+log = logging.getLogger(__name__)
 
 
 def explorer(mechanism: Mechanism, changes: Mapping[str, float] | None = None) -> str:
@@ -27,4 +30,5 @@ def explorer(mechanism: Mechanism, changes: Mapping[str, float] | None = None) -
     """
     export = Export(mechanism, changes)
     native = described(export, 3)
-    return explorer_page(mechanism, native.variables, simulated_part(export, browser_module()))
+    simulated = simulated_part(export, browser_module(log.warning))
+    return explorer_page(mechanism, native.variables, simulated)

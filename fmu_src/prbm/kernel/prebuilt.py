@@ -1,4 +1,4 @@
-"""Libraries of the kernel inside a wheel, for every platform.
+"""Libraries of the kernel inside a wheel, for this machine or for every platform.
 
 A wheel that was built with libraries has them in the folder ``libraries`` of this package, with
 their SHA-256 and that of the kernel's source in ``libraries.json``.  A clone has no such folder.
@@ -58,13 +58,13 @@ def prebuilt(name: str, sources: Mapping[str, bytes]) -> bytes | None:
     Returns
     -------
     bytes or None
-        None if the package has no libraries, or if its source has been changed since they were
-        compiled.
+        None if the package does not list the library, or if its source has been changed since the
+        libraries were compiled.
 
     Raises
     ------
     DamagedLibraryError
-        If the library is missing or its SHA-256 is not the listed one.
+        If the listed library is missing or its SHA-256 is not the listed one.
     """
     folder = files(__package__).joinpath(FOLDER)
     try:
@@ -74,13 +74,13 @@ def prebuilt(name: str, sources: Mapping[str, bytes]) -> bytes | None:
         return None
     except (OSError, ValueError, TypeError, KeyError):
         raise _damaged(LIST) from None
-    if compiled != files_digest(sources):
+    if name not in digests or compiled != files_digest(sources):
         return None
     try:
         content = folder.joinpath(name).read_bytes()
     except OSError:
         raise _damaged(name) from None
-    if hashlib.sha256(content).hexdigest() != digests.get(name):
+    if hashlib.sha256(content).hexdigest() != digests[name]:
         raise _damaged(name)
     return content
 

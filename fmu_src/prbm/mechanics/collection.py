@@ -41,6 +41,7 @@ class Collection:
         self.loops: list[tuple[str, Place]] = []
         self.origin: dict[str, Place] = {GROUND: Place()}
         self.drawn: dict[str, complex] = {GROUND: 0j}
+        self.depth = {GROUND: 0}  # Flexures and joints between each body and the ground.
         self.index: dict[str, int | None] = {GROUND: None}  # Directions of the bodies.
         self.links: list[int] = []
         self.link_count = 0
@@ -139,6 +140,7 @@ class Collection:
     def connect(self, near: str, far: str, known: bool, flexure: FreeBody | None = None) -> None:
         """Register a flexure or a joint; known: it has just closed a loop."""
         loop = len(self.loops) - 1 if known else None
+        self.depth.setdefault(far, self.depth[near] + 1)
         self.connections.append(Connection(near, far, loop, flexure))
 
     def close(self, name: str, place: Place, other: Place) -> None:

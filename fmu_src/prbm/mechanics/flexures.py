@@ -1,6 +1,7 @@
 """Flexures as links or beams: their coordinates, directions, masses, springs and loops."""
 
 import cmath
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -24,7 +25,9 @@ CURVE_POINTS = 33  # Points of each panel of a drawn beam.
 def add_flexure(parts: Collection, flexure: Flexure) -> None:
     """Add a flexure of which at least one body has been reached.
 
-    It reaches the body at its other end.  If this body has been reached before, it closes a loop.
+    It reaches the body at its other end.  If this body has been reached before, it closes a loop; a
+    beam is then laid from the body that is nearer to the ground, which leaves fewer arms to move its
+    masses.
 
     Raises
     ------
@@ -292,7 +295,9 @@ def _place_beam(
     """
     near, far = flexure.start, flexure.end
     chord = parts.end(flexure, far) - parts.end(flexure, near)
-    forwards = body_of(near) in parts.origin
+    bodies = body_of(near), body_of(far)
+    start_depth, end_depth = (parts.depth.get(body, math.inf) for body in bodies)
+    forwards = start_depth <= end_depth
     if not forwards:
         near, far = far, near
     z_near, z_far = parts.end(flexure, near), parts.end(flexure, far)

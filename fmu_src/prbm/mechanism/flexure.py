@@ -202,6 +202,62 @@ MODELS = {
     )
 }
 
+
+def register_model(
+    name: str, gamma: Sequence[float], K_theta: Sequence[float], *, reference: str = ""
+) -> FlexureModel:
+    """Add a model of flexures with pivots, for mechanism files that are loaded afterwards.
+
+    The springs have the rates K_theta_i EI/h, and each segment is a slender rod.  A model is known
+    in this process only: a program registers it before it loads the mechanism.
+
+    Parameters
+    ----------
+    name : str
+        Name of the model in mechanism files, an identifier.
+    gamma : sequence of float
+        Lengths of the moving links of a cantilever of the length h, from the clamp to the tip, in
+        units of h [-].  Their sum is below 1; the rest is fixed at the clamp.
+    K_theta : sequence of float
+        Stiffness coefficients of the pivots, from the clamp to the tip, as many [-].
+    reference : str
+        The publication, for the documentation of FMUs.
+
+    Raises
+    ------
+    ParameterError
+        If the name is used or no identifier, or a coefficient is out of its bounds.
+
+    Examples
+    --------
+    >>> model = register_model("Yu2012", (0.44, 0.46), (3.4710, 2.0682))
+    >>> round(model.end_slope, 3)
+    0.772
+    >>> _ = MODELS.pop("Yu2012")
+    """
+    if not name.isidentifier() or name in MODELS:
+        raise ParameterError(f"model {name!r}: choose an identifier other than {', '.join(MODELS)}")
+    if not 0 < len(gamma) == len(K_theta):
+        raise ParameterError(
+            f"model {name}: {len(gamma)} lengths gamma and {len(K_theta)} stiffnesses K_theta; "
+            "give as many of each"
+        )
+    if not (all(x > 0.0 for x in (*gamma, *K_theta)) and sum(gamma) < 1.0 + STUB_RTOL):
+        raise ParameterError(
+            f"model {name}: gamma = {tuple(gamma)}, K_theta = {tuple(K_theta)} must be positive, "
+            "and the sum of gamma at most 1"
+        )
+    lengths = tuple(
+        _gamma(f"gamma{i}", x, f"link {i} from the clamp") for i, x in enumerate(gamma, 1)
+    )
+    stiffnesses = tuple(
+        _K_theta(f"K_theta{i}", x, f"pivot {i} from the clamp") for i, x in enumerate(K_theta, 1)
+    )
+    references = (f"{reference} ({name}).",) if reference else ()
+    MODELS[name] = FlexureModel(name, lengths, stiffnesses, False, False, reference, references)
+    return MODELS[name]
+
+
 LEAF, TAPER, NOTCH = "leaf", "taper", "notch"
 PROFILES = (LEAF, TAPER, NOTCH)
 CLAMP, PIN, FREE = "clamp", "pin", "free"

@@ -11,7 +11,7 @@ from ..mechanics.stress import stressed
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from .marks import largest_latched, marks
-from .quantities import FREQUENCY, KINETIC, SETTLED_ENERGY_RTOL, settling
+from .quantities import FREQUENCY, KINETIC, SETTLED_ENERGY_RTOL, settling, settling_estimate
 from .released import displacement_outputs, released_displacement
 from .result import Columns, Result, column, moves, rest_time
 from .struck import UNRELIABLE, first_rigid_impact, peak_before
@@ -136,7 +136,8 @@ def headline(
             )
     lines += _stress(columns, mechanism, system.length)
     rests = any(rest_time(columns, stop.name) is not None for stop in mechanism.stops)
-    return [*lines, _settled(columns, span, rests)] if moving else lines
+    last = max((mark.time for mark in impacts), default=float(time[0]))
+    return [*lines, _settled(columns, span, rests, last)] if moving else lines
 
 
 def _stress(columns: Columns, mechanism: Mechanism, size: float) -> list[str]:
@@ -186,22 +187,53 @@ def stress_text(flexure: str, peak: float, strength: float | None, at: str = "")
     return f"stress in {flexure:10} {1e-6 * peak:.4g} MPa{at}{factor}"
 
 
-def _settled(columns: Columns, span: float, rests: bool) -> str:
-    """Return the line about the end of the motion; ``rests``: a body rests on a stop."""
+def _settled(columns: Columns, span: float, rests: bool, last: float) -> str:
+    """Return the line about the end of the motion.
+
+    Parameters
+    ----------
+    columns : structured array
+        The result.
+    span : float
+        Duration of the run [s].
+    rests : bool
+        Whether a body rests on a stop.
+    last : float
+        Time of the last impact, or of the start [s].
+    """
     for name in (KINETIC, FREQUENCY):
         column(columns, name)  # Raises an error if it is missing.
     when = settling(columns)
+    expected = _expected(settling_estimate(columns, last))
     if math.isnan(when) and rests:
         return (
             "settled              not yet: a body rests on its stop, but the mechanism still "
-            "vibrates; prbm modes prints decay times"
+            f"vibrates; {expected}"
         )
     if math.isnan(when):
-        return "settled              not yet, or too late to be certain: simulate longer"
+        return f"settled              not yet, or too late to be certain; {expected}"
     share = f"{100 * SETTLED_ENERGY_RTOL:g} %"
     return (
         f"settled              at t = {instant(when, span, 3)}: the kinetic energy stays below "
         f"{share} of its largest value"
+    )
+
+
+def _expected(when: float) -> str:
+    """Return the phrase about an estimated settling time [s].
+
+    Examples
+    --------
+    >>> print(_expected(3.456))
+    by its present decay at about t = 3.5 s: simulate longer than that
+    """
+    if math.isnan(when):
+        return "simulate longer; prbm modes prints decay times"
+    if math.isinf(when):
+        return "the energy does not fall: the damping is too small, or inputs drive the motion"
+    factor, unit = (1.0, "s") if when >= SECONDS_MIN else time_unit(when)
+    return (
+        f"by its present decay at about t = {factor * when:.2g} {unit}: simulate longer than that"
     )
 
 

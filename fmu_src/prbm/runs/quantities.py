@@ -7,7 +7,7 @@ impact are then those of all impacts, also of several between two communication 
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from math import nan
+from math import inf, nan
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from ..hybrid.records import Impact
 SETTLED_ENERGY_RTOL = 1e-4
 """A motion has settled if its kinetic energy stays below this share of its largest value."""
 STILL_ENERGY_RTOL = 1e-12  # Below this share of its largest kinetic energy nothing moves.
+ESTIMATE_PERIODS = 4.0  # Least time without impacts for an estimate, in fundamental periods.
 SETTLED_PERIODS = 0.5  # Least time without motion, in periods of the fundamental mode.
 
 KINETIC, FREQUENCY = "energy.kinetic", "mode.frequency"
@@ -127,6 +128,51 @@ def settling(columns: Table) -> float:
     still = float(energy[-2:].max()) <= STILL_ENERGY_RTOL * largest
     wait = 0.0 if still or not frequency > 0.0 else SETTLED_PERIODS / frequency
     return settled if float(t[-1]) - settled >= wait else nan
+
+
+def settling_estimate(columns: Table, since: float) -> float:
+    """Return an estimate of the settling time of a motion that has not settled [s].
+
+    The kinetic energy falls exponentially, with the rate from the first to the second half of the
+    time since the last impact.
+
+    Parameters
+    ----------
+    columns : mapping
+        ``time``, ``energy.kinetic`` and ``mode.frequency``, (m,) each.
+    since : float
+        Time of the last impact, or of the start [s].
+
+    Returns
+    -------
+    float
+        The time; infinite if the energy does not fall; NaN if the time since the last impact is too
+        short.
+
+    Examples
+    --------
+    >>> t = np.linspace(0.0, 4.0, 4001)
+    >>> moving = np.exp(-t) * np.sin(30.0 * t) ** 2
+    >>> found = settling_estimate(
+    ...     {"time": t, "energy.kinetic": moving, "mode.frequency": 5.0 + 0.0 * t}, 0.0
+    ... )
+    >>> bool(abs(found / -np.log(SETTLED_ENERGY_RTOL) - 1.0) < 0.02)  # exact: exp(-t) is 1e-4
+    True
+    """
+    t, energy = np.asarray(columns["time"], float), np.asarray(columns[KINETIC], float)
+    frequency = float(np.max(columns[FREQUENCY][-1]))
+    if not (t[-1] - since) * frequency > ESTIMATE_PERIODS:
+        return nan
+    first = (t > since) & (t <= 0.5 * (since + t[-1]))
+    last = t > 0.5 * (since + t[-1])
+    if not (first.any() and last.any()):
+        return nan
+    at = [int(np.flatnonzero(half)[np.argmax(energy[half])]) for half in (first, last)]
+    before, after = energy[at]
+    if not 0.0 < after < before:
+        return inf
+    rate = np.log(before / after) / (t[at[1]] - t[at[0]])
+    return float(t[at[1]] + np.log(after / (SETTLED_ENERGY_RTOL * energy.max())) / rate)
 
 
 def impacts(columns: Table) -> float:

@@ -8,6 +8,7 @@ with its message.  The best sample is refined by further simulations.
 
 import itertools
 import math
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager
@@ -50,6 +51,7 @@ LAST_FRACTION = 0.99  # Reported progress while a refinement takes more simulati
 EDGE_RTOL = 0.02  # Tolerance of the ends of the flat range, relative to the distance of samples.
 NAMES_LISTED_MAX = 12  # Messages about unknown outputs do not list more names.
 TIMES = ("first", "since")  # Reductions whose value is a time.
+Rows = Callable[[Sequence[str], Sequence[object]], object]
 Samples = Sequence[float | str] | Real
 
 
@@ -191,6 +193,7 @@ def study(
     workers: int | None = None,
     engine: str | None = None,
     progress: Progress | None = None,
+    rows: Rows | None = None,
 ) -> Study:
     """Simulate a mechanism on a grid of parameters, and find the optimum of an output.
 
@@ -219,6 +222,9 @@ def study(
         Number of processes; None: one per core.
     progress : callable or None
         Called with the completed fraction, from 0 to 1.
+    rows : callable or None
+        Called with the heads of the table, and with the row of each simulation of the grid as soon
+        as it and those before it are complete: parameters, outputs, the error.
 
     Raises
     ------
@@ -246,13 +252,18 @@ def study(
     points = np.array(list(itertools.product(*samples.values())))
     with _pool(setup, workers, len(points)) as run:
         report = _report(progress, len(points), 0 if wanted is None else REFINEMENTS_EXPECTED)
-        outcomes = _all(run, [*samples], points, report)
-        table = np.array([o.values or (math.nan,) * len(texts) for o in outcomes])
-        found = Study(
-            samples, points, dict(zip(texts, table.T, strict=True)),
-            {**{n: units.get(n, "") for n in samples}, **_output_units(setup.outputs, units)},
-            tuple(outcome.message for outcome in outcomes),
-        )  # fmt: skip
+        shown = {**{n: units.get(n, "") for n in samples}, **_output_units(setup.outputs, units)}
+        heads = [*(f"{name} [{shown[name] or '-'}]" for name in (*samples, *texts)), "error"]
+        outcomes = []
+        for point, outcome in zip(points, _each(run, [*samples], points), strict=True):
+            outcomes.append(outcome)
+            if rows is not None:
+                rows(heads, [*point.tolist(), *_values(outcome, len(texts)), outcome.message])
+            report(len(outcomes))
+        table = np.array([_values(outcome, len(texts)) for outcome in outcomes])
+        outputs_found = dict(zip(texts, table.T, strict=True))
+        messages = tuple(outcome.message for outcome in outcomes)
+        found = Study(samples, points, outputs_found, shown, messages)
         if wanted is None:
             return found
         sign = 1.0 if maximise is None else -1.0
@@ -418,14 +429,20 @@ def _report(progress: Progress | None, samples: int, refinements: int) -> Progre
     return report
 
 
-def _all(run: Run, parameters: Sequence[str], points: Real, report: Progress) -> list[Outcome]:
-    """Return the outcomes of all points in order."""
-    futures = [run(dict(zip(parameters, map(float, point), strict=True))) for point in points]
-    outcomes = []
-    for k, future in enumerate(futures, start=1):
-        outcomes.append(future.result())
-        report(k)
-    return outcomes
+def _each(run: Run, parameters: Sequence[str], points: Real) -> Iterator[Outcome]:
+    """Yield the outcomes of all points in order."""
+    pending: deque[Future[Outcome]] = deque()
+    for point in points:
+        pending.append(run(dict(zip(parameters, map(float, point), strict=True))))
+        while pending and pending[0].done():
+            yield pending.popleft().result()
+    while pending:
+        yield pending.popleft().result()
+
+
+def _values(outcome: Outcome, count: int) -> tuple[float, ...]:
+    """Return the outputs of a simulation; NaN for a failed one."""
+    return outcome.values or (math.nan,) * count
 
 
 # --- optimum --------------------------------------------------------------------------------------

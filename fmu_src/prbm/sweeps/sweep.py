@@ -623,4 +623,11 @@ def summary(results: "pd.DataFrame", out: str | os.PathLike[str]) -> str:
         lines.append(f"row {row} {status}: {message}")
     if (~good).sum() > 3:
         lines.append("see the columns status and message for the other failed runs")
+    complete = results[good].select_dtypes("number")
+    for name, missing in complete.isna().sum().items():
+        if missing:
+            lines.append(
+                f"{name}: no value in {missing} of {len(complete)} complete runs; simulate longer, "
+                "or check the condition"
+            )
     return "\n".join(lines)

@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from prbm.commands import building, command_line
+from prbm.commands import command_line
 from prbm.kernel import compiler
 
 KILL, FULL_DISK = 1, 2
@@ -28,7 +28,7 @@ def _compile(_: Sequence[str]) -> int:
 
 
 COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {
-    "build": building.main,
+    "build": lambda words: command_line.main(["build", *words]),
     "simulate": command_line.main,
     "compile": _compile,
 }

@@ -30,7 +30,6 @@ SOURCES = Path(prbm.__file__).parents[1]
 UNPRIVILEGED = ("setpriv", "--bounding-set=-all", "--inh-caps=-all")
 """Takes from an administrator the right to ignore permissions of files."""
 NATIVE = ("--flavour", "native", "--fmi", "2", "--model", "PRBDM")
-BUILD, SIMULATE = "prbm.commands.build_fmu", "prbm"
 WRITERS = 3
 SECONDS_MAX = 1800.0
 
@@ -129,11 +128,11 @@ def searched(command: str, points: int) -> dict[str, Any]:
 
 
 def command(
-    module: str, words: Sequence[str], before: Sequence[str] = (), **changes: str | None
+    words: Sequence[str], before: Sequence[str] = (), **changes: str | None
 ) -> "subprocess.CompletedProcess[str]":
     """Run a command in a process of its own; return the completed process."""
     return subprocess.run(
-        [*before, sys.executable, "-m", module, *words], capture_output=True, text=True,
+        [*before, sys.executable, "-m", "prbm", *words], capture_output=True, text=True,
         check=False, timeout=SECONDS_MAX, env=environment(**changes), cwd=tempfile.gettempdir(),
     )  # fmt: skip
 
@@ -145,7 +144,7 @@ def two_writers() -> list[str]:
         env = environment(**_compilers(Path(name)), XDG_CACHE_HOME=str(Path(name) / "cache"))
         processes = [
             subprocess.Popen(
-                [sys.executable, "-m", BUILD, *NATIVE, "--out", str(out)], env=env,
+                [sys.executable, "-m", "prbm", "build", *NATIVE, "--out", str(out)], env=env,
                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
             )
             for _ in range(WRITERS)
@@ -183,10 +182,10 @@ def without_rights(case: str) -> list[str]:
         else:
             changes |= _compilers(base)
         simulated = command(
-            SIMULATE, ["simulate", "PRBDM", "--stop-time", "0.01", "--out", str(out)], before,
+            ["simulate", "PRBDM", "--stop-time", "0.01", "--out", str(out)], before,
             **changes,
         )  # fmt: skip
-        built = command(BUILD, [*NATIVE, "--out", str(out)], before, **changes)
+        built = command(["build", *NATIVE, "--out", str(out)], before, **changes)
         expected = {"simulate": 0, "build": 0}
         if case == "no compiler" and not _has_zig():
             expected["build"] = 1

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "core/assembly.h"
-#include "core/block_map.h"
+#include "core/branches.h"
 #include "core/constraints.h"
 #include "core/flexure.h"
 #include "core/flexures.h"
@@ -38,9 +38,11 @@ static bool walk_all(System *system, Scratch *scratch, Problem *problem) {
     const Mechanism *m = system->mechanism;
     bool ok = true;
     system->r = 0;
+    clear_branches(system);
     for (int i = 0; ok && i < m->flexure_count + m->joint_count; i++) {
         size_t mark = scratch->used;
         const Step *step = &m->steps[i];
+        begin_branch(system, i, scratch);
         ok = step->flexure ? walk_flexure(system, step, scratch, problem)
                            : walk_joint(system, step, scratch, problem);
         scratch->used = mark;
@@ -165,32 +167,42 @@ static int end_of_block(int size, const bool *linked, int start) {
     return end;
 }
 
-/* Return the row of a block between start and end, counted in the block, that leaves most elements
- * zero: those of later rows in earlier columns. */
-static int row_apart(int size, const bool *linked, int start, int end) {
-    int apart = 0, most = 0;
-    for (int row = start + 1; row < end - 1; row++) {
-        int zeros = (row - start) * (end - 1 - row);
-        for (int i = row + 1; i < end; i++) {
-            for (int j = start; j < row; j++) {
-                zeros = linked[i * size + j] ? 0 : zeros;
-            }
-        }
-        apart = zeros > most ? row - start : apart;
-        most = zeros > most ? zeros : most;
-    }
-    return apart;
-}
-
 static int find_blocks(int size, const bool *linked, Block *blocks) {
     int count = 0;
     for (int start = 0; start < size;) {
         int end = end_of_block(size, linked, start);
-        Block block = {start, end - start, row_apart(size, linked, start, end)};
+        Block block = {start, end - start, 0};
         blocks[count++] = block;
         start = end;
     }
     return count;
+}
+
+/* Return the row of the body of a guide on two beams with a certain number of coordinates; 0: it is
+ * another block. */
+static int guide_split(int size, const int *last) {
+    int split = size == GUIDE ? size / 2 : 0;
+    for (int i = 0; i < split; i++) {
+        if (last[i] > split) {
+            return 0;
+        }
+    }
+    return split;
+}
+
+/* Find the last column that is linked with each row, counted in the block of the row. */
+static void find_last(const System *system, const bool *linked, int *last) {
+    int n = system->n;
+    for (int k = 0; k < system->mass_block_count; k++) {
+        int start = system->mass_blocks[k].start, end = start + system->mass_blocks[k].size;
+        for (int i = start; i < end; i++) {
+            last[i] = i - start;
+            for (int j = i; j < end; j++) {
+                last[i] = linked[i * n + j] || linked[j * n + i] ? j - start : last[i];
+            }
+        }
+        system->mass_blocks[k].split = guide_split(end - start, last + start);
+    }
 }
 
 /* Mark the coordinates that two directions depend on. */
@@ -218,6 +230,7 @@ static void find_all_blocks(System *system, Scratch *scratch) {
     }
     system->block_count = find_blocks(system->d, linked, system->blocks);
     system->mass_block_count = find_blocks(system->n, joined, system->mass_blocks);
+    find_last(system, joined, system->last);
     scratch->used = mark;
 }
 
@@ -263,7 +276,7 @@ static void add_moments(System *system, Scratch *scratch) {
     }
     find_all_blocks(system, scratch);
     pack_blocks(system);
-    set_block_maps(system, scratch);
+    set_branches(system, scratch);
 }
 
 /* Return the size of the drawn mechanism [m]: the largest distance between points of the ground and

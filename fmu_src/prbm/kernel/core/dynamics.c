@@ -83,7 +83,7 @@ static bool rates_of_motion(const Equations *eq, const double *y, const Referenc
 static void add_powers(const Equations *eq, const Evaluation *result, const double *v, double *dy) {
     int n = eq->system->n;
     if (eq->mass_damping != 0.0) {
-        dy[2 * n] += 2.0 * eq->mass_damping * kinetic_energy_of(eq, result);
+        dy[2 * n] += 2.0 * eq->mass_damping * kinetic_energy_of(result);
     }
     if (eq->slipping_count > 0) {
         dy[2 * n] += rubbing_power(eq, result, v);

@@ -32,8 +32,9 @@ typedef struct {
     double *a, *lam;                 /* (even + 2,) accelerations; (r,) */
     double *load, *rows;             /* (wide,), (r, wide) by direction: a and Z, unless mapped */
     double *mass, *shift;            /* (n, n), (wide,) blocks of M and Im(w^2), if mapped */
-    double *turned;                  /* (wide,) working memory, if mapped */
-    double *block;                   /* of M, below its diagonal */
+    Complex *roots, *moments;        /* of the branches, and (n,) of one branch, if mapped */
+    Parts turned;                    /* (wide,) working memory, if mapped */
+    double *block;                   /* of M, above its diagonal, or pairs of a branch */
     double spring_loss;              /* the power that the springs dissipate */
     double *pressure, *contact_loss; /* (s,) forces and dissipated powers of pressed stops */
     Factors factors;

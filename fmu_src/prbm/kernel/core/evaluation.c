@@ -2,7 +2,8 @@
  * twin of Equations.evaluate in mechanics/dynamics.py. */
 #include <string.h>
 
-#include "core/block_map.h"
+#include "core/branch_terms.h"
+#include "core/branches.h"
 #include "core/evaluation.h"
 #include "core/forces.h"
 #include "core/gaps.h"
@@ -28,10 +29,10 @@ PRBM Kinematics place_kinematics(const System *system, Memory *memory) {
     at.speed = place(memory, even + 2, sizeof(double));
     at.theta = system->mapped ? place(memory, wide, sizeof(double)) : at.angle;
     at.turn = system->mapped ? place(memory, wide, sizeof(double)) : at.speed;
-    at.squares = place(memory, wide, sizeof(double));
+    at.squares = place(memory, wide + PAIR, sizeof(double));
     at.own = place(memory, (size_t)system->d, sizeof(double));
     at.e = place(memory, wide, sizeof(Complex));
-    at.e_parts = place_parts(memory, wide);
+    at.e_parts = place_parts(memory, wide + PAIR);
     return at;
 }
 
@@ -58,7 +59,8 @@ PRBM void evaluation_place(Evaluation *evaluation, const System *system, Memory 
     result.contact_loss = place(memory, (size_t)system->s, sizeof(double));
     result.factors.even = (int)even;
     result.factors.blocks = system->mass_blocks;
-    result.factors.L = place(memory, n * n, sizeof(double));
+    result.factors.last = system->last;
+    result.factors.U = place(memory, n * n, sizeof(double));
     result.factors.inverse = place(memory, even, sizeof(double));
     result.factors.Z = place(memory, r * even, sizeof(double));
     result.factors.S = place(memory, 2 * r * r + r, sizeof(double));
@@ -66,8 +68,10 @@ PRBM void evaluation_place(Evaluation *evaluation, const System *system, Memory 
     result.load = system->mapped ? place(memory, wide, sizeof(double)) : result.a;
     result.rows = system->mapped ? place(memory, r * wide, sizeof(double)) : result.factors.Z;
     result.mass = place(memory, system->mapped ? n * n : 0, sizeof(double));
-    result.shift = place(memory, system->mapped ? wide : 0, sizeof(double));
-    result.turned = place(memory, system->mapped ? wide : 0, sizeof(double));
+    result.shift = place(memory, system->mapped ? wide + PAIR : 0, sizeof(double));
+    result.roots = place(memory, root_count(system), sizeof(Complex));
+    result.moments = place(memory, system->mapped ? n : 0, sizeof(Complex));
+    result.turned = place_parts(memory, system->mapped ? wide : 0);
     zero_placed(memory, begin);
     *evaluation = result;
 }
@@ -165,7 +169,7 @@ SIZED void find_loads(int even, const Equations *eq, Evaluation *result) {
 
 /* Return Im(w^2) = -2 theta' s' of an arm that stretches.  The equations without these terms give
  * the angular acceleration minus Im(w^2).  If the coordinates are the directions, add_coriolis adds
- * Im(w^2) to the solution; otherwise pull_shift adds its loads to the right side. */
+ * Im(w^2) to the solution; otherwise couple adds its loads to the right side. */
 static double coriolis(const System *system, const double *turn, int stretch_direction) {
     return -2.0 * turn[arm_of(system, stretch_direction)] * turn[stretch_direction];
 }
@@ -267,28 +271,36 @@ SHARED void rows_dispatch(int even, const Equations *eq, const Kinematics *at, d
 
 /* --- inertia ---------------------------------------------------------------------------------- */
 
+/* Return the last column of a row of a block of M that may not be zero. */
+static inline int last_in(int size, const int *last, int row) {
+    return IS_CONSTANT(size) ? size - 1 : last[row];
+}
+
 /* Subtract the damping c M v of a block from its loads x. */
-SIZED void damp_mass(int size, double c, const double *RESTRICT M, const double *RESTRICT v,
-                     double *RESTRICT x) {
+SIZED void damp_mass(int size, const int *last, double c, const double *RESTRICT M,
+                     const double *RESTRICT v, double *RESTRICT x) {
     for (int i = 0; i < size; i++) {
         x[i] -= c * M[i * size + i] * v[i];
-        for (int j = 0; j < i; j++) {
+        for (int j = i + 1; j <= last_in(size, last, i); j++) {
             x[i] -= c * M[i * size + j] * v[j];
             x[j] -= c * M[i * size + j] * v[i];
         }
     }
 }
 
-/* Compute one block of M, and add its quadratic velocity terms Im(diag(e)^H H diag(e)) v^2 to the
- * loads x.  M is symmetric, the matrix of these terms antisymmetric. */
-SIZED void block_inertia(int size, const Complex *RESTRICT H, const double *RESTRICT own, Parts e,
-                         const double *RESTRICT squares, double *RESTRICT M, double *RESTRICT x) {
+/* Compute the upper triangle of one block of M, and add its quadratic velocity terms
+ * Im(diag(e)^H H diag(e)) v^2 to the loads x.  M is symmetric, the matrix of these terms
+ * antisymmetric. */
+SIZED void block_inertia(int size, const int *last, const Complex *RESTRICT H,
+                         const double *RESTRICT own, Parts e, const double *RESTRICT squares,
+                         double *RESTRICT M, double *RESTRICT x) {
     UNROLLED
     for (int i = 0; i < size; i++) {
-        const int columns = size <= SMALL ? size : i;
+        M[i * size + i] = own[i];
+        const int from = IS_CONSTANT(size) ? 0 : i + 1, end = last_in(size, last, i);
         UNROLLED
-        for (int j = 0; j < columns; j++) {
-            if (j < i) {
+        for (int j = from; j <= end; j++) {
+            if (j > i) {
                 double re = e.re[i] * e.re[j] + e.im[i] * e.im[j];
                 double im = e.re[i] * e.im[j] - e.im[i] * e.re[j];
                 double turned = H[i * size + j].re * im + H[i * size + j].im * re;
@@ -297,7 +309,6 @@ SIZED void block_inertia(int size, const Complex *RESTRICT H, const double *REST
                 x[j] -= turned * squares[i];
             }
         }
-        M[i * size + i] = own[i];
     }
 }
 
@@ -305,88 +316,84 @@ SIZED void block_inertia(int size, const Complex *RESTRICT H, const double *REST
 SIZED void block_mass(const Equations *eq, Evaluation *result, int size, int start,
                       const Complex *H, double *M) {
     const Kinematics *at = &result->at;
+    const int *last = eq->system->last + start;
     double *x = result->a + start;
-    block_inertia(size, H, own_inertia(eq->system, at) + start, parts_from(at->e_parts, start),
-                  at->squares + start, M, x);
+    block_inertia(size, last, H, own_inertia(eq->system, at) + start,
+                  parts_from(at->e_parts, start), at->squares + start, M, x);
     if (eq->mass_damping != 0.0) {
-        damp_mass(size, eq->mass_damping, M, at->speed + start, x);
+        damp_mass(size, last, eq->mass_damping, M, at->speed + start, x);
     }
 }
 
-/* Factor a block of M into L, and apply L^-1 to loads and rows. */
-SIZED bool factor_any_block(const Equations *eq, Evaluation *result, int size, int apart, int start,
-                            const double *M, double *L) {
-    double *inverse = result->factors.inverse + start;
-    if (IS_CONSTANT(size) && size <= UNROLLED_MAX ? !factor_known(size, apart, M, L, inverse)
-                                            : !factor_any(size, apart, M, L, inverse)) {
+/* Factor a block of M into U, and apply U^-1 to loads and rows. */
+NOINLINE bool factor_block(const Equations *eq, Evaluation *result, const Block *block,
+                           const double *M, double *U) {
+    const int start = block->start, size = block->size, *last = eq->system->last + start;
+    if (!factor_any(size, last, M, U, result->factors.inverse + start)) {
         return false;
     }
-    block_forward(size, apart, L, result->a + start);
-    for (int k = 0; k < eq->r; k++) {
-        block_forward(size, apart, L, result->factors.Z + k * eq->system->even + start);
-    }
+    forward_block(size, last, U, 1, 0, result->a + start);
+    forward_block(size, last, U, eq->r, eq->system->even, result->factors.Z + start);
     return true;
 }
 
-NOINLINE bool factor_block(const Equations *eq, Evaluation *result, int size, int start,
-                           double *L) {
-    return factor_any_block(eq, result, size, 0, start, result->block, L);
-}
-
-SIZED bool block_motion(const Equations *eq, Evaluation *result, int size, int start,
-                        const Complex *H, double *L) {
-    block_mass(eq, result, size, start, H, result->block);
-    return factor_any_block(eq, result, size, 0, start, result->block, L);
+static bool block_motion(const Equations *eq, Evaluation *result, const Block *block,
+                         const Complex *H, double *U) {
+    block_mass(eq, result, block->size, block->start, H, result->block);
+    return factor_block(eq, result, block, result->block, U);
 }
 
 /* Compute and factor a small block of M.  Blocks of tiny or huge numbers take the general path. */
-SIZED bool small_block_motion(const Equations *eq, Evaluation *result, int size, int start,
-                              const Complex *H, double *L) {
-    const int even = eq->system->even, r = eq->r;
+SIZED bool small_block_motion(const Equations *eq, Evaluation *result, int size,
+                              const Block *block, const Complex *H, double *U) {
+    const int even = eq->system->even, r = eq->r, start = block->start;
     double M[SMALL * SMALL], D[SMALL];
     block_mass(eq, result, size, start, H, M);
-    if (!small_factor(size, M, L, D)) {
+    if (!small_factor(size, M, U, D)) {
         UNROLLED
         for (int i = 0; i < size * size; i++) {
-            result->block[i] = i % size <= i / size ? M[i] : 0.0;
+            result->block[i] = i / size <= i % size ? M[i] : 0.0;
         }
-        return factor_block(eq, result, size, start, L);
+        return factor_block(eq, result, block, result->block, U);
     }
     put_block(size, start, D, result->factors.inverse);
-    solve_small(size, start, L, result->a, FORWARD);
+    solve_small(size, start, U, result->a, FORWARD);
     for (int k = 0; k < r; k++) {
-        solve_small(size, start, L, result->factors.Z + k * even, FORWARD);
+        solve_small(size, start, U, result->factors.Z + k * even, FORWARD);
     }
     return true;
 }
 
-/* Factor a block of the mass matrix in result->mass. */
-SIZED bool mapped_block_motion(const Equations *eq, Evaluation *result, int size, int apart,
-                               int start, const double *M, double *L) {
-    if (eq->mass_damping != 0.0) {
-        damp_mass(size, eq->mass_damping, M, result->at.speed + start, result->a + start);
+/* As factor_block, for a guide on two beams. */
+NOINLINE bool factor_guide_block(const Equations *eq, Evaluation *result, int start,
+                                 const double *M, double *U) {
+    if (!factor_guide(M, U, result->factors.inverse + start)) {
+        return false;
     }
-    return factor_any_block(eq, result, size, apart, start, M, L);
+    solve_guide(U, result->a + start, FORWARD);
+    for (int k = 0; k < eq->r; k++) {
+        solve_guide(U, result->factors.Z + k * eq->system->even + start, FORWARD);
+    }
+    return true;
 }
 
-/* Factor the blocks of the mass matrix in result->mass.  Those of guides on two beams of the
- * orders 3 and 5 are compiled separately. */
+/* Factor the blocks of the mass matrix in result->mass. */
 NOINLINE bool mapped_blocks_motion(const Equations *eq, Evaluation *result) {
     bool regular = true;
     const double *M = result->mass;
-    double *L = result->factors.L;
+    double *U = result->factors.U;
     for (int k = 0; k < result->factors.block_count; k++) {
         const Block *block = &result->factors.blocks[k];
-        int start = block->start, size = block->size, apart = block->apart;
-        if (size == 7 && apart == 3) {
-            regular = mapped_block_motion(eq, result, 7, 3, start, M, L) && regular;
-        } else if (size == 11 && apart == 5) {
-            regular = mapped_block_motion(eq, result, 11, 5, start, M, L) && regular;
-        } else {
-            regular = mapped_block_motion(eq, result, size, apart, start, M, L) && regular;
+        int start = block->start, size = block->size;
+        if (eq->mass_damping != 0.0) {
+            damp_mass(size, eq->system->last + start, eq->mass_damping, M,
+                      result->at.speed + start, result->a + start);
         }
+        regular = (block->split > 0 ? factor_guide_block(eq, result, start, M, U)
+                                    : factor_block(eq, result, block, M, U)) &&
+                  regular;
         M += size * size;
-        L += size * size;
+        U += size * size;
     }
     return regular;
 }
@@ -397,18 +404,19 @@ static bool blocks_motion(const Equations *eq, Evaluation *result) {
     }
     bool regular = true;
     const Complex *H = eq->system->coupling;
-    double *L = result->factors.L;
+    double *U = result->factors.U;
     for (int k = 0; k < result->factors.block_count; k++) {
-        int start = result->factors.blocks[k].start, size = result->factors.blocks[k].size;
+        const Block *block = &result->factors.blocks[k];
+        int size = block->size;
         switch (eq->system->definite ? size : 0) {
-        case 1: regular = small_block_motion(eq, result, 1, start, H, L) && regular; break;
-        case 2: regular = small_block_motion(eq, result, 2, start, H, L) && regular; break;
-        case 3: regular = small_block_motion(eq, result, 3, start, H, L) && regular; break;
-        case 4: regular = small_block_motion(eq, result, 4, start, H, L) && regular; break;
-        default: regular = block_motion(eq, result, size, start, H, L) && regular;
+        case 1: regular = small_block_motion(eq, result, 1, block, H, U) && regular; break;
+        case 2: regular = small_block_motion(eq, result, 2, block, H, U) && regular; break;
+        case 3: regular = small_block_motion(eq, result, 3, block, H, U) && regular; break;
+        case 4: regular = small_block_motion(eq, result, 4, block, H, U) && regular; break;
+        default: regular = block_motion(eq, result, block, H, U) && regular;
         }
         H += size * size;
-        L += size * size;
+        U += size * size;
     }
     return regular;
 }
@@ -432,10 +440,7 @@ static void pull_blocks(const Equations *eq, Evaluation *result) {
     if (system->stretch_count > 0) {
         find_shift(system, &result->at, result->shift);
     }
-    zeros(system->n * system->n, result->mass);
-    for (int k = 0; k < system->block_count; k++) {
-        add_block_terms(system, &system->maps[k], own, eq->r, result);
-    }
+    branch_terms(system, own, eq->r, result);
 }
 
 /* Compute directions, loads and rows. */
@@ -470,24 +475,23 @@ NOINLINE void mapped_terms(const Equations *eq, const Reference *near, Evaluatio
 
 /* --- energy ----------------------------------------------------------------------------------- */
 
-/* Return the kinetic energy v^T diag(e)^H H diag(e) v / 2 at the evaluated velocities. */
-PRBM double kinetic_energy_of(const Equations *equations, const Evaluation *evaluation) {
-    const System *system = equations->system;
-    const Complex *e = evaluation->at.e;
-    const double *own = own_inertia(system, &evaluation->at), *v = evaluation->at.turn;
-    double sum = 0.0;
-    for (int k = 0; k < system->block_count; k++) {
-        int start = system->blocks[k].start, end = start + system->blocks[k].size;
-        for (int i = start; i < end; i++) {
-            const Complex *H = system->H + i * system->d;
-            double row = 0.5 * own[i] * v[i];
-            for (int j = start; j < i; j++) {
-                row += product(product(conjugate(e[i]), H[j]), e[j]).re * v[j];
-            }
-            sum += row * v[i];
+/* Return the kinetic energy v^T U D U^T v / 2 at the evaluated velocities, from the factors of M. */
+PRBM double kinetic_energy_of(const Evaluation *evaluation) {
+    const Factors *factors = &evaluation->factors;
+    const double *U = factors->U, *v = evaluation->at.speed;
+    double *rates = evaluation->row, sum = 0.0;
+    zeros(factors->even, rates);
+    for (int k = 0; k < factors->block_count; k++) {
+        int start = factors->blocks[k].start, size = factors->blocks[k].size;
+        for (int i = 0; i < size; i++) {
+            rates[start + i] += v[start + i];
+            const int behind = factors->last[start + i] - i;
+            add_scaled(behind, v[start + i], U + i * size + i + 1, rates + start + i + 1);
+            sum += rates[start + i] * rates[start + i] / factors->inverse[start + i];
         }
+        U += size * size;
     }
-    return sum;
+    return 0.5 * sum;
 }
 
 /* --- friction --------------------------------------------------------------------------------- */
@@ -582,7 +586,7 @@ NOINLINE void set_columns(const Equations *eq, Evaluation *result) {
 
 /* --- accelerations ---------------------------------------------------------------------------- */
 
-/* Compute the factors from the rows in Z, and replace a by L^-1 a. */
+/* Compute the factors from the rows in Z, and replace a by U^-1 a. */
 SIZED bool factor_motion(int even, const Equations *eq, Evaluation *result) {
     result->factors.r = eq->r;
     result->factors.block_count = eq->system->mass_block_count;

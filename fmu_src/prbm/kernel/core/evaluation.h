@@ -17,7 +17,7 @@ PRBM bool evaluate_equations(const Equations *equations, double t, const double 
 /* Compute only the factors of the equations at a state. */
 PRBM bool factor_equations(const Equations *equations, const double *q, const double *v,
                            const Reference *near, Evaluation *result, Problem *problem);
-PRBM double kinetic_energy_of(const Equations *equations, const Evaluation *evaluation);
+PRBM double kinetic_energy_of(const Evaluation *evaluation);
 PRBM double rub_limit(const Equations *equations, int i, const Complex *e);
 SHARED void directions_of(int even, const System *system, const Reference *near, Kinematics *at);
 SHARED void arms_at(int even, const System *system, const Reference *near, Kinematics *at);

@@ -1,70 +1,117 @@
 /* Factors of a saddle-point matrix, block by block, for repeated solution. */
+#include <string.h>
+
 #include "core/factors.h"
 #include "core/matrix.h"
 #include "core/vectors.h"
 
-/* Return the first column of a row of a block that may not be zero. */
-static inline int first_column(int apart, int row) {
-    return row > apart ? apart : 0;
+/* Return the last column of a row of U that may not be zero.  last may be NULL: no row has zeros. */
+static inline int last_column(int size, const int *last, int row) {
+    return last ? last[row] : size - 1;
 }
 
-/* Factor M = L D L^T from its lower triangle, with ones on the diagonal of L; inverse is 1/D.
- * Return false if M is not positive definite: a pivot may not be round-off of its diagonal
- * element. */
-SHARED bool factor_any(int size, int apart, const double *RESTRICT M, double *RESTRICT L,
-                       double *RESTRICT inverse) {
-    for (int i = 0; i < size; i++) {
-        const int first = first_column(apart, i);
-        double pivot = M[i * size + i];
-        for (int j = first; j < i; j++) {
-            double sum = M[i * size + j];
+/* Subtract from the elements i, from next to first, of count vectors b, stride apart, the sums of
+ * U_ij b_j for j up to end. */
+SIZED void forward_together(int count, int stride, int next, int first, int end, int size,
+                            const int *last, const double *U, double *b) {
+    for (int i = next; i >= first; i--) {
+        const int column = last_column(size, last, i), stop = column < end ? column : end;
+        const double *row = U + i * size;
+        Lanes sum[SMALL][SUMS] = {{NO_LANES}};
+        int j = i + 1;
+        for (; j < stop; j += PAIR) {
             UNROLLED
-            for (int k = first; k < j; k++) {
-                sum -= L[i * size + k] * L[j * size + k];
-            }
-            L[i * size + j] = sum; /* L_ij D_j so far */
-        }
-        UNROLLED
-        for (int j = first; j < i; j++) {
-            double share = L[i * size + j] * inverse[j];
-            pivot -= share * L[i * size + j];
-            L[i * size + j] = share;
-        }
-        if (!(pivot > SINGULAR_RTOL * M[i * size + i])) {
-            return false;
-        }
-        inverse[i] = 1.0 / pivot;
-    }
-    return true;
-}
-
-/* The same for numbers that the compiler knows, with a size up to UNROLLED_MAX. */
-SHARED bool factor_known(int size, int apart, const double *RESTRICT M, double *RESTRICT L,
-                         double *RESTRICT inverse) {
-    UNROLLED
-    for (int i = 0; i < size; i++) {
-        const int first = first_column(apart, i);
-        double pivot = M[i * size + i];
-        UNROLLED
-        for (int j = 0; j < size; j++) {
-            if (first <= j && j < i) {
-                double sum = M[i * size + j];
+            for (int l = 0; l < PAIR; l += LANES) {
+                Lanes each = lanes_at(row + j + l);
                 UNROLLED
-                for (int k = 0; k < size; k++) {
-                    sum = first <= k && k < j ? sum - L[i * size + k] * L[j * size + k] : sum;
+                for (int k = 0; k < count; k++) {
+                    sum[k][SUM_OF(l)] += each * lanes_at(b + k * stride + j + l);
                 }
-                L[i * size + j] = sum; /* L_ij D_j so far */
             }
         }
         UNROLLED
-        for (int j = 0; j < size; j++) {
-            if (first <= j && j < i) {
-                double share = L[i * size + j] * inverse[j];
-                pivot -= share * L[i * size + j];
-                L[i * size + j] = share;
+        for (int k = 0; k < count; k++) {
+            double *x = b + k * stride, rest = j == stop ? row[j] * x[j] : 0.0;
+            x[i] -= total(sum[k]) + rest;
+        }
+    }
+}
+
+/* Divide row i of U D by D, behind the column i, and compute D_i. */
+static bool factor_row(int size, int i, int end, double diagonal, double *U, double *inverse) {
+    double pivot = diagonal, *row = U + i * size;
+    for (int j = i + 1; j <= end; j++) {
+        double share = row[j] * inverse[j];
+        pivot -= share * row[j];
+        row[j] = share;
+    }
+    inverse[i] = 1.0 / pivot;
+    return pivot > SINGULAR_RTOL * diagonal;
+}
+
+/* Factor M = U D U^T from its upper triangle, with ones on the diagonal of U, from the last row to
+ * the first; inverse is 1/D.  The row i of U has no elements behind last[i].  Return false if M is
+ * not positive definite: a pivot may not be round-off of its diagonal element. */
+PRBM bool factor_any(int size, const int *last, const double *M, double *U, double *inverse) {
+    bool regular = true;
+    for (int next = size - 1; regular && next >= 0;) {
+        const int end = last_column(size, last, next);
+        int first = next;
+        while (first > 0 && next - first < SMALL - 1 && last_column(size, last, first - 1) == end) {
+            first--;
+        }
+        for (int i = first; i <= next; i++) {
+            memcpy(U + i * size + i, M + i * size + i, (size_t)(end - i + 1) * sizeof *U);
+        }
+        double *rows = U + first * size;
+        if (next - first == SMALL - 1) {
+            forward_together(SMALL, size, end - 1, next + 1, end, size, last, U, rows);
+        } else {
+            for (int i = first; i <= next; i++) {
+                forward_together(1, size, end - 1, next + 1, end, size, last, U, U + i * size);
             }
         }
-        if (!(pivot > SINGULAR_RTOL * M[i * size + i])) {
+        for (int i = next; i >= first && regular; i--) {
+            forward_together(1, size, next, i + 1, end, size, last, U, U + i * size);
+            regular = factor_row(size, i, end, M[i * size + i], U, inverse);
+        }
+        next = first - 1;
+    }
+    return regular;
+}
+
+/* Return the last column of a row of U of a guide that is not zero. */
+static inline int guide_column(int row) {
+    return row < GUIDE / 2 ? GUIDE / 2 : GUIDE - 1;
+}
+
+/* As factor_any, for a guide. */
+SHARED bool factor_guide(const double *RESTRICT M, double *RESTRICT U, double *RESTRICT inverse) {
+    UNROLLED
+    for (int i = GUIDE - 1; i >= 0; i--) {
+        const int end = guide_column(i);
+        double pivot = M[i * GUIDE + i];
+        UNROLLED
+        for (int j = GUIDE - 1; j > 0; j--) {
+            if (i < j && j <= end) {
+                double sum = M[i * GUIDE + j];
+                UNROLLED
+                for (int k = 0; k < GUIDE; k++) {
+                    const bool linked = j < k && k <= end && k <= guide_column(j);
+                    sum = linked ? sum - U[i * GUIDE + k] * U[j * GUIDE + k] : sum;
+                }
+                U[i * GUIDE + j] = sum; /* U_ij D_j */
+            }
+        }
+        UNROLLED
+        for (int j = 0; j < GUIDE; j++) {
+            if (i < j && j <= end) {
+                double share = U[i * GUIDE + j] * inverse[j];
+                pivot -= share * U[i * GUIDE + j];
+                U[i * GUIDE + j] = share;
+            }
+        }
+        if (!(pivot > SINGULAR_RTOL * M[i * GUIDE + i])) {
             return false;
         }
         inverse[i] = 1.0 / pivot;
@@ -72,8 +119,25 @@ SHARED bool factor_known(int size, int apart, const double *RESTRICT M, double *
     return true;
 }
 
-NOINLINE bool factor(int size, const double *M, double *L, double *inverse) {
-    return factor_any(size, 0, M, L, inverse);
+/* Replace b by U^-1 b or U^-T b, for a guide. */
+SHARED void solve_guide(const double *RESTRICT U, double *RESTRICT b, Substitution way) {
+    UNROLLED
+    for (int k = 0; k < GUIDE; k++) {
+        const int i = way == FORWARD ? GUIDE - 1 - k : k;
+        double sum = b[i];
+        UNROLLED
+        for (int j = 0; j < GUIDE; j++) {
+            const bool linked = way == FORWARD ? i < j && j <= guide_column(i)
+                                               : j < i && i <= guide_column(j);
+            const double *row = way == FORWARD ? U + i * GUIDE + j : U + j * GUIDE + i;
+            sum = linked ? sum - *row * b[j] : sum;
+        }
+        b[i] = sum;
+    }
+}
+
+NOINLINE bool factor(int size, const double *M, double *U, double *inverse) {
+    return factor_any(size, NULL, M, U, inverse);
 }
 
 /* Limits in small_factor of the products of pivots, beyond which they may underflow or overflow. */
@@ -81,11 +145,11 @@ NOINLINE bool factor(int size, const double *M, double *L, double *inverse) {
 #define LARGEST_MULTIPLE 1e280
 
 /* Factor M, of a size up to SMALL, like factor_any, but with all divisions at the end, so that they
- * overlap in time.  Elimination without divisions computes w_k = w_0 w_1 ... w_(k-1) D_k on the
- * diagonal, with w_0 = D_0, and w_k L_ik below it.  Return false if M is not positive definite, or
- * if a product may underflow or overflow; factor may then succeed.  The caller knows that no pivot
- * is round-off, or tests it. */
-SHARED bool small_factor(int size, const double *RESTRICT M, double *RESTRICT L,
+ * overlap in time.  Elimination without divisions computes w_k = w_z ... w_(k+1) D_k on the
+ * diagonal, with w_z = D_z for the last row z, and w_k U_ik above it.  Return false if M is not
+ * positive definite, or if a product may underflow or overflow; factor may then succeed.  The
+ * caller knows that no pivot is round-off, or tests it. */
+SHARED bool small_factor(int size, const double *RESTRICT M, double *RESTRICT U,
                          double *RESTRICT inverse) {
     double w[SMALL][SMALL], multiple = 1.0;
     bool safe;
@@ -93,24 +157,24 @@ SHARED bool small_factor(int size, const double *RESTRICT M, double *RESTRICT L,
     for (int i = 0; i < size; i++) {
         UNROLLED
         for (int j = 0; j < size; j++) {
-            w[i][j] = j <= i ? M[i * size + j] : 0.0;
+            w[i][j] = i <= j ? M[i * size + j] : 0.0;
         }
     }
     UNROLLED
-    for (int k = 0; k < size; k++) {
+    for (int k = size - 1; k >= 0; k--) {
         UNROLLED
         for (int i = 0; i < size; i++) {
             UNROLLED
             for (int j = 0; j < size; j++) {
-                if (k < j && j <= i) {
+                if (i <= j && j < k) {
                     w[i][j] = w[k][k] * w[i][j] - w[i][k] * w[j][k];
                 }
             }
         }
     }
-    safe = w[size - 1][size - 1] < LARGEST_MULTIPLE;
+    safe = w[0][0] < LARGEST_MULTIPLE;
     UNROLLED
-    for (int k = 0; k < size; k++) {
+    for (int k = size - 1; k >= 0; k--) {
         double share = 1.0 / w[k][k];
         safe = safe && w[k][k] > LEAST_MULTIPLE;
         safe = safe && multiple > LEAST_MULTIPLE && multiple < LARGEST_MULTIPLE;
@@ -118,8 +182,8 @@ SHARED bool small_factor(int size, const double *RESTRICT M, double *RESTRICT L,
         multiple *= w[k][k];
         UNROLLED
         for (int i = 0; i < size; i++) {
-            if (i > k) {
-                L[i * size + k] = w[i][k] * share;
+            if (i < k) {
+                U[i * size + k] = w[i][k] * share;
             }
         }
     }
@@ -145,80 +209,109 @@ SHARED void put_block(int size, int start, const double *from, double *to) {
     }
 }
 
-/* block_forward: b := L^-1 b; block_backward: b := L^-T b, within a block. */
-SHARED void block_forward(int size, int apart, const double *RESTRICT L, double *RESTRICT b) {
+/* block_forward: b := U^-1 b; block_backward: b := U^-T b, within a block of a size up to SMALL. */
+SHARED void block_forward(int size, const double *RESTRICT U, double *RESTRICT b) {
+    UNROLLED
+    for (int i = size - 2; i >= 0; i--) {
+        double sum = b[i];
+        UNROLLED
+        for (int j = 0; j < size; j++) {
+            sum = i < j ? sum - U[i * size + j] * b[j] : sum;
+        }
+        b[i] = sum;
+    }
+}
+
+SIZED void block_backward(int size, const double *RESTRICT U, double *RESTRICT b) {
     UNROLLED
     for (int i = 1; i < size; i++) {
         double sum = b[i];
-        const int first = first_column(apart, i);
-        const int from = size <= UNROLLED_MAX ? 0 : first, to = size <= UNROLLED_MAX ? size : i;
         UNROLLED
-        for (int j = from; j < to; j++) {
-            sum = first <= j && j < i ? sum - L[i * size + j] * b[j] : sum;
+        for (int j = 0; j < size; j++) {
+            sum = j < i ? sum - U[j * size + i] * b[j] : sum;
         }
         b[i] = sum;
     }
 }
 
-SIZED void block_backward(int size, int apart, const double *RESTRICT L, double *RESTRICT b) {
-    UNROLLED
-    for (int k = 1; k < size; k++) {
-        int i = size - 1 - k;
-        double sum = b[i];
-        const int last = i < apart ? apart + 1 : size;
-        const int from = size <= UNROLLED_MAX ? 0 : i + 1, to = size <= UNROLLED_MAX ? size : last;
-        UNROLLED
-        for (int j = from; j < to; j++) {
-            sum = i < j && j < last ? sum - L[j * size + i] * b[j] : sum;
-        }
-        b[i] = sum;
-    }
-}
-
-SIZED void block_solve(int size, int apart, const double *RESTRICT L, double *RESTRICT b,
-                       Substitution way) {
-    if (way == FORWARD) {
-        block_forward(size, apart, L, b);
-    } else {
-        block_backward(size, apart, L, b);
-    }
-}
-
-/* Apply block_solve to the entries of x that belong to a block: size entries from the index start,
- * with a size up to SMALL. */
-SHARED void solve_small(int size, int start, const double *RESTRICT L, double *RESTRICT x,
+/* Apply block_forward or block_backward to the entries of x that belong to a block: size entries
+ * from the index start, with a size up to SMALL. */
+SHARED void solve_small(int size, int start, const double *RESTRICT U, double *RESTRICT x,
                         Substitution way) {
     double b[SMALL];
     UNROLLED
     for (int i = 0; i < size; i++) {
         b[i] = x[start + i];
     }
-    block_solve(size, 0, L, b, way);
+    if (way == FORWARD) {
+        block_forward(size, U, b);
+    } else {
+        block_backward(size, U, b);
+    }
     put_block(size, start, b, x);
 }
 
-/* Apply block_solve to a block; that of a guide on two beams of the order 3 is compiled
- * separately. */
-static void solve_block(int size, int apart, const double *L, double *b, Substitution way) {
-    if (size == 7 && apart == 3) {
-        block_solve(7, 3, L, b, way);
+/* Return the last element of count vectors b, stride apart, that is not zero in all of them. */
+static int last_element(int size, int count, int stride, const double *b) {
+    for (int i = size - 1; i > 0; i--) {
+        for (int k = 0; k < count; k++) {
+            if (b[k * stride + i] != 0.0) {
+                return i;
+            }
+        }
+    }
+    return 0;
+}
+
+/* Replace count vectors b, stride apart, by U^-1 b, within a block of any size.  The rows of a loop,
+ * which come in pairs, are zero in the coordinates of other loops. */
+PRBM void forward_block(int size, const int *last, const double *U, int count, int stride,
+                        double *b) {
+    for (int k = 0; k < count; k += PAIR) {
+        const bool pair = k + 1 < count;
+        const int end = last_element(size, pair ? PAIR : 1, stride, b);
+        if (pair) {
+            forward_together(PAIR, stride, end - 1, 0, end, size, last, U, b);
+        } else {
+            forward_together(1, stride, end - 1, 0, end, size, last, U, b);
+        }
+        b += PAIR * stride;
+    }
+}
+
+/* Replace b by U^-T b, within a block of any size. */
+NOINLINE void backward_block(int size, const int *last, const double *U, double *b) {
+    for (int i = 0; i < size - 1; i++) {
+        const int end = last_column(size, last, i);
+        add_scaled(end - i, -b[i], U + i * size + i + 1, b + i + 1);
+    }
+}
+
+SIZED void solve_any(int size, const int *last, const double *U, double *b, Substitution way) {
+    if (way == FORWARD) {
+        forward_block(size, last, U, 1, 0, b);
     } else {
-        block_solve(size, apart, L, b, way);
+        backward_block(size, last, U, b);
     }
 }
 
 SIZED void solve_blocks(const Factors *factors, double *x, Substitution way) {
-    const double *L = factors->L;
+    const double *U = factors->U;
     for (int k = 0; k < factors->block_count; k++) {
         int start = factors->blocks[k].start, size = factors->blocks[k].size;
         switch (size) {
-        case 1: solve_small(1, start, L, x, way); break;
-        case 2: solve_small(2, start, L, x, way); break;
-        case 3: solve_small(3, start, L, x, way); break;
-        case 4: solve_small(4, start, L, x, way); break;
-        default: solve_block(size, factors->blocks[k].apart, L, x + start, way);
+        case 1: solve_small(1, start, U, x, way); break;
+        case 2: solve_small(2, start, U, x, way); break;
+        case 3: solve_small(3, start, U, x, way); break;
+        case 4: solve_small(4, start, U, x, way); break;
+        default:
+            if (factors->blocks[k].split > 0) {
+                solve_guide(U, x + start, way);
+            } else {
+                solve_any(size, factors->last + start, U, x + start, way);
+            }
         }
-        L += size * size;
+        U += size * size;
     }
 }
 
@@ -231,25 +324,25 @@ static void backward_all(const Factors *factors, double *x) {
 }
 
 /* Factor a Schur complement. */
-SIZED bool factor_rows(int size, const double *S, double *L, double *inverse) {
+SIZED bool factor_rows(int size, const double *S, double *U, double *inverse) {
     double ratios = 0.0;
-    if (small_factor(size, S, L, inverse)) {
+    if (small_factor(size, S, U, inverse)) {
         UNROLLED
-        for (int k = 1; k < size; k++) { /* The first ratio is 1. */
+        for (int k = 0; k < size - 1; k++) { /* The last ratio is 1. */
             ratios += inverse[k] * S[k * size + k];
         }
         if (ratios < 1.0 / SINGULAR_RTOL) {
             return true;
         }
     }
-    return factor(size, S, L, inverse);
+    return factor(size, S, U, inverse);
 }
 
-/* Compute the lower triangle of S = Z D^-1 Z^T, with the D of M, and factor S = L_S D_S L_S^T.
- * L_S (r, r) and 1/D_S (r,) are stored behind S.  Return false if S is singular. */
+/* Compute the upper triangle of S = Z D^-1 Z^T, with the D of M, and factor S = U_S D_S U_S^T.
+ * U_S (r, r) and 1/D_S (r,) are stored behind S.  Return false if S is singular. */
 SIZED bool schur_of_size(int r, int even, Factors *factors) {
     const double *Z = factors->Z, *inverse = factors->inverse;
-    double *S = factors->S, *L = S + r * r;
+    double *S = factors->S, *U = S + r * r;
     bool rows = true;
     Lanes sum[SMALL * SMALL][SUMS] = {{NO_LANES}};
     UNROLLED_BY_LANES
@@ -260,7 +353,7 @@ SIZED bool schur_of_size(int r, int even, Factors *factors) {
             Lanes Y = share * lanes_at(Z + i * even + j);
             UNROLLED
             for (int k = 0; k < r; k++) {
-                if (k <= i) {
+                if (i <= k) {
                     sum[i * r + k][SUM_OF(j)] += Y * lanes_at(Z + k * even + j);
                 }
             }
@@ -271,7 +364,47 @@ SIZED bool schur_of_size(int r, int even, Factors *factors) {
         S[i] = total(sum[i]);
         rows = rows && (i % (r + 1) != 0 || S[i] > factors->least);
     }
-    return rows && factor_rows(r, S, L, L + r * r);
+    return rows && factor_rows(r, S, U, U + r * r);
+}
+
+/* Compute count elements of a row of S, those of the row Z and of consecutive columns. */
+SIZED void schur_elements(int count, int even, const double *RESTRICT Z,
+                          const double *RESTRICT inverse, const double *RESTRICT columns,
+                          double *RESTRICT S) {
+    Lanes sum[SMALL][SUMS] = {{NO_LANES}};
+    UNROLLED_BY_LANES
+    for (int j = 0; j < even; j += LANES) {
+        Lanes share = lanes_at(inverse + j) * lanes_at(Z + j);
+        UNROLLED
+        for (int k = 0; k < count; k++) {
+            sum[k][SUM_OF(j)] += share * lanes_at(columns + k * even + j);
+        }
+    }
+    UNROLLED
+    for (int k = 0; k < count; k++) {
+        S[k] = total(sum[k]);
+    }
+}
+
+/* As schur_of_size, for any number of rows. */
+static bool schur_of_many(Factors *factors) {
+    const int r = factors->r, even = factors->even;
+    const double *Z = factors->Z, *inverse = factors->inverse;
+    double *S = factors->S, *U = S + r * r;
+    for (int i = 0; i < r; i++) {
+        const double *row = Z + i * even;
+        int k = i;
+        for (; k + SMALL <= r; k += SMALL) {
+            schur_elements(SMALL, even, row, inverse, Z + k * even, S + i * r + k);
+        }
+        for (; k < r; k++) {
+            schur_elements(1, even, row, inverse, Z + k * even, S + i * r + k);
+        }
+        if (!(S[i * r + i] > factors->least)) {
+            return false;
+        }
+    }
+    return factor(r, S, U, U + r * r);
 }
 
 /* Return Z_i D^-1 column. */
@@ -284,9 +417,9 @@ static double metric_product(const Factors *factors, int i, const double *column
     return sum;
 }
 
-/* Compute S, scale it by the lengths of the rows Z, and factor it by LU: for an S that is larger
- * than SMALL, or not symmetric because a stop slides and the columns differ from the rows.  The
- * scales (r,) are stored behind S. */
+/* Compute S, scale it by the lengths of the rows Z, and factor it by LU: for an S that is not
+ * symmetric because a stop slides and the columns differ from the rows.  The scales (r,) are stored
+ * behind S. */
 static bool factor_unsymmetric(Factors *factors) {
     int even = factors->even, r = factors->r;
     double *scale = factors->S + r * r;
@@ -319,7 +452,7 @@ static void unsymmetric_multipliers(const Factors *factors, double *lam) {
 
 /* Compute and factor S for vectors of the padded length even. */
 SIZED bool schur_padded(int even, Factors *factors) {
-    factors->symmetric = factors->Z_columns == factors->Z && factors->r <= SMALL;
+    factors->symmetric = factors->Z_columns == factors->Z;
     if (!factors->symmetric) {
         return factor_unsymmetric(factors);
     }
@@ -328,7 +461,8 @@ SIZED bool schur_padded(int even, Factors *factors) {
     case 1: return schur_of_size(1, even, factors);
     case 2: return schur_of_size(2, even, factors);
     case 3: return schur_of_size(3, even, factors);
-    default: return schur_of_size(4, even, factors);
+    case 4: return schur_of_size(4, even, factors);
+    default: return schur_of_many(factors);
     }
 }
 
@@ -343,13 +477,21 @@ SHARED bool schur_dispatch(int even, Factors *factors) {
 
 /* Solve S lam = b with the factors of a symmetric S.  On entry lam contains b. */
 SIZED void multipliers_of_size(int r, const double *S, double *lam) {
-    const double *L = S + r * r, *inverse = L + r * r;
-    block_forward(r, 0, L, lam);
+    const double *U = S + r * r, *inverse = U + r * r;
+    if (r <= SMALL) {
+        block_forward(r, U, lam);
+    } else {
+        forward_block(r, NULL, U, 1, 0, lam);
+    }
     UNROLLED
     for (int k = 0; k < r; k++) {
         lam[k] *= inverse[k];
     }
-    block_backward(r, 0, L, lam);
+    if (r <= SMALL) {
+        block_backward(r, U, lam);
+    } else {
+        backward_block(r, NULL, U, lam);
+    }
 }
 
 /* Subtract Z D^-1 x from lam, the right side of the constraint rows. */
@@ -372,7 +514,7 @@ SIZED void reduce_right_side(int count, int even, const double *RESTRICT Z,
 }
 
 /* Solve for the multipliers lam, and set x := D^-1 (x + Z_columns^T lam).  On entry x contains
- * L^-1 f, and lam the right side of the constraint rows. */
+ * U^-1 f, and lam the right side of the constraint rows. */
 SIZED void constrain_of_size(int r, int even, const Factors *factors, double *RESTRICT x,
                              double *RESTRICT lam) {
     const double *RESTRICT Z = factors->Z, *RESTRICT columns = factors->Z_columns;
@@ -397,7 +539,7 @@ SIZED void constrain_of_size(int r, int even, const Factors *factors, double *RE
     }
 }
 
-/* Compute the solution x and the multipliers lam.  On entry x contains L^-1 f, and lam the right
+/* Compute the solution x and the multipliers lam.  On entry x contains U^-1 f, and lam the right
  * side of the constraint rows. */
 SIZED void finish_padded(int even, const Factors *factors, double *x, double *lam) {
     switch (factors->r) {

@@ -102,6 +102,7 @@ PRBM void count_coordinates(Reader *reader, Mechanism *m) {
 typedef struct {
     bool *held, *walked;
     int *body; /* (b + 1,) coordinates of the bodies */
+    int *depth; /* (b + 1,) numbers of parts between the bodies and the ground */
     Coordinate *coordinates;
     int *links, *strains, *arms, *stretches;
     DirectionMap map;
@@ -216,6 +217,17 @@ static Step part(const Mechanism *m, int i) {
     return step;
 }
 
+/* Whether a part is added from its end to its start.  A beam that closes a loop is added from the
+ * body that is nearer to the ground, which leaves fewer arms to move its masses. */
+static bool laid_backwards(const Mechanism *m, const Walk *walk, const Step *step) {
+    int start = step->between->start, end = step->between->end;
+    bool beam = step->flexure && kind_of(m, step->flexure)->order > 0;
+    if (!walk->held[start] || !walk->held[end]) {
+        return !walk->held[start];
+    }
+    return beam && walk->depth[end] < walk->depth[start];
+}
+
 /* Visit the first unvisited part with an end on a connected body; false if there is none. */
 static bool walk_on(const Mechanism *m, Walk *walk, Step *step) {
     for (int i = 0; i < m->flexure_count + m->joint_count; i++) {
@@ -223,7 +235,7 @@ static bool walk_on(const Mechanism *m, Walk *walk, Step *step) {
         const bool *held = walk->held;
         if (!walk->walked[i] && (held[step->between->start] || held[step->between->end])) {
             walk->walked[i] = true;
-            step->backwards = !held[step->between->start];
+            step->backwards = laid_backwards(m, walk, step);
             step->first = walk->added;
             step->first_direction = walk->directed;
             return true;
@@ -236,6 +248,10 @@ static void add_coordinates(const Mechanism *m, Walk *walk, Step *step) {
     const Flexure *flexure = step->flexure;
     int far = step->backwards ? step->between->start : step->between->end;
     step->closes = walk->held[far];
+    if (!step->closes) {
+        int near = step->backwards ? step->between->end : step->between->start;
+        walk->depth[far] = walk->depth[near] + 1;
+    }
     if (flexure && kind_of(m, flexure)->order > 0) {
         add_beam(kind_of(m, flexure), flexure, walk, step->closes ? GROUND : far);
         return;
@@ -258,7 +274,8 @@ PRBM void lay_out_coordinates(Reader *reader, Mechanism *m) {
     DirectionMap map = {false, kept(reader, d + 1, sizeof(int)),
                         kept(reader, (size_t)m->map.count, sizeof(int)), 0};
     Walk walk = {kept(reader, b + 1, sizeof(bool)), kept(reader, parts, sizeof(bool)),
-                 kept(reader, b + 1, sizeof(int)), kept(reader, n, sizeof(Coordinate)),
+                 kept(reader, b + 1, sizeof(int)), kept(reader, b + 1, sizeof(int)),
+                 kept(reader, n, sizeof(Coordinate)),
                  kept(reader, n, sizeof(int)), kept(reader, n, sizeof(int)),
                  kept(reader, d, sizeof(int)), kept(reader, d, sizeof(int)), map, 0, 0, 0, 0, 0};
     Step *steps = kept(reader, parts, sizeof *steps);
@@ -268,6 +285,7 @@ PRBM void lay_out_coordinates(Reader *reader, Mechanism *m) {
     memset(walk.held, 0, (b + 1) * sizeof *walk.held);
     memset(walk.walked, 0, parts * sizeof *walk.walked);
     walk.held[GROUND] = true;
+    walk.depth[GROUND] = 0;
     walk.map.first[0] = 0;
     size_t reached = 1;
     for (size_t i = 0; i < parts && walk_on(m, &walk, &steps[i]); i++) {

@@ -44,10 +44,12 @@ PRBM void copy(int n, const double *from, double *to) {
 
 /* y += a x */
 PRBM void add_scaled(int n, double a, const double *RESTRICT x, double *RESTRICT y) {
-    if (a != 0.0) {
-        for (int i = 0; i < n; i++) {
-            y[i] += a * x[i];
-        }
+    const int paired = a != 0.0 ? n - n % PAIR : 0;
+    for (int i = 0; i < paired; i += LANES) {
+        set_lanes(y + i, lanes_at(y + i) + a * lanes_at(x + i));
+    }
+    if (a != 0.0 && paired < n) {
+        y[paired] += a * x[paired];
     }
 }
 

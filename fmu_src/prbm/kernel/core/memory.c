@@ -4,7 +4,6 @@
 
 #include "core/memory.h"
 
-enum { ALIGNMENT = 16 };
 
 PRBM bool fail(Problem *problem, const char *format, ...) {
     va_list arguments;

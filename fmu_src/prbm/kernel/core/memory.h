@@ -23,6 +23,9 @@ typedef struct {
     size_t used;
 } Memory;
 
+/* Of the parts [B]. */
+enum { ALIGNMENT = 16 };
+
 PRBM void *place(Memory *memory, size_t count, size_t size);
 
 /* Working memory for one call, taken in order and released by restoring the value of used.  A

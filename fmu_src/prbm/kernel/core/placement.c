@@ -1,5 +1,5 @@
 /* The memory of the constant arrays of a mechanism. */
-#include "core/block_map.h"
+#include "core/branches.h"
 #include "core/free_body.h"
 #include "core/placement.h"
 #include "core/vectors.h"
@@ -73,8 +73,9 @@ PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memor
     result.grounded = place(memory, (size_t)result.even, sizeof(double));
     result.factors = place(memory, (size_t)m->map.count, sizeof(double));
     result.blocks = place(memory, d, sizeof(Block));
-    place_maps(&result, memory);
+    place_branches(&result, memory);
     result.mass_blocks = place(memory, n, sizeof(Block));
+    result.last = place(memory, n, sizeof(int));
     result.coupling = place(memory, d * d, sizeof(Complex));
     result.own = place(memory, d, sizeof(double));
     result.straight = place(memory, (size_t)result.even, sizeof(double));

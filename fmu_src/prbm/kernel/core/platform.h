@@ -62,7 +62,8 @@
 #else
 #define IS_CONSTANT(length) false
 #endif
-/* The largest size that is compiled separately, and the largest that is unrolled if it is known. */
-enum { SMALL = 4, UNROLLED_MAX = 7 };
+/* Sizes that are compiled separately: up to SMALL, and the mass matrix of a guide on two beams with
+ * three coordinates each beside the rotation of the body. */
+enum { SMALL = 4, GUIDE = 7 };
 
 #endif

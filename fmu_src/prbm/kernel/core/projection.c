@@ -2,7 +2,7 @@
  * Equations.project_near in mechanics/dynamics.py. */
 #include <math.h>
 
-#include "core/block_map.h"
+#include "core/branch_terms.h"
 #include "core/matrix.h"
 #include "core/projection.h"
 #include "core/vectors.h"

@@ -51,44 +51,41 @@ typedef struct {
 } FreeBody;
 
 /* A block on the diagonal of the mass matrix, for example that of the links of a flexure that
- * closes a loop.  The rows after the row apart, counted in the block, are zero in the columns
- * before it. */
+ * closes a loop.  For a guide on two beams, split is the row of the body: the rows before it are zero
+ * in the columns behind it.  Otherwise it is 0. */
 typedef struct {
-    int start, size, apart;
+    int start, size, split;
 } Block;
 
-/* Blocks whose code is compiled separately: beams of the order 3 between two clamps, with 5 or 6
- * nodes and without stretch.  The last direction of those with a body is the last coordinate, the
- * rotation of the body. */
-typedef enum { NO_BEAM, BEAM_5, BEAM_5_BODY, BEAM_6, BEAM_6_BODY } BeamKind;
+/* Branches with code of their own: beams with LEAF_COORDINATES, as clamped ones of the order 3, without
+ * stretch, with 5 or 6 nodes, alone or with the body that they reach. */
+typedef enum { ANY_BRANCH, LEAF_5, LEAF_5_BODY, LEAF_6, LEAF_6_BODY } BranchCode;
+enum { LEAF_COORDINATES = 4 };
 
-/* Sizes of these blocks. */
-enum {
-    BEAM_COORDINATES = 4,
-    BEAM_ENTRIES = 10, /* of a symmetric matrix of the coordinates */
-    BEAM_PAIRED = 8,   /* the first of them, which are pairs in the rows of the matrix */
-    BEAM_BODY = 4,    /* the first of the entries in the row of a body */
-    BEAM_DIRECTIONS_MAX = 7,
-    BEAM_CHANGES = BEAM_DIRECTIONS_MAX * BEAM_COORDINATES
-};
-
-/* A block of the mass matrix of the directions, and its map from the coordinates. */
+/* What a step of the assembly adds: the directions of a flexure and of the body that it reaches,
+ * behind a root on another branch or on the ground. */
 typedef struct {
+    int step;              /* of the assembly */
     int start, size, even; /* The directions: the first, their number, its padded length. */
     int count;             /* The number of coordinates that they depend on. */
     int *coordinate;       /* (count,) in ascending order */
     double *change;        /* (count, even) changes of the directions with these coordinates */
     Parts H;               /* (size, even) below the diagonal, and zero elsewhere */
-    int mass_first, mass_size; /* The mass of the coordinates i and j <= i is at the index
-                                * mass_first + i mass_size + j of the mass blocks. */
-    BeamKind beam;         /* The members below are used unless it is NO_BEAM. */
-    bool together;         /* Whether the coordinates are consecutive. */
-    int place[BEAM_ENTRIES];       /* The indices of the masses of the coordinates. */
-    double constant[BEAM_ENTRIES]; /* The part of these masses that is constant. */
-    double rows[BEAM_CHANGES];     /* (size, BEAM_COORDINATES) change, row by row. */
-    double *products;      /* (pairs, BEAM_ENTRIES) their changes with the mass of each pair of
-                            * nodes */
-} BlockMap;
+    Parts S;               /* (even,) first moments of mass of what moves with the directions */
+    int real;              /* The number of rows of H, the first ones, that are real. */
+    bool identity;         /* Whether the directions are the coordinates. */
+    BranchCode code;       /* The code that is compiled for it. */
+    int *own;              /* (count (count + 1) / 2,) indices of the masses of the coordinates */
+    int pairs;             /* The padded number of pairs of directions. */
+    double *products;      /* (masses, pairs) changes of each mass with that of each pair */
+    int parent;            /* The branch that carries the root; FIXED: the ground. */
+    Parts lever;           /* (even of the parent,) displacement of the root with its directions */
+    int reach, *path;      /* The coordinates that move the root. */
+    int *slot;             /* (count of the parent,) their indices in the path */
+    int *coupled;          /* (reach, count) indices of the masses of path and coordinates */
+    int *both;             /* (reach,) index of the same coordinate among those of the branch */
+    int root;              /* Index of the motion of the root among those of all branches. */
+} Branch;
 
 /* The constant arrays of a mechanism, as in the twin.  There are n coordinates, d directions, r
  * loop rows, p mass points, s stops, f friction points and b bodies.  Columns of A and of the
@@ -133,9 +130,15 @@ typedef struct {
                                * K is the sum of both */
     int block_count;
     Block *blocks;            /* of the mass matrix of the directions */
-    BlockMap *maps;           /* of the blocks, if mapped */
+    int branch_count;         /* The branches, if mapped. */
+    Branch *branches;
+    int *branch_of;           /* (b + 1,) the branches of the bodies */
+    Memory branch_memory;     /* of their arrays */
+    double *constant_mass;    /* The constant part of the mass blocks, if mapped. */
     int mass_block_count;
     Block *mass_blocks;       /* of M: the same, unless mapped */
+    int *last;                /* (n,) the last columns of the rows of M that may not be zero, counted
+                               * in their blocks */
     Complex *coupling;        /* the blocks of H, one after the other */
     double *own;              /* (d,) the diagonal of the mass matrix of the directions */
     double *straight;         /* (even,) rest */

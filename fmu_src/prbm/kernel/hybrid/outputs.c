@@ -153,7 +153,7 @@ static bool output_motion(Simulation *sim, bool near, Problem *problem) {
         int i = eq->pressed[k];
         out[slots->stops + PER_STOP * i + STOP_FORCE] = present->evaluation.pressure[i];
     }
-    out[slots->energies + ENERGY_KINETIC] = kinetic_energy_of(eq, &present->evaluation);
+    out[slots->energies + ENERGY_KINETIC] = kinetic_energy_of(&present->evaluation);
     return true;
 }
 

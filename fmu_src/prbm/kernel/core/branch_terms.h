@@ -1,0 +1,19 @@
+/* The mass matrix, the quadratic velocity terms, and the map to the directions, branch by branch. */
+#ifndef PRBM_BRANCH_TERMS_H
+#define PRBM_BRANCH_TERMS_H
+
+#include "core/evaluated.h"
+
+/* Compute the directions theta (d,) of the coordinates x (n,). */
+PRBM void map_directions(const System *system, const double *x, double *theta);
+/* Compute the directions and their rates from the coordinates and their rates. */
+PRBM void map_motion(const System *system, Kinematics *at);
+/* Add the derivatives by directions x (r, wide), pulled back to the coordinates, to out
+ * (r, even). */
+PRBM void pull_directions(const System *system, int r, const double *x, double *out);
+/* Compute the mass matrix of the coordinates.  Add the quadratic velocity terms to the loads, and
+ * pull loads and r rows back to the coordinates.  own (d,) is the diagonal of the mass matrix of
+ * the directions. */
+PRBM void branch_terms(const System *system, const double *own, int r, Evaluation *result);
+
+#endif
