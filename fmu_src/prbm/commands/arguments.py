@@ -138,50 +138,6 @@ def picture_arguments(parser: ArgumentParser) -> None:
     set_argument(parser)
 
 
-def import_arguments(parser: ArgumentParser) -> None:
-    """Add the arguments of ``prbm import``."""
-    add = parser.add_argument
-    add("drawing", type=Path, metavar="FILE", help="drawing, .dxf or .svg")
-    add("--thickness", required=True, metavar="H", help="thickness of the plate [m]")
-    add(
-        "--material", default="steel", metavar="NAME",
-        help="material of the plate (default: %(default)s)",
-    )  # fmt: skip
-    add("--youngs-modulus", metavar="E", help="Young's modulus, with a unit (default: typical)")
-    add("--density", metavar="RHO", help="density, with a unit (default: typical)")
-    add(
-        "--ground", action="append", default=[], metavar="X,Y",
-        help="point of a fixed body in units of the drawing, or with units; repeatable (default: "
-        "marks on the layer ground, or the largest body)",
-    )  # fmt: skip
-    add(
-        "--unit", metavar="U",
-        help="unit of the drawing, for example mm or in (default: that of the file)",
-    )  # fmt: skip
-    add(
-        "--gap", metavar="D",
-        help="largest gap of the outline that is closed [m] (default: 1e-4 of the diagonal)",
-    )  # fmt: skip
-    add(
-        "--tolerance", metavar="D",
-        help="accuracy of coordinates, within which numbers are rounded [m] (default: 5e-6 of the "
-        "diagonal)",
-    )  # fmt: skip
-    add(
-        "--flexures-below", metavar="D",
-        help="largest thickness of a flexure [m] (default: what is thin beside the bodies)",
-    )  # fmt: skip
-    add("--name", metavar="NAME", help="name of the mechanism (default: that of the drawing)")
-    add(
-        "--out", type=Path, metavar="FILE.toml",
-        help="file to write (default: the drawing's name with .toml)",
-    )  # fmt: skip
-    add(
-        "--check", type=Path, metavar="FILE.png",
-        help="picture of the drawing with the recognised parts (default: none)",
-    )  # fmt: skip
-
-
 def animation_arguments(parser: ArgumentParser) -> None:
     """Add the arguments of ``prbm animate``."""
     add = parser.add_argument

@@ -27,7 +27,6 @@ from .arguments import (
     animation_arguments,
     engine_argument,
     examples,
-    import_arguments,
     input_argument,
     linear_arguments,
     load_argument,
@@ -46,6 +45,7 @@ from .arguments import (
     sweep_arguments,
 )
 from .build_arguments import DETAILS, SUMMARY, build_arguments
+from .drawing_arguments import drawing_commands
 from .measure_arguments import measure_arguments
 from .program import (
     FAILED,
@@ -100,8 +100,7 @@ def parser() -> argparse.ArgumentParser:
     _sweep(commands)
     _study(commands)
     measure_arguments(commands)
-    _import(commands)
-    _export(commands)
+    drawing_commands(commands)
     _picture(commands)
     _animate(commands)
     _explore(commands)
@@ -457,34 +456,6 @@ def _study(commands: Commands) -> None:
     stop_time_argument(parser)
     engine_argument(parser)
     out_argument(parser)
-
-
-def _import(commands: Commands) -> None:
-    parser = add_command(
-        commands, "import", "drawings:import_file",
-        "mechanism file from the outline of a plate in a drawing (DXF or SVG)",
-        examples(
-            "prbm import stage.dxf --thickness 8mm --material steel --ground 5,5 --out stage.toml",
-            "prbm import stage.dxf --thickness 8mm --check stage.png",
-        ),
-        details="Check the picture of --check: what was not understood is red.",
-    )  # fmt: skip
-    import_arguments(parser)
-
-
-def _export(commands: Commands) -> None:
-    parser = add_command(
-        commands, "export", "drawings:export_file",
-        "outline of a mechanism as a drawing (DXF), for CAD or a laser cutter",
-        examples("prbm export NotchGuide", "prbm export my_mechanism.toml --out plate.dxf"),
-        details="Slots beside the flexures let them end where they are clamped. prbm import reads "
-        "the drawing again.",
-    )  # fmt: skip
-    mechanism_argument(parser)
-    parser.add_argument(
-        "--out", type=Path, metavar="FILE.dxf", help="file to write (default: MECHANISM.dxf)"
-    )
-    set_argument(parser)
 
 
 def _picture(commands: Commands) -> None:
