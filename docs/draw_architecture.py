@@ -42,6 +42,7 @@ ABOUT = {
     "runs": "experiment, simulation without an FMU, result",
     "kernel": "the engine in C, FMI 2.0 and 3.0, the compiler",
     "interface": "FMI variables, value references, binary tables",
+    "cad": "DXF and SVG drawings",
     "drawing": "shapes of a mechanism, icon",
     "files": "TOML mechanism files, units, settings",
     "hybrid": "the event loop: guards, events, impacts, contact modes",

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .base.errors import PrbmError as PrbmError
     from .base.errors import SimulationError as SimulationError
     from .base.version import __version__ as __version__
+    from .cad.importing import read_drawing as read_drawing
     from .files.mechanism_file import load as load
     from .mechanism.description import Mechanism
     from .mechanism.flexure import register_model as register_model
@@ -48,6 +49,7 @@ __all__ = [
     "linearize",
     "load",
     "modes",
+    "read_drawing",
     "register_model",
     "simulate",
     "study",
@@ -69,6 +71,7 @@ _MODULES = {
     "linearize": ("analysis.linear_model", "linearize"),
     "load": ("files.mechanism_file", "load"),
     "modes": ("analysis.static_shape", "modes"),
+    "read_drawing": ("cad.importing", "read_drawing"),
     "register_model": ("mechanism.flexure", "register_model"),
     "simulate": ("plots.shown", "simulate"),
     "study": ("sweeps.study", "study"),

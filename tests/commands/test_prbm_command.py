@@ -32,8 +32,9 @@ from support import ROOT, SUPPORT
 PAGE = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")
 COMMANDS = (
     "list", "new", "parameters", "modes", "equilibrium", "linearize", "simulate", "stress", "shock",
-    "fit", "impact-map", "contact", "sweep", "study", "picture", "animate", "explore", "build",
-    "modelica", "ssp", "validate", "measure youngs-modulus", "measure calibration",
+    "fit", "impact-map", "contact", "sweep", "study", "import", "export", "picture", "animate",
+    "explore", "build", "modelica", "ssp", "validate", "measure youngs-modulus",
+    "measure calibration",
     "measure frequency", "measure restitution", "completion",
 )  # fmt: skip
 

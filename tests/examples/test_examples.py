@@ -71,6 +71,18 @@ def test_folding_reduces_the_lateral_error_of_beam_theory(
     assert is_picture("straight_line.png")
 
 
+def test_an_imported_drawing_has_the_frequency_of_the_formula(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Four leaves between clamps, 12 EI/L^3 each, with 13/35 of their mass."""
+    pytest.importorskip("ezdxf", reason="drawings need ezdxf and shapely")
+    example("from_a_drawing.py").main()
+    words = capsys.readouterr().out.split()
+    found, formula = float(words[2]), float(words[7])
+    assert found == pytest.approx(formula, rel=1e-3)
+    assert is_picture("stage.png")
+
+
 def test_quickstart_names_the_file_that_it_cannot_write() -> None:
     Path("PRBDM2R.fmu").mkdir()
     with pytest.raises(SystemExit, match=r"cannot write .*PRBDM2R\.fmu: Is a directory; run this"):

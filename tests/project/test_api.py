@@ -26,6 +26,7 @@ PUBLIC = [
     "linearize",
     "load",
     "modes",
+    "read_drawing",
     "register_model",
     "simulate",
     "study",

@@ -58,6 +58,12 @@ def test_changed_texts_are_read_or_rejected(name):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("name", ["DXF", "SVG"])
+def test_changed_drawings_are_read_or_rejected(name):
+    assert texts.run(4000, seed=1, names=[name]).failures == []
+
+
+@pytest.mark.slow
 def test_changed_packages_are_read_or_rejected():
     assert texts.run(500, names=["SSP"]).failures == []
 

@@ -45,6 +45,7 @@ from .arguments import (
     sweep_arguments,
 )
 from .build_arguments import DETAILS, SUMMARY, build_arguments
+from .drawing_arguments import drawing_commands
 from .measure_arguments import measure_arguments
 from .program import (
     FAILED,
@@ -99,6 +100,7 @@ def parser() -> argparse.ArgumentParser:
     _sweep(commands)
     _study(commands)
     measure_arguments(commands)
+    drawing_commands(commands)
     _picture(commands)
     _animate(commands)
     _explore(commands)

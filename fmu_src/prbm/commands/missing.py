@@ -4,11 +4,14 @@ EXTRAS = {
     "dask": "sweep",
     "distributed": "sweep",
     "exudyn": "fe",
+    "ezdxf": "drawing",
     "fmpy": "fmpy",
     "imageio_ffmpeg": "video",
     "pandas": "sweep",
     "pyarrow": "sweep",
     "rainflow": "fatigue",
+    "shapely": "drawing",
+    "svgpathtools": "drawing",
     "ziglang": "platforms",
 }
 """Extras by the modules of their packages; a module without an extra is required."""

@@ -37,7 +37,7 @@ def add_flexure(parts: Collection, flexure: Flexure) -> None:
     kind = parts.mechanism.type_of(flexure)
     check_slender(flexure, kind, parts.length(flexure), parts.values)
     if parts.mechanism.model(kind).order:
-        _add_beam(parts, flexure, _beam(parts, flexure, kind), kind)
+        _add_beam(parts, flexure, beam_of(parts, flexure, kind), kind)
     else:
         _add_links(parts, flexure, _segments(parts, flexure, kind))
 
@@ -169,7 +169,7 @@ def _add_link(
     return j
 
 
-def _beam(parts: Collection, flexure: Flexure, kind: FlexureType) -> Beam:
+def beam_of(parts: Collection, flexure: Flexure, kind: FlexureType) -> Beam:
     """Return the beam of a flexure."""
     model, line = parts.mechanism.model(kind), _line(parts, flexure, kind)
     panels = _panels(parts, flexure, kind, line.length, model.nodes)

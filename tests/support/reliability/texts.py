@@ -1,4 +1,4 @@
-"""Changed texts: mechanism files, records, LabVIEW files, SSP packages and units.
+"""Changed texts: mechanism files, records, LabVIEW files, SSP packages, drawings and units.
 
 A text is a valid one in which pieces are replaced, removed, repeated, exchanged or inserted.  It
 must be read or rejected with an error of the package, within a limit of CPU time.
@@ -19,9 +19,12 @@ import numpy as np
 
 from c_importer import host_fmu
 from changed_texts import CHANGES, FRAGMENTS, REMOVED_MAX, change, pieces_of
+from drawn_plates import framed_stage, svg
+from drawn_plates import write as write_dxf
 from measurement_layouts import LAYOUTS, lvm
 from mechanism_mistakes import EXAMPLE
 from prbm.base.errors import PrbmError
+from prbm.cad.importing import Options, import_drawing
 from prbm.data.records import read_record
 from prbm.files import record_units, units
 from prbm.files.mechanism_file import read_mechanism, shipped
@@ -35,7 +38,8 @@ UNITS = (
     "2 mm2", "0.1 kg.m2", "(3 + 4) mm", "1 in", "20 degC", "4 lbf/in^2", "1 J/(kg*K)",
 )  # fmt: skip
 CPU_SECONDS = 2.0  # Of one text.
-PACKAGES_SHARE = 50  # Reading a package takes this many times as long as reading a text.
+PACKAGES_SHARE = 50  # Reading a package takes this many times as long as reading a text,
+DRAWINGS_SHARE = 20  # and recognising a drawing.
 
 
 class Kind(NamedTuple):
@@ -144,6 +148,20 @@ def _valid_package() -> Path:
     return _packages[0][1]
 
 
+def _drawing(path: Path) -> None:
+    """Read a file as the outline of a mechanism."""
+    import_drawing(path, Options(1e-3))
+
+
+def _drawn(suffix: str) -> str:
+    """Return the text of a drawing of a stage in a frame, without the head of a DXF file."""
+    if suffix == ".svg":
+        return svg(framed_stage(), 'width="120mm" viewBox="0 0 120 100"')
+    with tempfile.TemporaryDirectory(prefix="prbm_texts_") as name:
+        text = write_dxf(Path(name) / "plate.dxf", framed_stage(), "R12").read_text("utf-8")
+    return "  0\nSECTION\n  2\n" + text[text.index("ENTITIES") :]
+
+
 def kinds() -> dict[str, Kind]:
     """Return the kinds of texts by name."""
     with zipfile.ZipFile(_valid_package()) as archive:
@@ -155,6 +173,8 @@ def kinds() -> dict[str, Kind]:
         "CSV": Kind(read_record, tables, ".csv"),
         "LVM": Kind(read_record, [lvm(), lvm(","), lvm(columns="No")], ".lvm"),
         "SSP": Kind(_package, [description], ".ssd", PACKAGES_SHARE),
+        "DXF": Kind(_drawing, [_drawn(".dxf")], ".dxf", DRAWINGS_SHARE),
+        "SVG": Kind(_drawing, [_drawn(".svg")], ".svg", DRAWINGS_SHARE),
         "units": Kind(_unit, UNITS),
     }
 

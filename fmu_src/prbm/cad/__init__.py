@@ -1,0 +1,1 @@
+"""CAD drawings: mechanisms from the outline of a plate, and outlines of mechanisms."""

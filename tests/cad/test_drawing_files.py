@@ -1,0 +1,301 @@
+"""Files of drawings: versions, units, layers, blocks, gaps, and files that are refused."""
+
+import contextlib
+import shutil
+from itertools import pairwise
+
+import ezdxf
+import numpy as np
+import pytest
+import shapely
+
+from drawn_plates import box, disc, filleted_stage, framed_stage, rings, strip, svg, write
+from prbm.cad import curves, dxf
+from prbm.cad.curves import DrawingError
+from prbm.cad.importing import Options, import_drawing
+from prbm.cad.numbers import plain, roundest
+
+OPTIONS = Options(8e-3)
+
+
+def drawing(tmp_path, change, plate=None, **options):
+    """Import the framed stage from a file that a function changes before it is saved."""
+    document = ezdxf.new("R2010", units=4)
+    change(document, document.modelspace())
+    for ring in rings(framed_stage() if plate is None else plate):
+        document.modelspace().add_lwpolyline(ring[:-1], close=True)
+    path = tmp_path / "plate.dxf"
+    document.saveas(path)
+    return import_drawing(path, Options(8e-3, **options))
+
+
+def thickness(result) -> float:
+    """Return the thickness of the leaves [mm]."""
+    return 1e3 * result.draft.kinds[0].dimensions["thickness"]
+
+
+@pytest.mark.parametrize("version", ["R12", "R2000", "R2004", "R2007", "R2010", "R2013", "R2018"])
+def test_every_version_gives_the_same_mechanism(tmp_path, version):
+    result = import_drawing(write(tmp_path / "plate.dxf", framed_stage(), version), OPTIONS)
+    assert len(result.mechanism.flexures) == 4
+    assert thickness(result) == pytest.approx(0.4, rel=1e-9)
+
+
+@pytest.mark.parametrize(("unit", "length"), [(1, 25.4), (4, 1.0), (5, 10.0), (13, 1e-3)])
+def test_the_unit_of_the_file_scales_the_mechanism(tmp_path, unit, length):
+    result = import_drawing(write(tmp_path / "plate.dxf", framed_stage(), unit=unit), OPTIONS)
+    assert thickness(result) == pytest.approx(0.4 * length, rel=1e-6)
+
+
+def test_a_drawing_without_a_unit_is_in_millimetres_and_says_so(tmp_path):
+    result = import_drawing(write(tmp_path / "plate.dxf", framed_stage(), "R12"), OPTIONS)
+    assert "the drawing has no unit: millimetres are assumed" in result.notes
+    inches = Options(8e-3, unit=0.0254)
+    again = import_drawing(tmp_path / "plate.dxf", inches)
+    assert thickness(again) == pytest.approx(25.4 * 0.4)
+
+
+def test_marks_name_the_ground_instead_of_the_largest_body(tmp_path):
+    """The stage is fixed, and the frame moves."""
+
+    def mark(document, space):
+        space.add_point((50, 40), dxfattribs={"layer": "Ground"})
+
+    draft = drawing(tmp_path, mark).draft
+    assert draft.found.bodies[draft.stage].bounds == pytest.approx((-0.01, -0.01, 0.11, 0.09))
+
+
+def test_a_given_point_names_the_ground_in_units_of_the_drawing(tmp_path):
+    result = drawing(tmp_path, lambda *_: None, ground_drawn=[50 + 40j])
+    assert result.draft.found.bodies[result.draft.stage].bounds[0] == pytest.approx(-0.01)
+    with pytest.raises(ValueError, match=r"the point \(20, 20\) mm is on no body; the nearest"):
+        drawing(tmp_path, lambda *_: None, ground=[0.02 + 0.02j])
+
+
+@pytest.mark.parametrize(
+    ("wall", "direction", "gap"),
+    [(((71, 35), (71, 45)), 0.0, 1e-3), (((28, 45), (28, 35)), 180.0, 2e-3),
+     (((40, 50.5), (60, 50.5)), 90.0, 0.5e-3)],
+)  # fmt: skip
+def test_a_line_on_the_layer_stops_is_a_stop_with_its_gap(tmp_path, wall, direction, gap):
+    def stop(document, space):
+        space.add_line(*wall, dxfattribs={"layer": "stops"})
+
+    (found,) = drawing(tmp_path, stop).mechanism.stops
+    assert found.body == "stage"
+    assert found.direction == direction
+    assert found.position == pytest.approx(gap, abs=1e-9)
+
+
+def test_construction_lines_and_hidden_layers_are_ignored(tmp_path):
+    def lines(document, space):
+        document.layers.add("hidden").off()
+        for layer in ("construction", "hidden", "Defpoints"):
+            space.add_line((-20, 40), (120, 40), dxfattribs={"layer": layer})
+        space.add_text("plate")
+
+    result = drawing(tmp_path, lines)
+    assert len(result.mechanism.flexures) == 4
+    assert "not read: 1 LINE on a hidden layer, 1 TEXT" in result.notes
+
+
+def test_blocks_in_blocks_are_placed(tmp_path):
+    """The outline is in a block, turned by 90 degrees in another one."""
+    document = ezdxf.new("R2010", units=4)
+    inner, outer = document.blocks.new("inner"), document.blocks.new("outer")
+    for ring in rings(framed_stage()):
+        inner.add_lwpolyline(ring[:-1], close=True)
+    outer.add_blockref("inner", (0, 0), dxfattribs={"rotation": 90})
+    document.modelspace().add_blockref("outer", (10, 20))
+    document.saveas(tmp_path / "plate.dxf")
+    result = import_drawing(tmp_path / "plate.dxf", OPTIONS)
+    assert len(result.mechanism.flexures) == 4
+    assert result.draft.found.plate.shape.bounds == pytest.approx((-0.08, 0.01, 0.02, 0.13))
+
+
+def test_gaps_and_lines_that_are_drawn_twice_are_repaired_and_reported(tmp_path):
+    document = ezdxf.new("R2010", units=4)
+    space = document.modelspace()
+    for ring in rings(framed_stage()):
+        for k, (a, b) in enumerate(pairwise(ring)):
+            space.add_line(a, (b[0] + 0.005 * (k == 0), b[1]))
+            if k == 1:
+                space.add_line(b, a)
+    document.saveas(tmp_path / "plate.dxf")
+    result = import_drawing(tmp_path / "plate.dxf", OPTIONS)
+    assert len(result.mechanism.flexures) == 4
+    assert any("gaps of at most 0.005 mm were closed" in note for note in result.notes)
+    assert any("are drawn twice" in note for note in result.notes)
+
+
+def test_an_open_outline_is_refused_with_its_gap(tmp_path):
+    def outline(document, space):
+        space.add_lwpolyline([(0, 0), (50, 0), (50, 20), (0, 20), (0, 1.5)])
+
+    with pytest.raises(ValueError, match=r"gaps of up to 1.5 mm at \(0, .*; close them, or incr"):
+        drawing(tmp_path, outline, plate=shapely.MultiPolygon())
+
+
+def test_parts_that_nothing_holds_are_left_out_and_reported(tmp_path):
+    def island(document, space):
+        space.add_circle((200, 40), 10)
+
+    result = drawing(tmp_path, island)
+    assert [text for _, text in result.draft.found.doubts] == [
+        "nothing connects this part to the ground: left out"
+    ]
+
+
+# --- SVG ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("head", "scale"),
+    [('width="120mm" viewBox="0 0 120 100"', 1.0), ('width="12in" viewBox="0 0 120 100"', 2.54)],
+)
+def test_an_svg_file_gives_the_mechanism_with_its_unit(tmp_path, head, scale):
+    path = tmp_path / "plate.svg"
+    path.write_text(svg(filleted_stage(), head), encoding="utf-8")
+    result = import_drawing(path, OPTIONS)
+    assert len(result.mechanism.flexures) == 4
+    assert thickness(result) == pytest.approx(0.4 * scale, rel=1e-3)
+    bounds = np.array([-10.0, -10.0, 110.0, 90.0]) * 1e-3 * scale
+    assert result.draft.found.plate.shape.bounds == pytest.approx(bounds, rel=1e-3)
+
+
+def test_transformations_shapes_and_layers_of_svg_files_are_read(tmp_path):
+    """Two plates joined by a leaf: a rectangle, a circle as a hole, and a stop on a layer."""
+    body = (
+        '<g transform="translate(5 5) rotate(90)"><rect x="0" y="0" width="30" height="20"/>'
+        '<circle cx="10" cy="10" r="3"/></g><rect x="-20" y="75" width="40" height="20"/>'
+        '<polygon points="-4.8,34 -5.2,34 -5.2,76 -4.8,76"/>'
+        '<g id="stops"><line x1="7" y1="10" x2="7" y2="30"/></g>'
+    )
+    head = 'xmlns="http://www.w3.org/2000/svg" width="100mm" viewBox="0 0 100 100"'
+    path = tmp_path / "plate.svg"
+    path.write_text(f"<svg {head}>{body}</svg>", encoding="utf-8")
+    result = import_drawing(path, Options(8e-3, ground=[-0.09j]))
+    (flexure,) = result.draft.found.flexures
+    assert abs(flexure.shape.end - flexure.shape.start) == pytest.approx(0.04, rel=1e-3)
+    assert len(result.draft.found.bodies[result.draft.stage].interiors) == 1
+    assert result.mechanism.stops[0].position == pytest.approx(2e-3, abs=1e-6)
+
+
+# --- files that are refused -----------------------------------------------------------------------
+
+
+def test_files_that_are_no_drawings_are_refused(tmp_path):
+    for name, content, reason in (
+        ("a.dxf", b"", "there are no lines or curves"),
+        ("b.dxf", b"AC1027\0\0\0", "it is a DWG file; export the drawing as DXF"),
+        ("c.dxf", b"\x00\xff" * 200, "not a DXF file|there are no lines"),
+        ("d.svg", b"<svg", "not an SVG file"),
+        ("e.svg", b"<html/>", "its root is html"),
+        ("f.svg", b'<!DOCTYPE x [<!ENTITY a "b">]><svg>&a;</svg>', "it defines entities"),
+        ("g.step", b"", "drawings are read from .dxf and .svg files"),
+    ):
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(ValueError, match=reason):
+            import_drawing(tmp_path / name, OPTIONS)
+    with pytest.raises(ValueError, match="cannot be read"):
+        import_drawing(tmp_path / "none.dxf", OPTIONS)
+
+
+def test_limits_of_size_entities_points_nesting_and_copies(tmp_path, monkeypatch):
+    path = write(tmp_path / "plate.dxf", framed_stage())
+    for module, limit, value, reason in (
+        (dxf, "FILE_SIZE_MAX", 100, "larger than 100 bytes"),
+        (curves, "ENTITIES_MAX", 1, "more than 1 entities"),
+        (curves, "POINTS_MAX", 3, "more than 3 points"),
+        (curves, "COORDINATE_MAX", 1e-3, "farther than 0.001 m from the origin"),
+    ):
+        with monkeypatch.context() as patch:
+            patch.setattr(module, limit, value)
+            with pytest.raises(ValueError, match=reason):
+                import_drawing(path, OPTIONS)
+
+    def nested(document, space):
+        for k in range(12):
+            document.blocks.new(f"b{k}").add_blockref(f"b{k + 1}", (0, 0))
+        document.blocks.new("b12").add_circle((0, 0), 1)
+        space.add_blockref("b0", (0, 0))
+
+    with pytest.raises(ValueError, match="blocks are nested more than 8 deep"):
+        drawing(tmp_path, nested)
+
+    def copied(document, space):
+        document.blocks.new("b").add_circle((0, 0), 1)
+        space.add_blockref("b", (0, 0)).grid((1000, 1000), (1, 1))
+
+    with pytest.raises(ValueError, match="1000000 copies in an array"):
+        drawing(tmp_path, copied)
+
+
+def test_a_coordinate_that_is_not_a_number_is_refused(tmp_path):
+    def line(document, space):
+        space.add_line((0, 0), (float("nan"), 1))
+
+    with pytest.raises(ValueError, match=r"is not a number or farther|inconsistent|not a DXF"):
+        drawing(tmp_path, line)
+
+
+@pytest.mark.slow
+def test_random_changes_of_a_file_give_a_mechanism_or_a_reason(tmp_path):
+    """Bytes of a file are changed, removed or repeated; each result is a message or a mechanism."""
+    content = bytearray(write(tmp_path / "plate.dxf", framed_stage(), "R12").read_bytes())
+    start = content.index(b"ENTITIES")
+    rng = np.random.default_rng(0)
+    path, read = tmp_path / "changed.dxf", 0
+    for _ in range(40):
+        changed = bytearray(content)
+        for _ in range(int(rng.integers(1, 4))):
+            k = int(rng.integers(start, len(changed)))
+            kind = rng.integers(3)
+            if kind == 0:
+                changed[k] = int(rng.integers(256))
+            elif kind == 1:
+                del changed[k : k + int(rng.integers(1, 30))]
+            else:
+                changed[k:k] = changed[k : k + int(rng.integers(1, 30))]
+        path.write_bytes(bytes(changed))
+        with contextlib.suppress(DrawingError):
+            read += len(import_drawing(path, OPTIONS).mechanism.flexures) > 0
+    assert read > 5
+
+
+def test_a_material_is_known_or_given():
+    with pytest.raises(ValueError, match="material 'cheese' is unknown: choose one of steel"):
+        import_drawing("any.dxf", Options(8e-3, material="cheese"))
+
+
+def test_round_numbers_have_the_fewest_decimals_within_the_tolerance():
+    assert roundest(39.9998, 0.001) == 40.0
+    assert roundest(-0.50004, 1e-4) == -0.5
+    assert plain(1e-6) == "0.000001"
+
+
+def test_the_name_of_a_drawing_may_have_any_letters(tmp_path):
+    path = write(tmp_path / "plate.dxf", framed_stage())
+    other = shutil.copy(path, tmp_path / '3 "plätze" {v2}.dxf')
+    assert import_drawing(other, OPTIONS).mechanism.name.isidentifier()
+
+
+def test_crossing_leaves_of_two_plates_are_bolted_to_the_same_bodies(tmp_path):
+    """A cross pivot: each plate has one leaf, and holes at the same places in both bodies."""
+    along = np.exp(1j * np.pi / 4)
+    holes = [disc(complex(x, y), 2) for x in (-25, 25) for y in (-30, 30)]
+    document = ezdxf.new("R2010", units=4)
+    for layer, turn in (("0", along), ("plate 2", along.conjugate())):
+        bars = box(-40, -40, 40, -20).union(box(-40, 20, 40, 40))
+        plate = bars.union(strip(turn * np.linspace(-30, 30, 10), 0.5))
+        for ring in rings(plate.difference(shapely.unary_union(holes))):
+            document.modelspace().add_lwpolyline(ring[:-1], close=True, dxfattribs={"layer": layer})
+    document.saveas(tmp_path / "plate.dxf")
+    result = import_drawing(tmp_path / "plate.dxf", Options(8e-3, ground=[-0.03j - 0.03]))
+    mechanism = result.mechanism
+    assert [body.name for body in mechanism.bodies] == ["stage"]
+    assert len(mechanism.flexures) == 2
+    ends = [one.shape.end - one.shape.start for one in result.draft.found.flexures]
+    assert sorted(np.degrees(np.angle(ends))) == pytest.approx([45.0, 135.0], abs=1e-3)
+    mass = 7850.0 * 8e-3 * 2 * (0.08 * 0.02 - 2 * np.pi * 0.002**2)
+    assert mechanism.bodies[0].mass == pytest.approx(mass, rel=2e-3)
