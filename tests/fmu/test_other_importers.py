@@ -164,8 +164,8 @@ def test_states_without_finite_derivatives_are_discarded(native, model, case, fm
         instance.fmu.setContinuousStates((c_double * len(x))(*far_state(instance, case)), len(x))
         for name, found in statuses(instance).items():
             assert found in (DISCARD, ERROR) if name == "step" else found == DISCARD, name
-        assert "are not finite numbers" in instance.messages[-1] or "not determine" in \
-            instance.messages[-1]  # fmt: skip
+        reasons = ("far from every motion", "not determine")
+        assert any(reason in instance.messages[-1] for reason in reasons)
         instance.fmu.setContinuousStates((c_double * len(x))(*x), len(x))
         assert [*integrator.z()] == [*z]
         assert instance.bytes() == before

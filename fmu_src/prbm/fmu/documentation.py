@@ -268,9 +268,8 @@ def _use(mechanism: Mechanism, experiment: Experiment) -> str:
         f"<p>The folder <code>{FOLDER}</code> has the start values as a parameter set (SSV).</p>\n"
         "<p>Path: unpack the FMU to a folder whose path has only letters and digits of ASCII, "
         "spaces and <code>. _ - ~</code>. The library pythonfmu decodes no other percent-encoded "
-        "characters and crashes the host. FMPy unpacks to the folder of temporary files; if needed "
-        "set <code>TMPDIR</code> (Linux) or <code>TMP</code> (Windows), or use the native FMU of "
-        "this mechanism, which reads all paths.</p>\n"
+        "characters and crashes the host. Set <code>TMPDIR</code> (Linux) or <code>TMP</code> "
+        "(Windows) for FMPy, or use the native FMU, which reads all paths.</p>\n"
         "<p>Errors:</p>\n<ul>\n"
         "<li>An invalid value, parameter set or step is rejected. The reason is logged, and every "
         "<code>doStep</code> returns <code>fmi2Discard</code> until the value is corrected.</li>\n"
@@ -640,15 +639,13 @@ def _exchange(interface: NativeInterface, version: int) -> str:
 def _peaks(mechanism: Mechanism) -> Iterator[str]:
     if any(stop.compliant for stop in mechanism.stops):
         yield (
-            "<p>While a compliant stop is pressed, each extremum of its force and indentation is a "
-            "state event (release indicator): <code>peak_force</code>, <code>indentation</code> "
-            "and <code>contact_duration</code> do not depend on the importer's steps.</p>"
+            "<p>Each extremum of the force of a compliant stop is a state event (release indicator): "
+            "its peak and duration do not depend on the importer's steps.</p>"
         )
     if stressed(mechanism):
         yield (
-            "<p>In model exchange <code>peak_stress</code> is sampled at the steps that the "
-            "importer completes and at events. For an error of 0.1 % these steps must be at most a "
-            "twentieth of the period of the fastest vibration of the stress.</p>"
+            "<p>The importer's steps sample <code>peak_stress</code>. For an error of 0.1 % they must "
+            "be at most a twentieth of the period of the fastest vibration of the stress.</p>"
         )
 
 
