@@ -639,13 +639,13 @@ def _exchange(interface: NativeInterface, version: int) -> str:
 def _peaks(mechanism: Mechanism) -> Iterator[str]:
     if any(stop.compliant for stop in mechanism.stops):
         yield (
-            "<p>Each extremum of the force of a compliant stop is a state event (release indicator): "
-            "its peak and duration do not depend on the importer's steps.</p>"
+            "<p>Each extremum of the force of a compliant stop is a state event (release "
+            "indicator): its peak and duration do not depend on the importer's steps.</p>"
         )
     if stressed(mechanism):
         yield (
-            "<p>The importer's steps sample <code>peak_stress</code>. For an error of 0.1 % they must "
-            "be at most a twentieth of the period of the fastest vibration of the stress.</p>"
+            "<p>In model exchange, steps sample <code>peak_stress</code>. For an error of 0.1 % they "
+            "must be at most a twentieth of the period of the fastest vibration of the stress.</p>"
         )
 
 

@@ -25,8 +25,8 @@ CURVE_POINTS = 33  # Points of each panel of a drawn beam.
 def add_flexure(parts: Collection, flexure: Flexure) -> None:
     """Add a flexure of which at least one body has been reached.
 
-    It reaches the body at its other end.  If this body has been reached before, it closes a loop.  A
-    beam is then laid from the body nearer to the ground, so that fewer arms move its masses.
+    It reaches the body at its other end.  If this body has been reached before, it closes a loop;
+    a beam is then laid from the body nearer to the ground, so that fewer arms move its masses.
 
     Raises
     ------
