@@ -644,8 +644,8 @@ def _peaks(mechanism: Mechanism) -> Iterator[str]:
         )
     if stressed(mechanism):
         yield (
-            "<p>In model exchange, steps sample <code>peak_stress</code>. For an error of 0.1 % they "
-            "must be at most a twentieth of the period of the fastest vibration of the stress.</p>"
+            "<p>In model exchange, steps sample <code>peak_stress</code>. For an error of 0.1 % "
+            "they must be at most 1/20 of the period of the fastest vibration of the stress.</p>"
         )
 
 
