@@ -33,7 +33,7 @@ from c_importer import Job, execute, kernel_library, unpack, write
 from native import POINTS, RIGHT_HAND_SIDE, cost, inclusive
 from prbm.fmu import native_fmu
 from prbm.fmu.reference_results import steps
-from prbm.kernel.compiler import FLAGS, OPTIMIZATION
+from prbm.kernel.compiler import FLAGS
 from prbm.mechanics.assembly import assemble
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.parts import Flexure
@@ -107,7 +107,7 @@ def counted(given: Mechanism, points: Real, functions: Sequence[str]) -> tuple[i
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         unpacked(given, folder)
-        optimized = [flag for flag in (*OPTIMIZATION, *FLAGS) if flag != "-g0"]
+        optimized = [flag for flag in FLAGS if flag != "-g0"]
         library = kernel_library("profiled", ("-g", *optimized))
         job = Job(folder / "model", points=points, records=("shuttle.x",), library=library)
         counter = ("valgrind", "--tool=callgrind", f"--callgrind-out-file={folder / 'profile'}")

@@ -30,13 +30,10 @@ from .sources import UNIT, files_digest, kernel
 
 HOST, ALL = "host", "all"
 FLAGS = (
-    "-std=c99", "-ffp-contract=off", "-fvisibility=hidden", "-g0",
+    "-std=c99", "-O3", "-ffp-contract=off", "-fvisibility=hidden", "-g0",
     # The following options do not change results.  Vectors are used explicitly where they help.
     "-fno-math-errno", "-fno-trapping-math", "-fno-tree-vectorize",
 )  # fmt: skip
-OPTIMIZATION = ("-O3",)
-GCC_OPTIMIZATION = ("-O2", "-fno-gcse", "-fpeel-loops", "-fsplit-loops", "-funswitch-loops")
-"""For GCC, two thirds of the time of -O3, at 0.2 to 2 % more instructions of a simulation."""
 LINK = {
     "linux": (
         "-fPIC", "-shared", "-s", "-Wl,--build-id=none", "-Wl,-Bsymbolic", "-Wl,--no-undefined",
@@ -255,8 +252,6 @@ class Compiler:
         Text that distinguishes compilers and their versions in the cache.
     name : str
         Name for messages.
-    optimization : tuple of str
-        Options of optimization, which do not change results.
     duration : float
         Approximate time to compile the kernel [s], for messages.
     """
@@ -264,7 +259,6 @@ class Compiler:
     command: tuple[str, ...]
     identity: str
     name: str
-    optimization: tuple[str, ...] = OPTIMIZATION
     duration: float = 10.0
 
 
@@ -294,11 +288,8 @@ def _system_compilers() -> Iterator[Compiler]:
         path = shutil.which(command[0])
         version = _version((path, *command[1:])) if path else None
         if version is not None and path is not None:
-            if "Free Software" in version:
-                whole = (path, *command[1:], *static)
-                yield Compiler(whole, version, text, GCC_OPTIMIZATION)
-            else:
-                yield Compiler((path, *command[1:]), version, text)
+            own = static if "Free Software" in version else ()
+            yield Compiler((path, *command[1:], *own), version, text)
         elif chosen:
             raise CompilerError(
                 f"the environment variable CC = {chosen!r} is not a working C compiler; unset it, "
@@ -374,7 +365,7 @@ class Job:
     @property
     def arguments(self) -> tuple[str, ...]:
         """Arguments of the compiler, without libraries."""
-        options = (*self.compiler.optimization, *FLAGS, *self.product.flags)
+        options = (*FLAGS, *self.product.flags)
         return (*options, *LINK[self.platform.system], "-I.", UNIT, "-o", self.output)
 
     @property
