@@ -242,6 +242,11 @@ static void pack_blocks(System *system) {
         int start = system->blocks[k].start, size = system->blocks[k].size;
         for (int i = start; i < start + size; i++) {
             memcpy(next, system->H + i * d + start, (size_t)size * sizeof *next);
+            for (int j = 0; !system->mapped && j < size; j++) {
+                Parts parts = parts_from(system->coupling_parts, (int)(next - system->coupling));
+                parts.re[j] = j > i - start ? next[j].re : 0.0;
+                parts.im[j] = j > i - start ? next[j].im : 0.0;
+            }
             next += size;
             system->own[i] = system->H[i * d + i].re + system->J[i];
         }

@@ -71,37 +71,37 @@ PRBM void map_directions(const System *system, const double *x, double *theta) {
     }
 }
 
-/* Add the derivatives by the directions x, pulled back to the coordinates, to out. */
-SIZED void pull_branch(int size, int count, const Branch *branch, const double *RESTRICT x,
-                       double *RESTRICT out) {
+/* Add r rows x of derivatives by the directions, wide apart, pulled back to the coordinates, to out,
+ * even apart. */
+SIZED void pull_branch(int size, int count, const System *system, const Branch *branch, int r,
+                       const double *RESTRICT x, double *RESTRICT out) {
     const int even = even_length(size), paired = size - size % PAIR;
     x += branch->start;
-    UNROLLED
-    for (int c = 0; c < count; c++) {
-        const double *change = branch->change + c * even;
-        Lanes sum[SUMS] = {NO_LANES};
-        UNROLLED
-        for (int i = 0; i < paired; i += LANES) {
-            sum[SUM_OF(i)] += lanes_at(x + i) * aligned_lanes(change + i);
-        }
-        double last = paired < size ? x[paired] * change[paired] : 0.0;
-        out[branch->coordinate[c]] += total(sum) + last;
-    }
-}
-
-/* Add r rows x of derivatives by the directions, pulled back to the coordinates, to out. */
-static void pull_rows(const System *system, const Branch *branch, int r, const double *x,
-                      double *out) {
     for (int row = 0; row < r; row++) {
-        switch (branch->code) {
-        case LEAF_5: pull_branch(5, LEAF_COORDINATES, branch, x, out); break;
-        case LEAF_5_BODY:
-        case LEAF_6: pull_branch(6, LEAF_COORDINATES, branch, x, out); break;
-        case LEAF_6_BODY: pull_branch(7, LEAF_COORDINATES, branch, x, out); break;
-        case ANY_BRANCH: pull_branch(branch->size, branch->count, branch, x, out);
+        UNROLLED
+        for (int c = 0; c < count; c++) {
+            const double *change = branch->change + c * even;
+            Lanes sum[SUMS] = {NO_LANES};
+            UNROLLED
+            for (int i = 0; i < paired; i += LANES) {
+                sum[SUM_OF(i)] += lanes_at(x + i) * aligned_lanes(change + i);
+            }
+            double last = paired < size ? x[paired] * change[paired] : 0.0;
+            out[branch->coordinate[c]] += total(sum) + last;
         }
         x += system->wide;
         out += system->even;
+    }
+}
+
+static void pull_rows(const System *system, const Branch *branch, int r, const double *x,
+                      double *out) {
+    switch (branch->code) {
+    case LEAF_5: pull_branch(5, LEAF_COORDINATES, system, branch, r, x, out); break;
+    case LEAF_5_BODY:
+    case LEAF_6: pull_branch(6, LEAF_COORDINATES, system, branch, r, x, out); break;
+    case LEAF_6_BODY: pull_branch(7, LEAF_COORDINATES, system, branch, r, x, out); break;
+    case ANY_BRANCH: pull_branch(branch->size, branch->count, system, branch, r, x, out);
     }
 }
 
@@ -284,16 +284,10 @@ static void add_own_terms(const System *system, const Branch *branch, const doub
 }
 
 PRBM void branch_terms(const System *system, const double *own, int r, Evaluation *result) {
-    int size = 0;
-    for (int k = 0; k < system->mass_block_count; k++) {
-        size += system->mass_blocks[k].size * system->mass_blocks[k].size;
-    }
-    copy(size, system->constant_mass, result->mass);
+    memcpy(result->mass, system->constant_mass, system->mass_size * sizeof *result->mass);
     for (int k = 0; k < system->branch_count; k++) {
         const Branch *branch = &system->branches[k];
-        if (branch->parent == FIXED) {
-            result->roots[branch->root] = complex_of(0.0, 0.0);
-        } else {
+        if (branch->parent != FIXED) { /* Roots on the ground do not move: zeros. */
             move_root(system, branch, result);
             root_terms(system, branch, result);
         }

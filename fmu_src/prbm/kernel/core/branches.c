@@ -324,6 +324,11 @@ static BranchCode code_of(const System *system, const Branch *branch) {
 
 PRBM void set_branches(System *system, Scratch *scratch) {
     int roots = 0;
+    system->mass_size = 0;
+    for (int k = 0; k < system->mass_block_count; k++) {
+        size_t size = (size_t)system->mass_blocks[k].size;
+        system->mass_size += size * size;
+    }
     zeros(system->mapped ? system->n * system->n : 0, system->constant_mass);
     for (int k = 0; k < system->branch_count; k++) {
         Branch *branch = &system->branches[k];

@@ -288,18 +288,16 @@ SIZED void damp_mass(int size, const int *last, double c, const double *RESTRICT
     }
 }
 
-/* Compute the upper triangle of one block of M, and add its quadratic velocity terms
- * Im(diag(e)^H H diag(e)) v^2 to the loads x.  M is symmetric, the matrix of these terms
+/* Compute the upper triangle of a block of M, of a size up to SMALL, and add its quadratic velocity
+ * terms Im(diag(e)^H H diag(e)) v^2 to the loads x.  M is symmetric, the matrix of these terms
  * antisymmetric. */
-SIZED void block_inertia(int size, const int *last, const Complex *RESTRICT H,
-                         const double *RESTRICT own, Parts e, const double *RESTRICT squares,
-                         double *RESTRICT M, double *RESTRICT x) {
+SIZED void small_inertia(int size, const Complex *RESTRICT H, const double *RESTRICT own, Parts e,
+                         const double *RESTRICT squares, double *RESTRICT M, double *RESTRICT x) {
     UNROLLED
     for (int i = 0; i < size; i++) {
         M[i * size + i] = own[i];
-        const int from = IS_CONSTANT(size) ? 0 : i + 1, end = last_in(size, last, i);
         UNROLLED
-        for (int j = from; j <= end; j++) {
+        for (int j = 0; j < size; j++) {
             if (j > i) {
                 double re = e.re[i] * e.re[j] + e.im[i] * e.im[j];
                 double im = e.re[i] * e.im[j] - e.im[i] * e.re[j];
@@ -312,16 +310,27 @@ SIZED void block_inertia(int size, const int *last, const Complex *RESTRICT H,
     }
 }
 
-/* Compute the block of M that begins at start; add its inertial and damping loads to a. */
-SIZED void block_mass(const Equations *eq, Evaluation *result, int size, int start,
-                      const Complex *H, double *M) {
-    const Kinematics *at = &result->at;
-    const int *last = eq->system->last + start;
-    double *x = result->a + start;
-    block_inertia(size, last, H, own_inertia(eq->system, at) + start,
-                  parts_from(at->e_parts, start), at->squares + start, M, x);
-    if (eq->mass_damping != 0.0) {
-        damp_mass(size, last, eq->mass_damping, M, at->speed + start, x);
+/* The same for a block of any size, by pairs.  The last pair of a row may exceed it: H is zero there,
+ * and what is stored there in M is replaced by the next row, or not used. */
+static void block_inertia(int size, const int *last, Parts H, const double *own, Parts e,
+                          const double *squares, double *M, double *x) {
+    for (int i = 0; i < size; i++) {
+        Lanes own_re = all_lanes(e.re[i]), own_im = all_lanes(e.im[i]);
+        Lanes square = all_lanes(squares[i]), sum[SUMS] = {NO_LANES};
+        for (int j = i + 1; j <= last[i]; j += PAIR) {
+            UNROLLED
+            for (int l = j; l < j + PAIR; l += LANES) {
+                Lanes e_re = lanes_at(e.re + l), e_im = lanes_at(e.im + l);
+                Lanes h_re = lanes_at(H.re + i * size + l), h_im = lanes_at(H.im + i * size + l);
+                Lanes re = own_re * e_re + own_im * e_im, im = own_re * e_im - own_im * e_re;
+                Lanes turned = h_re * im + h_im * re;
+                set_lanes(M + i * size + l, h_re * re - h_im * im);
+                sum[SUM_OF(l - j)] += turned * lanes_at(squares + l);
+                set_lanes(x + l, lanes_at(x + l) - turned * square);
+            }
+        }
+        M[i * size + i] = own[i];
+        x[i] += total(sum);
     }
 }
 
@@ -337,18 +346,31 @@ NOINLINE bool factor_block(const Equations *eq, Evaluation *result, const Block 
     return true;
 }
 
-static bool block_motion(const Equations *eq, Evaluation *result, const Block *block,
-                         const Complex *H, double *U) {
-    block_mass(eq, result, block->size, block->start, H, result->block);
-    return factor_block(eq, result, block, result->block, U);
+/* Compute and factor a block of M of any size. */
+static bool block_motion(const Equations *eq, Evaluation *result, const Block *block, Parts H,
+                         double *U) {
+    const int start = block->start, size = block->size, *last = eq->system->last + start;
+    const Kinematics *at = &result->at;
+    double *M = result->block, *x = result->a + start;
+    block_inertia(size, last, H, own_inertia(eq->system, at) + start,
+                  parts_from(at->e_parts, start), at->squares + start, M, x);
+    if (eq->mass_damping != 0.0) {
+        damp_mass(size, last, eq->mass_damping, M, at->speed + start, x);
+    }
+    return factor_block(eq, result, block, M, U);
 }
 
 /* Compute and factor a small block of M.  Blocks of tiny or huge numbers take the general path. */
 SIZED bool small_block_motion(const Equations *eq, Evaluation *result, int size,
                               const Block *block, const Complex *H, double *U) {
     const int even = eq->system->even, r = eq->r, start = block->start;
-    double M[SMALL * SMALL], D[SMALL];
-    block_mass(eq, result, size, start, H, M);
+    const Kinematics *at = &result->at;
+    double M[SMALL * SMALL], D[SMALL], *x = result->a + start;
+    small_inertia(size, H, own_inertia(eq->system, at) + start, parts_from(at->e_parts, start),
+                  at->squares + start, M, x);
+    if (eq->mass_damping != 0.0) {
+        damp_mass(size, eq->system->last + start, eq->mass_damping, M, at->speed + start, x);
+    }
     if (!small_factor(size, M, U, D)) {
         UNROLLED
         for (int i = 0; i < size * size; i++) {
@@ -403,19 +425,23 @@ static bool blocks_motion(const Equations *eq, Evaluation *result) {
         return mapped_blocks_motion(eq, result);
     }
     bool regular = true;
-    const Complex *H = eq->system->coupling;
+    int first = 0;
     double *U = result->factors.U;
     for (int k = 0; k < result->factors.block_count; k++) {
         const Block *block = &result->factors.blocks[k];
         int size = block->size;
+        const Complex *H = eq->system->coupling + first;
         switch (eq->system->definite ? size : 0) {
         case 1: regular = small_block_motion(eq, result, 1, block, H, U) && regular; break;
         case 2: regular = small_block_motion(eq, result, 2, block, H, U) && regular; break;
         case 3: regular = small_block_motion(eq, result, 3, block, H, U) && regular; break;
         case 4: regular = small_block_motion(eq, result, 4, block, H, U) && regular; break;
-        default: regular = block_motion(eq, result, block, H, U) && regular;
+        default:
+            regular = block_motion(eq, result, block,
+                                   parts_from(eq->system->coupling_parts, first), U) &&
+                      regular;
         }
-        H += size * size;
+        first += size * size;
         U += size * size;
     }
     return regular;
@@ -466,7 +492,7 @@ NOINLINE void mapped_terms(const Equations *eq, const Reference *near, Evaluatio
     for (int j = 0; j < even; j += LANES) {
         set_lanes(result->a + j, all_lanes(0.0));
     }
-    zeros(eq->r * even, Z);
+    memset(Z, 0, (size_t)(eq->r * even) * sizeof *Z);
     pull_blocks(eq, result);
     for (int k = 0; system->stretch_count > 0 && k < eq->r; k++) {
         result->lam[k] += even_dot(wide, result->rows + k * wide, result->shift);

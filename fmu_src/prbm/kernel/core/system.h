@@ -134,12 +134,14 @@ typedef struct {
     Branch *branches;
     int *branch_of;           /* (b + 1,) the branches of the bodies */
     Memory branch_memory;     /* of their arrays */
-    double *constant_mass;    /* The constant part of the mass blocks, if mapped. */
+    size_t mass_size;         /* The number of elements of all mass blocks. */
+    double *constant_mass;    /* Their constant part, if mapped. */
     int mass_block_count;
     Block *mass_blocks;       /* of M: the same, unless mapped */
     int *last;                /* (n,) the last columns of the rows of M that may not be zero, counted
                                * in their blocks */
     Complex *coupling;        /* the blocks of H, one after the other */
+    Parts coupling_parts;     /* their upper triangles, and zero elsewhere */
     double *own;              /* (d,) the diagonal of the mass matrix of the directions */
     double *straight;         /* (even,) rest */
     double *calculated;       /* gamma0 of the flexure types with several pivots */
