@@ -47,8 +47,10 @@ def events(guide, load, last):
 @pytest.mark.slow
 def test_the_frame_of_lee_has_its_published_limit_load():
     """Finite elements: 18.55 kN at 487 mm; then it snaps back through a second limit point."""
-    first, second = events(case("lee", order=5), "P.y", -22e3)
-    assert first[0] == second[0] == "limit point"
+    found = events(case("lee", order=5), "P.y", -22e3)
+    first, second = (event for event in found if event[0] == "limit point")
+    rests = [event for event in found if event[0] == "rest"]
+    assert [abs(load) < 1.0 for _, load, _ in rests] == [True, True]
     assert -first[1] == pytest.approx(18.55e3, rel=2e-3)
     assert first[2] == pytest.approx(0.487, rel=5e-3)
     assert -second[1] < 0.0
