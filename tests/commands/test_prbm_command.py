@@ -15,7 +15,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from shapely.affinity import translate
 
+from drawn_plates import framed_stage
+from drawn_plates import write as draw
 from measurement_records import records, write
 from prbm.__main__ import main as started
 from prbm.base import atomic as files
@@ -120,6 +123,7 @@ def test_commands_of_the_page_run_in_an_empty_folder(tmp_path, capsys):
     """The printed text is that of the page; the files are records and examples of the clone."""
     records(tmp_path)
     shutil.copytree(ROOT / "examples" / "shock", tmp_path / "examples" / "shock")
+    draw(tmp_path / "stage.dxf", translate(framed_stage(), 10.0, 10.0))
     for block in re.findall(r"```sh\n(.*?)```", PAGE, re.DOTALL):
         for line in block.splitlines():
             program, _, words = line.partition(" ")
