@@ -62,8 +62,9 @@ static BranchSizes branch_sizes(const Mechanism *m) {
 static size_t branch_bytes(const System *system) {
     BranchSizes most = branch_sizes(system->mechanism);
     size_t n = (size_t)system->n, d = (size_t)system->d;
-    size_t integers = most.coordinates * (n + 2) + 2 * most.branches * n + most.entries;
-    size_t numbers = most.changes + 2 * most.couplings + most.products + 4 * (d + 2 * most.branches);
+    size_t integers = most.coordinates * (n + 1) + 3 * most.branches * n + most.entries;
+    size_t moments = 2 * (d + most.branches), levers = 2 * (d + 1) * most.branches;
+    size_t numbers = most.changes + 2 * most.couplings + most.products + moments + levers;
     return integers * sizeof(int) + numbers * sizeof(double) +
            most.branches * ARRAYS_PER_BRANCH * ALIGNMENT;
 }
@@ -102,7 +103,9 @@ PRBM void clear_branches(System *system) {
 
 PRBM void begin_branch(System *system, int step) {
     const Step *added = &system->mechanism->steps[step];
-    Span span = span_of(system, added);
+    const Connection *between = added->between;
+    const int near = added->backwards ? between->end : between->start;
+    const int far = added->backwards ? between->start : between->end;
     const int start = added->first_direction, end = end_of_step(system->mechanism, step);
     Branch *branch = &system->branches[system->branch_count];
     if (!system->mapped || start == end) {
@@ -112,9 +115,9 @@ PRBM void begin_branch(System *system, int step) {
     branch->start = start;
     branch->size = end - start;
     branch->even = even_length(branch->size);
-    branch->parent = system->branch_of[span.root];
+    branch->parent = system->branch_of[near];
     if (!added->closes) {
-        system->branch_of[span.far] = system->branch_count;
+        system->branch_of[far] = system->branch_count;
     }
     system->branch_count++;
 }
