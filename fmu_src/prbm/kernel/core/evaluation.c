@@ -271,17 +271,17 @@ SHARED void rows_dispatch(int even, const Equations *eq, const Kinematics *at, d
 
 /* --- inertia ---------------------------------------------------------------------------------- */
 
-/* Return the last column of a row of a block of M that may not be zero. */
-static inline int last_in(int size, const int *last, int row) {
-    return IS_CONSTANT(size) ? size - 1 : last[row];
-}
-
-/* Subtract the damping c M v of a block from its loads x. */
-SIZED void damp_mass(int size, const int *last, double c, const double *RESTRICT M,
-                     const double *RESTRICT v, double *RESTRICT x) {
+/* Subtract the damping c M v of the block M that begins at start from the loads. */
+SIZED void damp_block(const Equations *eq, int size, int start, const double *RESTRICT M,
+                      Evaluation *result) {
+    const double c = eq->mass_damping, *v = result->at.speed + start;
+    double *x = result->a + start;
+    if (c == 0.0) {
+        return;
+    }
     for (int i = 0; i < size; i++) {
         x[i] -= c * M[i * size + i] * v[i];
-        for (int j = i + 1; j <= last_in(size, last, i); j++) {
+        for (int j = i + 1; j <= eq->system->last[start + i]; j++) {
             x[i] -= c * M[i * size + j] * v[j];
             x[j] -= c * M[i * size + j] * v[i];
         }
@@ -349,14 +349,12 @@ NOINLINE bool factor_block(const Equations *eq, Evaluation *result, const Block 
 /* Compute and factor a block of M of any size. */
 static bool block_motion(const Equations *eq, Evaluation *result, const Block *block, Parts H,
                          double *U) {
-    const int start = block->start, size = block->size, *last = eq->system->last + start;
+    const int start = block->start, size = block->size;
     const Kinematics *at = &result->at;
-    double *M = result->block, *x = result->a + start;
-    block_inertia(size, last, H, own_inertia(eq->system, at) + start,
-                  parts_from(at->e_parts, start), at->squares + start, M, x);
-    if (eq->mass_damping != 0.0) {
-        damp_mass(size, last, eq->mass_damping, M, at->speed + start, x);
-    }
+    double *M = result->block;
+    block_inertia(size, eq->system->last + start, H, own_inertia(eq->system, at) + start,
+                  parts_from(at->e_parts, start), at->squares + start, M, result->a + start);
+    damp_block(eq, size, start, M, result);
     return factor_block(eq, result, block, M, U);
 }
 
@@ -365,12 +363,10 @@ SIZED bool small_block_motion(const Equations *eq, Evaluation *result, int size,
                               const Block *block, const Complex *H, double *U) {
     const int even = eq->system->even, r = eq->r, start = block->start;
     const Kinematics *at = &result->at;
-    double M[SMALL * SMALL], D[SMALL], *x = result->a + start;
+    double M[SMALL * SMALL], D[SMALL];
     small_inertia(size, H, own_inertia(eq->system, at) + start, parts_from(at->e_parts, start),
-                  at->squares + start, M, x);
-    if (eq->mass_damping != 0.0) {
-        damp_mass(size, eq->system->last + start, eq->mass_damping, M, at->speed + start, x);
-    }
+                  at->squares + start, M, result->a + start);
+    damp_block(eq, size, start, M, result);
     if (!small_factor(size, M, U, D)) {
         UNROLLED
         for (int i = 0; i < size * size; i++) {
@@ -407,10 +403,7 @@ NOINLINE bool mapped_blocks_motion(const Equations *eq, Evaluation *result) {
     for (int k = 0; k < result->factors.block_count; k++) {
         const Block *block = &result->factors.blocks[k];
         int start = block->start, size = block->size;
-        if (eq->mass_damping != 0.0) {
-            damp_mass(size, eq->system->last + start, eq->mass_damping, M,
-                      result->at.speed + start, result->a + start);
-        }
+        damp_block(eq, size, start, M, result);
         regular = (block->split > 0 ? factor_guide_block(eq, result, start, M, U)
                                     : factor_block(eq, result, block, M, U)) &&
                   regular;
