@@ -367,22 +367,22 @@ SIZED bool schur_of_size(int r, int even, Factors *factors) {
     return rows && factor_rows(r, S, U, U + r * r);
 }
 
-/* Compute count elements of a row of S, those of the row Z and of consecutive columns. */
-SIZED void schur_elements(int count, int even, const double *RESTRICT Z,
-                          const double *RESTRICT inverse, const double *RESTRICT columns,
-                          double *RESTRICT S) {
+/* Compute the products x^T D^-1 Z_k (count,) with consecutive rows Z. */
+SIZED void metric_products(int count, int even, const double *RESTRICT x,
+                           const double *RESTRICT inverse, const double *RESTRICT Z,
+                           double *RESTRICT products) {
     Lanes sum[SMALL][SUMS] = {{NO_LANES}};
     UNROLLED_BY_LANES
     for (int j = 0; j < even; j += LANES) {
-        Lanes share = lanes_at(inverse + j) * lanes_at(Z + j);
+        Lanes share = lanes_at(x + j) * lanes_at(inverse + j);
         UNROLLED
         for (int k = 0; k < count; k++) {
-            sum[k][SUM_OF(j)] += share * lanes_at(columns + k * even + j);
+            sum[k][SUM_OF(j)] += lanes_at(Z + k * even + j) * share;
         }
     }
     UNROLLED
     for (int k = 0; k < count; k++) {
-        S[k] = total(sum[k]);
+        products[k] = total(sum[k]);
     }
 }
 
@@ -395,10 +395,10 @@ static bool schur_of_many(Factors *factors) {
         const double *row = Z + i * even;
         int k = i;
         for (; k + SMALL <= r; k += SMALL) {
-            schur_elements(SMALL, even, row, inverse, Z + k * even, S + i * r + k);
+            metric_products(SMALL, even, row, inverse, Z + k * even, S + i * r + k);
         }
         for (; k < r; k++) {
-            schur_elements(1, even, row, inverse, Z + k * even, S + i * r + k);
+            metric_products(1, even, row, inverse, Z + k * even, S + i * r + k);
         }
         if (!(S[i * r + i] > factors->least)) {
             return false;
@@ -498,18 +498,11 @@ SIZED void multipliers_of_size(int r, const double *S, double *lam) {
 SIZED void reduce_right_side(int count, int even, const double *RESTRICT Z,
                              const double *RESTRICT x, const double *RESTRICT inverse,
                              double *RESTRICT lam) {
-    Lanes sum[SMALL][SUMS] = {{NO_LANES}};
-    UNROLLED_BY_LANES
-    for (int j = 0; j < even; j += LANES) {
-        Lanes share = lanes_at(x + j) * lanes_at(inverse + j);
-        UNROLLED
-        for (int k = 0; k < count; k++) {
-            sum[k][SUM_OF(j)] += lanes_at(Z + k * even + j) * share;
-        }
-    }
+    double products[SMALL];
+    metric_products(count, even, x, inverse, Z, products);
     UNROLLED
     for (int k = 0; k < count; k++) {
-        lam[k] -= total(sum[k]);
+        lam[k] -= products[k];
     }
 }
 
