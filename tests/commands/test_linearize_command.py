@@ -1,7 +1,5 @@
 """Linear models from the command line."""
 
-import shlex
-
 import numpy as np
 import pytest
 
@@ -9,13 +7,14 @@ import prbm
 from prbm.commands import command_line as cli
 
 
-def run(line):
-    return cli.main(shlex.split(f"linearize PRBDM2R {line}"))
+def run(options, *more):
+    return cli.main(["linearize", "PRBDM2R", *options.split(), *more])
 
 
 def test_the_files_have_the_model_and_its_responses(tmp_path, capsys):
     options = "--inputs force.x base.acceleration.y --outputs shuttle.x base.force.x"
-    assert run(f"{options} --frequencies 1:100Hz --load force.x=0.1N --out {tmp_path}") == cli.OK
+    options += " --frequencies 1:100Hz --load force.x=0.1N"
+    assert run(options, "--out", str(tmp_path)) == cli.OK
     assert "shuttle.x by force.x" in capsys.readouterr().out
     model = prbm.linearize(
         prbm.load("PRBDM2R"), inputs=["force.x", "base.acceleration.y"],

@@ -1,7 +1,6 @@
 """Modes about shapes under loads, from the command line."""
 
 import csv
-import shlex
 
 import pytest
 
@@ -10,8 +9,8 @@ from prbm.commands import command_line as cli
 from support import mechanism
 
 
-def frequencies(line, folder):
-    assert cli.main(shlex.split(f"modes CurvedBistable {line} --out {folder}")) == 0
+def frequencies(options, folder):
+    assert cli.main(["modes", "CurvedBistable", *options.split(), "--out", str(folder)]) == 0
     with open(folder / "CurvedBistable-modes.csv", encoding="utf-8", newline="") as file:
         return [float(row["frequency [Hz]"]) for row in csv.DictReader(file)]
 
@@ -27,5 +26,5 @@ def test_a_load_and_the_holding_force_of_its_shape_give_the_same_modes(tmp_path,
 
 
 def test_an_unknown_load_is_rejected_with_the_known_ones(capsys):
-    assert cli.main(shlex.split("modes CurvedBistable --load push.y=-5N")) == 2
+    assert cli.main("modes CurvedBistable --load push.y=-5N".split()) == 2
     assert "the loads are force.x, force.y, force.moment" in capsys.readouterr().err

@@ -281,7 +281,7 @@ SIZED void damp_block(const Equations *eq, int size, int start, const double *RE
     }
     for (int i = 0; i < size; i++) {
         x[i] -= c * M[i * size + i] * v[i];
-        for (int j = i + 1; j <= eq->system->last[start + i]; j++) {
+        for (int j = i + 1; j < size && j <= eq->system->last[start + i]; j++) {
             x[i] -= c * M[i * size + j] * v[j];
             x[j] -= c * M[i * size + j] * v[i];
         }
