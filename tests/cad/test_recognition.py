@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from shapely.affinity import scale
 
 from drawn_plates import (
     between_blocks,
@@ -146,14 +147,16 @@ def test_a_raised_leaf_is_half_a_period_of_a_cosine(tmp_path):
     assert 1e3 * shape.thickness == pytest.approx(1.0, rel=THICKNESS_RTOL)
 
 
-def test_an_arc_has_the_curvature_of_its_circle(tmp_path):
+@pytest.mark.parametrize("size", [1.0, 0.01, 100.0])
+def test_an_arc_has_the_curvature_of_its_circle(size, tmp_path):
+    """The fit converges in all units: its limits are relative to the chord."""
     angle = np.linspace(-0.31, 0.31, 200)
     edge = 60 * np.sin(0.3)
     plate = strip(60j * (np.exp(-1j * angle) - 1), 0.5)
     plate = plate.union(box(edge, -10, 40, 5)).union(box(-40, -10, -edge, 5))
-    shape = only(imported(tmp_path, plate))
-    assert abs(shape.dimensions["curvature"]) == pytest.approx(1 / 0.06, rel=1e-3)
-    assert length(shape) == pytest.approx(2 * edge, rel=1e-3)
+    shape = only(imported(tmp_path, scale(plate, size, size, origin=(0, 0))))
+    assert abs(shape.dimensions["curvature"]) == pytest.approx(1 / (0.06 * size), rel=1e-4)
+    assert length(shape) == pytest.approx(2 * edge * size, rel=1e-3)
 
 
 def test_leaves_curved_to_the_same_side_are_no_mirror_images(tmp_path):

@@ -26,5 +26,5 @@ def test_a_load_and_the_holding_force_of_its_shape_give_the_same_modes(tmp_path,
 
 
 def test_an_unknown_load_is_rejected_with_the_known_ones(capsys):
-    assert cli.main("modes CurvedBistable --load push.y=-5N".split()) == 2
+    assert cli.main(["modes", "CurvedBistable", "--load", "push.y=-5N"]) == 2
     assert "the loads are force.x, force.y, force.moment" in capsys.readouterr().err

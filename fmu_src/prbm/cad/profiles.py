@@ -200,10 +200,11 @@ def _fitted(
     noise: float,
 ) -> tuple[float, Shape] | None:
     """Return the largest distance from arcs and the shape; None if it is too far from them."""
-    s, width, length = *_not_upright(section), section.length
-    thickness, depth = depths
-    half = 0.5 * (waist[1] - waist[0]) if waisted else 0.0
-    centre = 0.5 * (waist[0] + waist[1])
+    unit = depths[0]  # Of lengths in the fit, which stops at an absolute gradient.
+    s, width = (x / unit for x in _not_upright(section))
+    length, thickness, depth = section.length / unit, 1.0, depths[1] / unit
+    half = 0.5 * (waist[1] - waist[0]) / unit if waisted else 0.0
+    centre = 0.5 * (waist[0] + waist[1]) / unit
     a = max(0.5 * length - half, 0.1 * length)
     unknowns = [thickness, centre, a, *([depth] if free else []), *([half] if waisted else [])]
 
@@ -226,15 +227,15 @@ def _fitted(
         *([50.0 * depth] if free else []),
         *([0.5 * length] if waisted else []),
     ]
-    start = np.clip(unknowns, np.array(lower) + 1e-12, np.array(upper) - 1e-12)
-    fit = least_squares(residual, start, bounds=(lower, upper), x_scale=np.maximum(start, 1e-9))
-    t, c, a = (float(x) for x in fit.x[:3])
-    b = float(fit.x[3]) if free else a
-    ell = 2.0 * float(fit.x[-1]) if waisted else 0.0
-    error = float(np.abs(fit.fun).max()) * depth
-    if error > max(FIT_RTOL * min(depth, 3.0 * t), 3.0 * noise):
+    start = np.clip(unknowns, np.array(lower) + 1e-9, np.array(upper) - 1e-9)
+    fit = least_squares(residual, start, bounds=(lower, upper), x_scale=np.maximum(start, 1e-6))
+    t, c, a = (unit * float(x) for x in fit.x[:3])
+    b = unit * float(fit.x[3]) if free else a
+    ell = 2.0 * unit * float(fit.x[-1]) if waisted else 0.0
+    error = float(np.abs(fit.fun).max()) * depths[1]
+    if error > max(FIT_RTOL * min(depths[1], 3.0 * t), 3.0 * noise):
         return None
-    if waisted and ell < WAIST_MIN * (length - ell):
+    if waisted and ell < WAIST_MIN * (section.length - ell):
         return None
     return error, _notch_shape(section, t, c, (a, b), ell, error)
 
@@ -316,38 +317,39 @@ def _mean_thickness(trace: Trace, uniform: NDArray[np.bool_]) -> float:
 def _arc(local: Complex) -> tuple[float, float]:
     """Return the curvature of the circle through a line [1/m], and the distance from it [m]."""
     chord = float(local[-1].real)
+    line = local / chord  # The fit stops at an absolute gradient.
 
     def circle(unknown: Real) -> Real:
         """Return the distances of points from the circle through both ends, to the left."""
         curvature = float(unknown[0])
-        if abs(curvature) * chord < 1e-9:
-            return np.asarray(local.imag)
+        if abs(curvature) < 1e-9:
+            return np.asarray(line.imag)
         radius = 1.0 / curvature
-        height = np.sqrt(max(radius**2 - 0.25 * chord**2, 0.0)) * np.sign(radius)
-        centre = complex(0.5 * chord, height)
-        result: Real = np.sign(radius) * (abs(radius) - np.abs(local - centre))
+        height = np.sqrt(max(radius**2 - 0.25, 0.0)) * np.sign(radius)
+        result: Real = np.sign(radius) * (abs(radius) - np.abs(line - complex(0.5, height)))
         return result
 
-    lowest = float(local.imag[np.argmax(np.abs(local.imag))])
-    guess = -8.0 * lowest / (chord**2 + 4.0 * lowest**2)
+    lowest = float(line.imag[np.argmax(np.abs(line.imag))])
+    guess = -8.0 * lowest / (1.0 + 4.0 * lowest**2)
     fit = least_squares(circle, [guess], x_scale=abs(guess) or 1.0)
-    return float(fit.x[0]), float(np.abs(fit.fun).max())
+    return float(fit.x[0]) / chord, float(np.abs(fit.fun).max()) * chord
 
 
 def _wave(local: Complex) -> tuple[float, float]:
     """Return the rise of half a period of a cosine [m], and the distance of a line from it [m]."""
     chord = float(local[-1].real)
+    line = local / chord  # The fit stops at an absolute gradient.
 
     def wave(unknown: Real) -> Real:
         """Return the distances across the tangents at the ends, which have an angle."""
-        turned = local * np.exp(-1j * float(unknown[0]))
+        turned = line * np.exp(-1j * float(unknown[0]))
         span, rise = float(turned[-1].real), float(turned[-1].imag)
         result: Real = turned.imag - 0.5 * rise * (1.0 - np.cos(np.pi * turned.real / span))
         return result
 
-    slope = local[1:][np.abs(local[1:]) > 0.0]
+    slope = line[1:][np.abs(line[1:]) > 0.0]
     guess = float(np.angle(slope[0]))
     fits = [least_squares(wave, [g]) for g in (guess, -2.0 * guess, 0.0)]
     fit = min(fits, key=lambda one: float(one.cost))
     angle = float(fit.x[0])
-    return float(-chord * np.sin(angle)), float(np.abs(fit.fun).max())
+    return float(-chord * np.sin(angle)), float(np.abs(fit.fun).max()) * chord
