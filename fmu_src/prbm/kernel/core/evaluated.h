@@ -34,7 +34,7 @@ typedef struct {
     double *mass, *shift;            /* (n, n), (wide,) blocks of M and Im(w^2), if mapped */
     Complex *roots, *moments;        /* of the branches, and (n,) of one branch, if mapped */
     Parts turned;                    /* (wide,) working memory, if mapped */
-    double *block;                   /* of M, above its diagonal, or pairs of a branch */
+    double *block;                   /* of the system, for a block of M or pairs of a branch */
     double spring_loss;              /* the power that the springs dissipate */
     double *pressure, *contact_loss; /* (s,) forces and dissipated powers of pressed stops */
     Factors factors;

@@ -54,7 +54,7 @@ PRBM void evaluation_place(Evaluation *evaluation, const System *system, Memory 
     result.columns = place(memory, r * even, sizeof(double));
     result.a = place(memory, even + 2, sizeof(double));
     result.lam = place(memory, r, sizeof(double));
-    result.block = place(memory, wide * wide, sizeof(double));
+    result.block = system->block;
     result.pressure = place(memory, (size_t)system->s, sizeof(double));
     result.contact_loss = place(memory, (size_t)system->s, sizeof(double));
     result.factors.even = (int)even;

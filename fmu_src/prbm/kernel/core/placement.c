@@ -77,6 +77,7 @@ PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memor
     result.mass_blocks = place(memory, n, sizeof(Block));
     result.last = place(memory, n, sizeof(int));
     result.coupling = place(memory, d * d, sizeof(Complex));
+    result.block = place(memory, (size_t)result.wide * (size_t)result.wide, sizeof(double));
     result.coupling_parts = place_parts(memory, result.mapped ? 0 : d * d);
     result.own = place(memory, d, sizeof(double));
     result.straight = place(memory, (size_t)result.even, sizeof(double));

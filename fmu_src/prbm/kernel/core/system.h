@@ -141,6 +141,7 @@ typedef struct {
     int *last;                /* (n,) the last columns of the rows of M that may not be zero, counted
                                * in their blocks */
     Complex *coupling;        /* the blocks of H, one after the other */
+    double *block;            /* (wide, wide) working memory of all evaluations, one at a time */
     Parts coupling_parts;     /* their upper triangles, and zero elsewhere */
     double *own;              /* (d,) the diagonal of the mass matrix of the directions */
     double *straight;         /* (even,) rest */
