@@ -98,8 +98,8 @@ def test_a_study_without_an_optimum_has_written_its_rows(workers, capsys):
     assert run(line) == cli.MISTAKE
     printed = capsys.readouterr().err
     assert "no simulation has a value of settling" in printed
-    assert "PRBDM-study.csv has the 3 completed rows" in printed
-    assert table("PRBDM-study.csv")["stop.position [m]"] == ["0.0", "0.001", "0.002"]
+    assert "PRBDM-study.csv.partial has the 3 completed rows" in printed
+    assert table("PRBDM-study.csv.partial")["stop.position [m]"] == ["0.0", "0.001", "0.002"]
 
 
 def test_an_interrupted_study_keeps_the_rows_before_the_interruption(monkeypatch, capsys):
@@ -114,8 +114,15 @@ def test_an_interrupted_study_keeps_the_rows_before_the_interruption(monkeypatch
     monkeypatch.setattr(RowFile, "add", interrupted)
     line = "study PRBDM --vary 'stop.position=0:3 mm:4' --of stop.gap --workers 1"
     assert run(f"{line} --stop-time 1ms --step 1ms --out .") == cli.INTERRUPTED
-    assert "interrupted; PRBDM-study.csv has the 2 completed rows" in capsys.readouterr().err
-    assert table("PRBDM-study.csv")["stop.position [m]"] == ["0.0", "0.001"]
+    assert (
+        "interrupted; PRBDM-study.csv.partial has the 2 completed rows" in capsys.readouterr().err
+    )
+    assert table("PRBDM-study.csv.partial")["stop.position [m]"] == ["0.0", "0.001"]
+    assert not Path("PRBDM-study.csv").exists()
+    monkeypatch.undo()
+    assert run(f"{line} --stop-time 1ms --step 1ms --out .") == cli.OK
+    assert len(table("PRBDM-study.csv")["stop.position [m]"]) == 4
+    assert not Path("PRBDM-study.csv.partial").exists()
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ PACKAGE = Path(prbm.__file__).parent
 WRITERS = {
     "base/atomic.py": "the function itself",
     "cad/importing.py": "a temporary folder, for the reader",
-    "commands/output.py": "rows of a study, which are kept as they come",
+    "commands/output.py": "completed rows of a study, beside its table",
     "drawing/style.py": "memory",
     "fmu/archive.py": "memory",
     "kernel/compiler.py": "a temporary folder, for the compiler",

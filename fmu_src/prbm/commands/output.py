@@ -3,14 +3,17 @@
 import csv
 import io
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
 
-from ..base.atomic import FileError, check_no_folder, check_writable, write_all
+from ..base.atomic import FileError, check_file, check_no_folder, check_writable, write_all
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+PARTIAL = ".partial"  # End of the name of a file with the first rows of a table.
 
 
 @dataclass
@@ -34,6 +37,18 @@ class Output:
     def __post_init__(self) -> None:
         if self.folder is not None:
             check_writable(self.folder)
+
+    def check(self, *names: str) -> None:
+        """Check, before a long computation, that files can be written.
+
+        Raises
+        ------
+        FileError
+            If a path is a folder, a pipe or a device.
+        """
+        if self.folder is not None:
+            for name in names:
+                check_file(self.folder / name)
 
     def text(self, name: str, content: str) -> None:
         """Add a text file."""
@@ -76,19 +91,31 @@ class Output:
 
 
 class RowFile:
-    """A table that is written row by row, so that it remains if the computation ends early.
+    """The rows of a table that is written at the end, kept in a file beside it meanwhile.
+
+    The table itself is replaced at once, when it is complete.  If the computation ends early, the
+    rows so far remain in ``NAME.partial``.
 
     Parameters
     ----------
     folder : Path or None
         Output folder, which is created; None: no file is written.
     name : str
-        Name of the file.  An earlier file of that name is replaced.
+        Name of the table.
+
+    Raises
+    ------
+    FileError
+        If the table or the file of its rows cannot be written at its path.
     """
 
     def __init__(self, folder: Path | None, name: str) -> None:
-        self.path = None if folder is None else folder / name
+        self.path = None if folder is None else folder / f"{name}{PARTIAL}"
         self.count = 0
+        self.file: IO[str] | None = None
+        if folder is not None and self.path is not None:
+            check_file(folder / name)
+            check_file(self.path)
 
     def add(self, heads: Sequence[str], row: Sequence[object]) -> None:
         """Write a row, after the heads if it is the first one."""
@@ -96,17 +123,32 @@ class RowFile:
             return
         text = csv_text(heads, [row])
         try:
-            if self.count == 0:
+            if self.file is None:
                 self.path.parent.mkdir(parents=True, exist_ok=True)
+                self.path.unlink(missing_ok=True)
+                self.file = self.path.open("x", encoding="utf-8", newline="")
             else:
                 text = text.partition("\n")[2]
-            with self.path.open("a" if self.count else "w", encoding="utf-8", newline="") as file:
-                file.write(text)
+            self.file.write(text)
+            self.file.flush()
         except OSError as error:
             raise FileError(
                 f"cannot write {self.path}: {error.strerror}; choose another folder with --out"
             ) from None
         self.count += 1
+
+    def close(self) -> None:
+        """Close the file."""
+        if self.file is not None:
+            with suppress(OSError):  # Reported by the last flush.
+                self.file.close()
+            self.file = None
+
+    def remove(self) -> None:
+        """Remove the file, when the table has been written."""
+        self.close()
+        if self.path is not None:
+            self.path.unlink(missing_ok=True)
 
     @property
     def kept(self) -> str:

@@ -47,14 +47,23 @@ def run_study(options: argparse.Namespace) -> None:
         {**units_of(mechanism), **dict.fromkeys(placeholders(inputs), "")}, options.vary
     )
     tolerance = optional_quantity(options.tolerance, "", "--tolerance")
-    written = RowFile(options.out, f"{mechanism.name}-study.csv")
+    table, figure = (f"{mechanism.name}-study.{suffix}" for suffix in ("csv", "png"))
+    output.check(figure)
+    written, rows = RowFile(options.out, table), list[Sequence[object]]()
+
+    def keep(heads: Sequence[str], row: Sequence[object]) -> None:
+        written.add(heads, row)
+        rows.append(row)
+        if len(rows) == 1:
+            rows.insert(0, heads)
+
     found = _reporting(written, lambda: study(
         mechanism, varied, options.of or [], minimise=options.minimise, maximise=options.maximise,
         values=values, inputs=inputs,
         stop_time=optional_quantity(options.stop_time, "s", "--stop-time"),
         step=optional_quantity(options.step, "s", "--step"), tolerance=tolerance,
         workers=options.workers, engine=options.engine, progress=reporter(),
-        rows=written.add,
+        rows=keep,
     ))  # fmt: skip
     columns = dict(zip(found.varied, found.points.T, strict=True)) | dict(found.outputs)
     _print_table(columns, found.units)
@@ -66,10 +75,10 @@ def run_study(options: argparse.Namespace) -> None:
         verb = "least" if options.maximise is None else "largest"
         for line in _optimum_lines(found.optimum, found.units, verb):
             print(line)
-    output.figure(f"{mechanism.name}-study.png", lambda: _figure(mechanism, found))
-    if written.path is not None:
-        print(written.path)
+    output.table(table, [str(head) for head in rows[0]], rows[1:])
+    output.figure(figure, lambda: _figure(mechanism, found))
     output.write()
+    written.remove()
 
 
 def _reporting(written: RowFile, run: Callable[[], Study]) -> Study:
@@ -80,6 +89,8 @@ def _reporting(written: RowFile, run: Callable[[], Study]) -> Study:
         raise KeyboardInterrupt(f"interrupted; {written.kept}" if written.kept else "") from None
     except ParameterError as error:
         raise ParameterError(f"{error}; {written.kept}" if written.kept else str(error)) from None
+    finally:
+        written.close()
 
 
 def _varied(units: Mapping[str, str], texts: Sequence[str]) -> dict[str, Real]:
