@@ -206,7 +206,7 @@ def print_default_runs() -> None:
     }
     reference: tuple[float, float] | None = None
     for name, given in guides.items():
-        one, run = instructions(given), counted(given, POINTS, ("fmi2DoStep",))[1]
+        one, run = instructions(given), counted(given, POINTS, ("fmi2DoStep",))[0][1]
         reference = reference or (one, run)
         print(
             f"  {name:14s} right-hand side {one:6.0f}, ratio {one / reference[0]:5.3f}; "

@@ -1,17 +1,20 @@
-"""Cost of a right-hand side over the number of links and of loops.
+"""Cost of a right-hand side over the number of links, flexures and nodes.
 
     python benchmarks/scaling.py
 
-valgrind counts the instructions of the native right-hand side.  The exponent is the slope of a
+valgrind counts the instructions of the native right-hand side, and those of its Schur complement:
+the system of the constraint forces of all loops, which is dense.  The exponent is the slope of a
 least-squares line through the logarithms, over the upper half of the sizes.
 
-links   the guide with two chains of n links each, 4 to 50: one loop, growing blocks of the mass
-        matrix
-axial   the same chains with links that stretch: twice the coordinates
-loops   a shuttle on k 2R flexures that stretch, 2 to 12: k - 1 loops, blocks of the mass matrix of
-        constant size (parallel links that do not stretch would be over-constrained)
-beams   the guide on beams of several orders and numbers of nodes, relative to the 2R guide: the
-        right-hand side in instructions, and the default second in CPU time
+links     the guide with two chains of n links each, 4 to 50: one loop, growing blocks of the mass
+          matrix
+axial     the same chains with links that stretch: twice the coordinates
+parallel  a shuttle on k parallel 2R flexures that stretch, 2 to 50: k - 1 loops, blocks of the mass
+          matrix of constant size (flexures that do not stretch would be over-constrained)
+series    a column of k 2R flexures with bodies between them, 2 to 32: no loop, one block
+nodes     the guide on beams of the order 3 with 5 to 24 nodes
+beams     the guide on beams of several orders and numbers of nodes, relative to the 2R guide: the
+          right-hand side in instructions, and the default second in CPU time
 """
 
 import argparse
@@ -32,18 +35,21 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fmu_src"))
 from c_importer import Job, execute, kernel_library, unpack, write
 from native import POINTS, RIGHT_HAND_SIDE, cost, inclusive
 from prbm.fmu import native_fmu
-from prbm.fmu.reference_results import steps
 from prbm.kernel.compiler import FLAGS
+from prbm.kernel.simulation import KernelSimulation
 from prbm.mechanics.assembly import assemble
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.parts import Flexure
-from prbm.runs.experiment import Experiment
 from support import mechanism
 
 Real = NDArray[np.float64]
 
 LINKS = (4, 8, 12, 18, 25, 35, 50)  # Links per flexure.
-LEAVES = (2, 3, 4, 6, 8, 10, 12)  # Parallel flexures.
+PARALLEL = (2, 4, 6, 12, 25, 50)  # Flexures.
+SERIES = (2, 4, 8, 16, 32)  # Flexures.
+NODES = (5, 6, 8, 12, 16, 24)  # Nodes per beam.
+SCHUR_COMPLEMENT = ("schur_of_many",)  # Function of the kernel, for more than four constraints.
+SMALL = 4  # Constraints for which the Schur complement is part of other functions.
 STOP_TIME_MAX = 2e-5  # Long enough for a mean over the steps [s].
 STEPS_MAX = 20  # Enough for a mean if the steps are short.
 BEAMS = ((3, 5, False), (3, 6, False), (5, 8, False), (3, 6, True))  # Order, nodes, axial.
@@ -75,6 +81,32 @@ def leaves(k: int) -> Mechanism:
     )
 
 
+def column(k: int) -> Mechanism:
+    """Return a shuttle on a column of k flexures with small bodies between them."""
+    guide = mechanism("PRBDM2R")
+    (shuttle,) = guide.bodies
+    height = [f"{i / k:.17g}*flexure.length" for i in range(k + 1)]
+    between = [
+        dataclasses.replace(
+            shuttle, name=f"body_{i}", mass=1e-3, inertia=1e-9, centre=(0.0, height[i]),
+            points={"bottom": (0.0, height[i]), "top": (0.0, height[i])},
+        )
+        for i in range(1, k)
+    ]  # fmt: skip
+    ends = ["ground.bottom", *(f"body_{i}" for i in range(1, k)), "shuttle.left"]
+    flexures = tuple(
+        Flexure(
+            f"leaf_{i}", "flexure", ends[i] if i == 0 else f"{ends[i]}.top",
+            ends[i + 1] if i + 1 == k else f"{ends[i + 1]}.bottom",
+        )
+        for i in range(k)
+    )  # fmt: skip
+    return dataclasses.replace(
+        guide, name=f"Column{k}", ground={"bottom": (0.0, 0.0)}, bodies=(*between, shuttle),
+        flexures=flexures,
+    )  # fmt: skip
+
+
 def beams(order: int, nodes: int, axial: bool) -> Mechanism:
     """Return the guide on two beams."""
     guide = mechanism("PRBDM2R")
@@ -92,8 +124,24 @@ def unpacked(given: Mechanism, folder: Path) -> Path:
     return unpack(folder / "model.fmu", folder / "model")
 
 
-def counted(given: Mechanism, points: Real, functions: Sequence[str]) -> tuple[int, int]:
-    """Return the calls and inclusive instructions of functions of a native FMU.
+@dataclasses.dataclass(frozen=True)
+class Cost:
+    """Instructions of a right-hand side.
+
+    Parameters
+    ----------
+    whole : float
+        Mean number of instructions of a right-hand side.
+    schur : float
+        Mean number of those of the Schur complement, 0 for up to four constraints.
+    """
+
+    whole: float
+    schur: float = 0.0
+
+
+def counted(given: Mechanism, points: Real, *groups: Sequence[str]) -> list[tuple[int, int]]:
+    """Return the calls and inclusive instructions of groups of functions of a native FMU.
 
     Parameters
     ----------
@@ -101,7 +149,7 @@ def counted(given: Mechanism, points: Real, functions: Sequence[str]) -> tuple[i
         Mechanism of the FMU.
     points : array (k,)
         Communication points of the run [s].
-    functions : sequence of str
+    groups : sequences of str
         Functions of the kernel or of FMI 2.0.
     """
     with tempfile.TemporaryDirectory() as name:
@@ -114,37 +162,103 @@ def counted(given: Mechanism, points: Real, functions: Sequence[str]) -> tuple[i
         done = execute(job, before=counter)
         if done.status:
             raise RuntimeError(done.errors)
-        return inclusive(folder / "profile", functions)
+        return [inclusive(folder / "profile", functions) for functions in groups]
+
+
+def right_hand_side(given: Mechanism, constraints: int = 0) -> Cost:
+    """Return the instructions of a right-hand side of a mechanism with a number of constraints."""
+    motion = KernelSimulation(given, {})
+    motion.advance(STOP_TIME_MAX)
+    stop_time = STOP_TIME_MAX * min(1.0, STEPS_MAX / motion.step_count)
+    groups = (RIGHT_HAND_SIDE, *((SCHUR_COMPLEMENT,) if constraints > SMALL else ()))
+    found = counted(given, np.array([0.0, stop_time]), *groups)
+    return Cost(*(total / calls for calls, total in found))
 
 
 def instructions(given: Mechanism) -> float:
     """Return the mean number of instructions of a right-hand side of a mechanism."""
-    stop_time = min(STOP_TIME_MAX, STEPS_MAX / steps(given, {}, Experiment(1.0)))
-    calls, total = counted(given, np.array([0.0, stop_time]), RIGHT_HAND_SIDE)
-    return total / calls
+    return right_hand_side(given).whole
 
 
-def rows(sizes: tuple[int, ...], make: Callable[[int], Mechanism]) -> Iterator[tuple[int, float]]:
+def rows(sizes: tuple[int, ...], make: Callable[[int], Mechanism]) -> Iterator[tuple[int, Cost]]:
     """Print and yield the sizes and costs of mechanisms."""
     for size in sizes:
         given = make(size)
         system = assemble(given, given.values())
-        cost = instructions(given)
+        cost = right_hand_side(given, len(system.loops))
         print(
-            f"  {size:4d}: {system.n:4d} coordinates, {len(system.links):4d} links, "
-            f"{len(system.loops) // 2:3d} loops {cost:12.0f} instructions"
+            f"  {size:4d}: {system.n:4d} coordinates, {len(system.loops):4d} constraints "
+            f"{cost.whole:12.0f} instructions, {cost.schur / cost.whole:4.0%} Schur complement",
+            flush=True,
         )
         yield size, cost
 
 
-def print_growth(title: str, sizes: tuple[int, ...], make: Callable[[int], Mechanism]) -> float:
-    """Print the costs and the exponent of their growth, and return the exponent."""
+@dataclasses.dataclass(frozen=True)
+class Growth:
+    """Costs of mechanisms over their size.
+
+    Parameters
+    ----------
+    title : str
+        What grows.
+    sizes : tuple of int, (m,)
+        Numbers of links, flexures or nodes.
+    costs : tuple of Cost, (m,)
+        Costs of the right-hand sides.
+    """
+
+    title: str
+    sizes: tuple[int, ...]
+    costs: tuple[Cost, ...]
+
+    @property
+    def exponent(self) -> float:
+        """Exponent over the upper half of the sizes."""
+        return self._slope([cost.whole for cost in self.costs])
+
+    @property
+    def exponent_without_schur(self) -> float:
+        """Exponent of the instructions outside of the Schur complement."""
+        return self._slope([cost.whole - cost.schur for cost in self.costs])
+
+    def _slope(self, costs: Sequence[float]) -> float:
+        half = len(self.sizes) // 2
+        return float(np.polyfit(np.log(self.sizes[half:]), np.log(costs[half:]), 1)[0])
+
+
+def growth(title: str, sizes: tuple[int, ...], make: Callable[[int], Mechanism]) -> Growth:
+    """Print and return the costs of mechanisms and the exponents of their growth."""
     print(f"\n{title}")
-    size, cost = np.array([*rows(sizes, make)]).T
-    half = len(size) // 2
-    slope = np.polyfit(np.log(size[half:]), np.log(cost[half:]), 1)[0]
-    print(f"  exponent {slope:.2f} over the upper half of the sizes", flush=True)
-    return float(slope)
+    found = Growth(title, sizes, tuple(cost for _, cost in rows(sizes, make)))
+    print(
+        f"  exponent {found.exponent:.2f} over the upper half of the sizes, "
+        f"{found.exponent_without_schur:.2f} without the Schur complement",
+        flush=True,
+    )
+    return found
+
+
+def draw(found: Sequence[Growth], file: Path) -> None:
+    """Draw the costs over the sizes into a file."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.0, 4.5), layout="constrained")
+    axes = figure.add_subplot(xlabel="number of links, flexures or nodes [-]",
+                              ylabel="instructions of a right-hand side [-]",
+                              xscale="log", yscale="log")  # fmt: skip
+    for one, marker in zip(found, "osD^vP", strict=False):
+        label = f"{one.title.partition(':')[0].lower()}, exponent {one.exponent:.2f}"
+        (line,) = axes.plot(one.sizes, [c.whole for c in one.costs], marker, ls="-", label=label)
+        if any(cost.schur for cost in one.costs):
+            axes.plot(
+                one.sizes, [c.whole - c.schur for c in one.costs], marker, ls="--", mfc="none",
+                color=line.get_color(),
+                label=f"without the Schur complement, {one.exponent_without_schur:.2f}",
+            )  # fmt: skip
+    axes.grid(which="major", alpha=0.3)
+    axes.legend(fontsize="small")
+    figure.savefig(file, dpi=150)
 
 
 def default_second(given: Mechanism, runs: int) -> float:
@@ -177,11 +291,12 @@ def main() -> None:
         "--largest",
         type=int,
         default=50,
-        help="largest number of links per chain (default: %(default)s)",
+        help="largest number of links, flexures or nodes (default: %(default)s)",
     )
     parser.add_argument(
         "--runs", type=int, default=7, help="runs of a default second (default: %(default)s)"
     )
+    parser.add_argument("--figure", type=Path, help="draw the growth into this file")
     parser.add_argument("--beams", action="store_true", help="measure only beams")
     arguments = parser.parse_args()
     largest = arguments.largest
@@ -190,10 +305,18 @@ def main() -> None:
     if arguments.beams:
         print_beams(arguments.runs)
         return
-    sizes = tuple(n for n in LINKS if n <= largest)
-    print_growth("Links: two chains of n links", sizes, chains)
-    print_growth("Axial: chains of n links that stretch", sizes, lambda n: chains(n, axial=True))
-    print_growth("Loops: k parallel 2R flexures that stretch", LEAVES, leaves)
+    found = [
+        growth(title, tuple(size for size in sizes if size <= largest), make)
+        for title, sizes, make in (
+            ("Links: two chains of n links", LINKS, chains),
+            ("Links that stretch: the same chains", LINKS, lambda n: chains(n, axial=True)),
+            ("Parallel flexures: 2R flexures that stretch", PARALLEL, leaves),
+            ("Flexures in series: a column of 2R flexures", SERIES, column),
+            ("Nodes: two beams of the order 3", NODES, lambda n: beams(3, n, False)),
+        )
+    ]
+    if arguments.figure:
+        draw(found, arguments.figure)
     print_beams(arguments.runs)
 
 

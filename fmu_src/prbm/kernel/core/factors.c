@@ -387,7 +387,7 @@ SIZED void metric_products(int count, int even, const double *RESTRICT x,
 }
 
 /* As schur_of_size, for any number of rows. */
-static bool schur_of_many(Factors *factors) {
+NOINLINE bool schur_of_many(Factors *factors) {
     const int r = factors->r, even = factors->even;
     const double *Z = factors->Z, *inverse = factors->inverse;
     double *S = factors->S, *U = S + r * r;
