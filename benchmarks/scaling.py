@@ -11,7 +11,7 @@ links     the guide with two chains of n links each, 4 to 50: one loop, growing 
 axial     the same chains with links that stretch: twice the coordinates
 parallel  a shuttle on k parallel 2R flexures that stretch, 2 to 50: k - 1 loops, blocks of the mass
           matrix of constant size (flexures that do not stretch would be over-constrained)
-series    a column of k 2R flexures with bodies between them, 2 to 32: no loop, one block
+series    a column of k 2R flexures with bodies between them, 2 to 16: no loop, one block
 nodes     the guide on beams of the order 3 with 5 to 24 nodes
 beams     the guide on beams of several orders and numbers of nodes, relative to the 2R guide: the
           right-hand side in instructions, and the default second in CPU time
@@ -46,7 +46,7 @@ Real = NDArray[np.float64]
 
 LINKS = (4, 8, 12, 18, 25, 35, 50)  # Links per flexure.
 PARALLEL = (2, 4, 6, 12, 25, 50)  # Flexures.
-SERIES = (2, 4, 8, 16, 32)  # Flexures.
+SERIES = (2, 4, 6, 8, 12, 16)  # Flexures.
 NODES = (5, 6, 8, 12, 16, 24)  # Nodes per beam.
 SCHUR_COMPLEMENT = ("schur_of_many",)  # Function of the kernel, for more than four constraints.
 SMALL = 4  # Constraints for which the Schur complement is part of other functions.
@@ -59,7 +59,8 @@ def chains(n: int, axial: bool = False) -> Mechanism:
     """Return the guide on two chains of n links."""
     guide = mechanism("PRBDM2R")
     leaf = dataclasses.replace(guide.flexure_types[0], model="nR", n=n, axial=axial)
-    return dataclasses.replace(guide, name=f"Chains{n}{'Axial' * axial}", flexure_types=(leaf,))
+    name = f"Chains{n}{'Axial' * axial}"  # Damping in proportion to stiffness bounds their steps.
+    return dataclasses.replace(guide, name=name, flexure_types=(leaf,), damping_beta=0.0)
 
 
 def leaves(k: int) -> Mechanism:
@@ -85,10 +86,10 @@ def column(k: int) -> Mechanism:
     """Return a shuttle on a column of k flexures with small bodies between them."""
     guide = mechanism("PRBDM2R")
     (shuttle,) = guide.bodies
-    height = [f"{i / k:.17g}*flexure.length" for i in range(k + 1)]
+    height = [f"{i}*flexure.length" for i in range(k + 1)]
     between = [
         dataclasses.replace(
-            shuttle, name=f"body_{i}", mass=1e-3, inertia=1e-9, centre=(0.0, height[i]),
+            shuttle, name=f"body_{i}", mass=1e-2, inertia=1e-6, centre=(0.0, height[i]),
             points={"bottom": (0.0, height[i]), "top": (0.0, height[i])},
         )
         for i in range(1, k)
@@ -101,9 +102,12 @@ def column(k: int) -> Mechanism:
         )
         for i in range(k)
     )  # fmt: skip
+    top = f"{k}*flexure.length"
+    shuttle = dataclasses.replace(shuttle, centre=(0.0, top), points={"left": (0.0, top)})
+    stop = dataclasses.replace(guide.stops[0], point=(0.0, top))
     return dataclasses.replace(
         guide, name=f"Column{k}", ground={"bottom": (0.0, 0.0)}, bodies=(*between, shuttle),
-        flexures=flexures,
+        flexures=flexures, stops=(stop,), gravity=(0.0, 0.0),
     )  # fmt: skip
 
 
