@@ -58,9 +58,13 @@ BEAMS = ((3, 5, False), (3, 6, False), (5, 8, False), (3, 6, True))  # Order, no
 def chains(n: int, axial: bool = False) -> Mechanism:
     """Return the guide on two chains of n links."""
     guide = mechanism("PRBDM2R")
-    leaf = dataclasses.replace(guide.flexure_types[0], model="nR", n=n, axial=axial)
-    name = f"Chains{n}{'Axial' * axial}"  # Damping in proportion to stiffness bounds their steps.
-    return dataclasses.replace(guide, name=name, flexure_types=(leaf,), damping_beta=0.0)
+    # Thick and undamped, as the FMU rejects a fastest mode far above the fundamental one.
+    leaf = dataclasses.replace(guide.flexure_types[0], model="nR", n=n, axial=axial, thickness=1e-3)
+    name = f"Chains{n}{'Axial' * axial}"
+    release = dataclasses.replace(guide.release, displacement=-1e-3)
+    return dataclasses.replace(
+        guide, name=name, flexure_types=(leaf,), damping_beta=0.0, release=release
+    )
 
 
 def leaves(k: int) -> Mechanism:
