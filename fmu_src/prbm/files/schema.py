@@ -20,6 +20,7 @@ from pydantic import (
 )
 
 from ..base.errors import MechanismError, PrbmError
+from ..hybrid.rest_speed import with_rest_speeds
 from ..mechanics.collection import Collection
 from ..mechanics.flexures import check_drawn
 from ..mechanism import parameters, parts
@@ -241,7 +242,7 @@ class StopTable(Named):
     offset: Annotated[Quantity, measured(parts.Stop, "offset")] = parts.Stop.offset
     restitution: Annotated[Quantity, measured(parts.Stop, "restitution")] = parts.Stop.restitution
     friction: Annotated[Quantity, measured(parts.Stop, "friction")] = parts.Stop.friction
-    rest_speed: Annotated[Quantity, measured(parts.Stop, "rest_speed")] = parts.Stop.rest_speed
+    rest_speed: Annotated[Quantity, measured(parts.Stop, "rest_speed")] | None = None
     law: Law = Field(parts.RIGID, description="Law of impact")
     exponent: Annotated[Quantity, measured(parts.Stop, "exponent")] | None = None
     stiffness: Annotated[Quantity, measured(parts.Stop, "stiffness")] | None = None
@@ -379,7 +380,7 @@ def mechanism(file: MechanismTable, drawing: str = "") -> Mechanism:
     except PrbmError as error:
         made_by = origins(_with_copies(file)) | drawn.made_by
         raise type(error)(explained(str(error), made_by)) from None
-    return result
+    return with_rest_speeds(result, {stop.name for stop in file.stops if stop.rest_speed is None})
 
 
 def _assembled(
@@ -399,7 +400,7 @@ def _assembled(
         flexures=connected[0],
         flexure_types=connected[1],
         joints=joints,
-        stops=tuple(parts.Stop(**_attached(stop, points)) for stop in file.stops),
+        stops=tuple(_stop(stop, points) for stop in file.stops),
         frictions=tuple(parts.Friction(**_attached(part, points)) for part in file.frictions),
         forces=tuple(parts.Force(**_attached(force, points)) for force in file.forces),
         probes=tuple(parts.Probe(**dict(probe)) for probe in file.probes),
@@ -596,6 +597,14 @@ def _flexure(table: FlexureTable) -> parts.Flexure:
 def _release(table: ReleaseTable, bodies: Mapping[str, Mapping[str, parts.Point]]) -> parts.Release:
     """Return the release of a table."""
     return parts.Release(**_attached(table, bodies))
+
+
+def _stop(table: StopTable, bodies: Mapping[str, Mapping[str, parts.Point]]) -> parts.Stop:
+    """Return the stop of a table; :func:`mechanism` computes the rest speed if it has none."""
+    given = _attached(table, bodies)
+    if table.rest_speed is None:
+        del given["rest_speed"]
+    return parts.Stop(**given)
 
 
 def _attached(
