@@ -17,6 +17,7 @@ from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble
 from ..mechanism.description import Mechanism
 from ..runs.headline import headline
+from ..runs.hits import hits
 from ..runs.result import Result, names
 from ..runs.run import communication_points, simulate
 from .duration import given_inputs, span
@@ -59,6 +60,8 @@ def run_simulation(options: argparse.Namespace) -> None:
     spent = time.perf_counter() - begin
     print(f"simulated            {stop_time:g} s in {spent:.2f} s")
     for line in headline(result, mechanism, result.start_values):
+        print(line)
+    for line in hits(result) if len(result.impacts) > 1 else ():
         print(line)
     columns = names(result.columns)
     output.table(f"{mechanism.name}.csv", columns, (list(row) for row in result.columns.tolist()))

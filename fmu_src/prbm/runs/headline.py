@@ -16,6 +16,7 @@ from .released import displacement_outputs, released_displacement
 from .result import Columns, Result, column, moves, rest_time
 from .struck import UNRELIABLE, first_rigid_impact, peak_before
 
+REST = "came to rest"
 SECONDS_MIN = 0.1  # Times of shorter runs are printed in ms or µs [s].
 
 
@@ -52,11 +53,24 @@ def instant(t: float, span: float, digits: int) -> str:
 
     Examples
     --------
-    >>> instant(0.0349812, 1.0, 5), instant(2.71034e-6, 1e-4, 3)
-    ('0.03498 s', '2.710 µs')
+    >>> instant(0.0349812, 1.0, 5), instant(2.71034e-6, 1e-4, 3), instant(0.0, 1e-4, 3)
+    ('0.03498 s', '2.710 µs', '0 s')
     """
     factor, unit = (1.0, "s") if span >= SECONDS_MIN else time_unit(span)
-    return f"{factor * t:.{digits}f} {unit}"
+    text = f"{factor * t:.{digits}f}"
+    return f"{text} {unit}" if float(text) else "0 s"
+
+
+def speed_text(speed: float) -> str:
+    """Return a speed [m/s] with three digits.
+
+    Examples
+    --------
+    >>> speed_text(0.8067), speed_text(2.41e-5)
+    ('0.807 m/s', '24.1 µm/s')
+    """
+    factor, unit = prefixed_unit(speed, "m/s")
+    return f"{factor * speed:.3g} {unit}"
 
 
 def contact_line(stop: str, force: float, indentation: float, duration: float) -> str:
@@ -78,7 +92,8 @@ def contact_line(stop: str, force: float, indentation: float, duration: float) -
     for x, si, digits in ((force, "N", 4), (indentation, "m", 3), (duration, "s", 3)):
         factor, shown = prefixed_unit(x, si)
         texts.append(f"{factor * x:.{digits}g} {shown}")
-    return f"force at {stop:11} at most {texts[0]}, indentation {texts[1]}, contact {texts[2]}"
+    lasted = f"contact {texts[2]}" if duration else "the contact has not ended"
+    return f"force at {stop:11} at most {texts[0]}, indentation {texts[1]}, {lasted}"
 
 
 def headline(
@@ -119,7 +134,9 @@ def headline(
         details = ""
         if first is not None:
             which = "the first" if first.count == 1 else f"number {first.count}"
-            details = f", {which} at t = {instant(first.time, span, 5)} with {first.speed:.3f} m/s"
+            details = (
+                f", {which} at t = {instant(first.time, span, 5)} with {speed_text(first.speed)}"
+            )
         elif not count:
             nearest = float(column(columns, f"{stop}.gap").min())
             details = f", the smallest gap was {length(nearest, system.length)}"
@@ -127,17 +144,23 @@ def headline(
         force, indentation, duration = largest_latched(result, stop) if compliant else (0.0,) * 3
         if force > 0.0:
             lines.append(contact_line(stop, force, indentation, duration))
-        since = rest_time(columns, stop)
+        since = None if compliant and _in_impact(columns, stop) else rest_time(columns, stop)
         if since is not None:
             lines.append(
-                f"came to rest         at t = {instant(since, span, 3)} on {stop}, "
+                f"{REST:20} at t = {instant(since, span, 3)} on {stop}, "
                 f"{_place(columns, system)}, pressed with "
                 f"{column(columns, f'{stop}.force')[-1]:.4g} N"
             )
     lines += _stress(columns, mechanism, system.length)
-    rests = any(rest_time(columns, stop.name) is not None for stop in mechanism.stops)
+    rests = any(line.startswith(REST) for line in lines)
     last = max((mark.time for mark in impacts), default=float(time[0]))
     return [*lines, _settled(columns, span, rests, last)] if moving else lines
+
+
+def _in_impact(columns: Columns, stop: str) -> bool:
+    """Return whether a result ends during an impact at a compliant stop, whose duration is 0."""
+    counted = column(columns, f"{stop}.impact_count")[-1]
+    return bool(counted and not column(columns, f"{stop}.contact_duration")[-1])
 
 
 def _stress(columns: Columns, mechanism: Mechanism, size: float) -> list[str]:
