@@ -3,9 +3,14 @@
 The environment variable ``PRBM_LIBRARIES`` selects them: ``host``, those of this machine, if it has
 a C compiler (the default); ``all``, those of every platform and of web pages, for which the build
 installs ``ziglang``; ``none``.
+
+Metadata hook: the readme of the package, whose links to files of the repository become absolute if
+the environment variable ``PRBM_REPOSITORY`` (or those of GitHub Actions) has its address, and texts
+without a link otherwise.
 """
 
 import os
+import re
 import shutil
 import sys
 import tempfile
@@ -16,9 +21,11 @@ from pathlib import Path
 from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+from hatchling.metadata.plugin.interface import MetadataHookInterface
 from packaging.tags import platform_tags
 
 SELECTIONS = ("host", "all", "none")
+LINK = re.compile(r"(!?)\[([^\]]*)\]\((?!https?:|mailto:)([^)\s]+)\)")  # To a file or heading.
 
 
 def selection() -> str:
@@ -83,6 +90,41 @@ class LibrariesHook(BuildHookInterface):  # type: ignore[type-arg]
         """Remove the temporary files."""
         if hasattr(self, "folder"):
             shutil.rmtree(self.folder)
+
+
+class ReadmeHook(MetadataHookInterface):
+    """Set the readme and the addresses of the project."""
+
+    def update(self, metadata: dict[str, Any]) -> None:
+        """Add ``readme`` and ``urls`` to the metadata."""
+        address = repository()
+        text = (Path(self.root) / "README.md").read_text(encoding="utf-8")
+        content = {"content-type": "text/markdown", "text": rendered(text, address)}
+        metadata["readme"] = content
+        pages = {"Source": "", "Issues": "/issues", "Changes": "/blob/main/CHANGELOG.md"}
+        metadata["urls"] = {name: address + page for name, page in pages.items() if address}
+
+
+def repository() -> str:
+    """Return the address of the repository on its web server; empty if it is not known."""
+    given = os.environ.get("PRBM_REPOSITORY", "").strip().rstrip("/")
+    server, name = (os.environ.get(f"GITHUB_{x}", "") for x in ("SERVER_URL", "REPOSITORY"))
+    return given or (f"{server}/{name}" if server and name else "")
+
+
+def rendered(text: str, address: str) -> str:
+    """Return a Markdown text with links that do not depend on its folder.
+
+    Without an address, links keep their texts and pictures their descriptions.
+    """
+
+    def link(match: re.Match[str]) -> str:
+        picture, name, target = match.groups()
+        if not address or target.startswith("#"):
+            return "" if picture else name
+        return f"{picture}[{name}]({address}/{'raw' if picture else 'blob'}/main/{target})"
+
+    return LINK.sub(link, text)
 
 
 def all_libraries(progress: Callable[[str], None]) -> dict[str, bytes]:

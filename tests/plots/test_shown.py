@@ -97,6 +97,21 @@ def test_units_of_the_columns_are_those_of_the_interface(result):
     assert {unit for name, unit in units.items() if name.startswith("energy.")} == {"J"}
 
 
+def test_a_data_set_has_the_columns_and_their_units(result):
+    data = result.to_xarray()
+    assert set(data.variables) == set(result)
+    for name, unit in result.units().items():
+        np.testing.assert_array_equal(data[name], result[name])
+        assert data[name].attrs["units"] == unit
+    assert float(data["shuttle.x"].sel(time=0.0)) == result["shuttle.x"][0]
+
+
+def test_a_missing_xarray_is_reported_with_a_remedy(result, monkeypatch):
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(ResultError, match=r"install it with: .*prbm-impact\[notebook\]"):
+        result.to_xarray()
+
+
 def test_a_missing_pandas_is_reported_with_a_remedy(result, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(ResultError, match=r"install it with: .*prbm-impact\[notebook\]"):

@@ -1,8 +1,13 @@
 """The metadata of the package, its citation, and the settings of editors agree with the project."""
 
 import configparser
+import re
+import runpy
+import subprocess
+import sys
 import tomllib
 
+import pytest
 import yaml
 
 import prbm
@@ -55,3 +60,46 @@ def test_source_files_obey_the_settings_of_editors():
         assert not text or text.endswith("\n"), path
         assert not [line for line in text.split("\n") if line != line.rstrip()], path
         assert "\t" not in text, path
+
+
+@pytest.mark.parametrize("address", ["", "https://example.org/group/prbm"])
+def test_the_readme_of_the_package_has_no_link_to_a_file_beside_it(address):
+    """Package registries show it without the files of the repository."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    shown = runpy.run_path(str(ROOT / "hatch_build.py"))["rendered"](text, address)
+    found = re.findall(r"\]\(([^)]*)\)", shown)
+    assert found
+    assert not [link for link in found if not link.startswith("https://")]
+    beside = {file.split("#")[0] for file in re.findall(r"\]\((?!https?:|#)([^)]*)\)", text)}
+    linked = {file for file in beside if f"{address}/blob/main/{file}" in shown}
+    pictures = {file for file in beside if f"{address}/raw/main/{file}" in shown}
+    assert (linked | pictures == beside) if address else not linked | pictures
+    assert shown.count("```") == text.count("```")
+
+
+def test_the_conda_recipe_has_the_requirements_of_the_package():
+    recipe = yaml.safe_load((ROOT / "conda" / "recipe.yaml").read_text(encoding="utf-8"))
+    assert recipe["context"]["version"] == PROJECT["version"]
+    own = {r.replace(" ", "").replace("matplotlib-base", "matplotlib")
+           for r in recipe["requirements"]["run"]}  # fmt: skip
+    assert own == {*PROJECT["dependencies"], f"python{PROJECT['requires-python']}"}
+    commands = {f"{name} = {target}" for name, target in PROJECT["scripts"].items()}
+    assert set(recipe["build"]["python"]["entry_points"]) == commands
+    build = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["build-system"]
+    host = {requirement.replace(" ", "") for requirement in recipe["requirements"]["host"]}
+    assert set(build["requires"]) <= host
+    for key, name in (("summary", "description"), ("license", "license")):
+        assert recipe["about"][key] == PROJECT[name]
+
+
+@pytest.mark.parametrize(
+    ("schema", "files"),
+    [
+        ("github-issue-forms", ["fault.yml", "mechanism.yml"]),
+        ("github-issue-config", ["config.yml"]),
+    ],
+)
+def test_the_forms_of_issues_are_valid(schema, files):
+    folder = ROOT / ".github" / "ISSUE_TEMPLATE"
+    command = [sys.executable, "-m", "check_jsonschema", "--builtin-schema", f"vendor.{schema}"]
+    subprocess.run([*command, *(folder / file for file in files)], check=True)

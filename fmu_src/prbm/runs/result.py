@@ -21,6 +21,7 @@ from .quantities import FREQUENCY, QUANTITIES
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray
 
 Columns = NDArray[Any]
 ZERO_MOTION_RTOL = 1e-9  # Smaller motions, relative to the size of the mechanism, are round-off.
@@ -136,6 +137,27 @@ class Result(Mapping[str, Columns]):
         frame = pandas.DataFrame.from_records(self.columns, index="time")
         frame.attrs = {"mechanism": self.mechanism.name, "units": self.units()}
         return frame
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Return the columns as an xarray Dataset over the dimension ``time``.
+
+        ``attrs["units"]`` of each column has its SI unit, empty for integers and Booleans, and
+        ``attrs["mechanism"]`` of the data set the name of the mechanism.
+
+        Raises
+        ------
+        ResultError
+            If xarray is not installed.
+        """
+        try:
+            import xarray  # imported here: an extra, and it takes half a second
+        except ModuleNotFoundError:
+            raise ResultError(
+                "xarray is not installed; install it with: python -m pip install "
+                '"prbm-impact[notebook]"'
+            ) from None
+        found = {name: ("time", self[name], {"units": unit}) for name, unit in self.units().items()}
+        return xarray.Dataset(found, attrs={"mechanism": self.mechanism.name})
 
     def units(self) -> dict[str, str]:
         """Return the SI units by column, empty for integers and Booleans.
