@@ -97,7 +97,7 @@ def test_a_contact_of_hertz_has_its_duration_and_force():
 def test_a_mass_on_a_spring_has_the_contact_time_of_sdnd101():
     """Test SDND101 of code_aster: 100 kg, 1e4 N/m, contact 1e6 N/m, 1 m/s; 31.26 ms."""
     size = {"mass": 100.0, "length": 10.0, "displacement": -1e-6, "velocity": 1.0}
-    trial = Simulation(point_mass(young=1e9, **size)).omega
+    trial = Simulation(point_mass(young=1e9, **size)).configuration.omega
     young = 1e9 * (10.0 / trial) ** 2
     _, out = after_hit(young=young, stiffness=1e6, restitution=1.0, **size)
     expected = math.pi / math.sqrt(1e2 + 1e6 * out["stop.point.mobility"])

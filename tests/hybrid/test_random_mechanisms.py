@@ -269,7 +269,9 @@ def test_accelerations_satisfy_lagrange_equations(mechanism, seed, held):
     q, v = random_state(system, seed)
     holds = [held and i == 0 for i in range(len(mechanism.stops))]
     contacts = ContactState.free(len(holds), 0).holding(np.flatnonzero(holds).tolist())
-    a, lam, *_ = Equations(system, sim.inputs, contacts, sim.omega).evaluate(sim.time, q, v)
+    a, lam, *_ = Equations(system, sim.inputs, contacts, sim.configuration.omega).evaluate(
+        sim.time, q, v
+    )
 
     def scalars(q):
         return np.concatenate([closures(system, q), gaps(system, q)[holds]])

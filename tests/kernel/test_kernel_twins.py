@@ -52,6 +52,7 @@ from prbm.mechanics import (
     stress,
 )
 from prbm.mechanics import inputs as input_data
+from prbm.mechanics import start as starts
 from prbm.mechanics import system as system_arrays
 from prbm.mechanics.contact_state import ContactMode, ContactState, Phase, Touching
 from prbm.mechanism import flexure
@@ -1156,6 +1157,32 @@ def test_modes_are_the_same(name, displacement):
         kernel().modes(ours.structure, shape, frequency, phi)
         theirs = modal.modes(system, expected)
         assert_same_modes(frequency, phi, theirs, spread(np.linalg.cond(theirs.M)))
+
+
+@twin(
+    start_shape=starts.start_shape, instability=starts.instability,
+    unstable_directions=modal.unstable_directions, moved_by=modal.moved_by,
+)  # fmt: skip
+@each_mechanism
+def test_unstable_directions_are_the_same(name):
+    for system, ours, _ in systems(name):
+        expected = statics.equilibrium(system, 1e-3)
+        found = modal.modes(system, expected)
+        k, phi = len(found.frequency), np.ascontiguousarray(found.shape)
+        moved = np.full(k, np.nan)
+        kernel().moved_by(ours.structure, expected.q, phi, moved)
+        along = modal.moved_by(system, expected.q, phi)
+        assert_same(moved, along)
+        for frequency in (found.frequency, np.sort(found.frequency * np.sign(0.5 - np.arange(k)))):
+            for g in (None, along):
+                counted = kernel().unstable_directions(k, frequency, g)
+                assert counted == modal.unstable_directions(frequency, g)
+        rest, release = np.zeros(1, np.intc), np.zeros(1, np.intc)
+        kernel().instability(ours.structure, ours.values, rest, release)
+        assert starts.instability(system, system.values) == (rest[0], release[0])
+        q = np.full(system.n, np.nan)
+        kernel().start_shape(ours.structure, ours.values, q)
+        assert_same(q, starts.start_shape(system, system.values), 1e-9)
 
 
 @twin(fundamental_frequency=modal.fundamental_frequency)

@@ -91,7 +91,7 @@ def test_combined_equations_equal_the_separate_functions(rng):
         rows = jacobian(system.loops, e)
         w = forces.field_row(system.S, system.gravity)
         Q = forces.springs(system.K, q - system.q0) + forces.generalised(w, e)
-        Q -= 8e-6 * system.K @ v + 2 * 0.02 * sim.omega * M @ v
+        Q -= 8e-6 * system.K @ v + 2 * 0.02 * sim.configuration.omega * M @ v
         right = np.concatenate([Q - C @ v**2, convective(system.loops, e, v)])
         x = np.linalg.solve(constraints.saddle(M, rows, rows), right)
         a, lam, *_ = equations.evaluate(0.0, q, v)

@@ -111,7 +111,7 @@ def test_a_stretching_pendulum_with_a_wall_satisfies_lagrange_equations(holds):
     # Order from the ground: cord, its stretch, body A; bar, body B.
     assert sim.system.arm.tolist() == [0, 0, 2, 3, 4]
     contacts = ContactState.free(1, 0).holding([0] * holds)
-    equations = Equations(sim.system, sim.inputs, contacts, sim.omega)
+    equations = Equations(sim.system, sim.inputs, contacts, sim.configuration.omega)
     for seed in range(20):
         q, v = state(sim, seed)
         M, right, gap, gradient, quadratic = (np.array(x, float) for x in lagrange()(q, v))

@@ -29,6 +29,7 @@ from ..mechanics.arrays import Real
 from ..mechanics.contact_state import ContactState
 from ..mechanics.dynamics import Equations, Evaluation
 from ..mechanics.inputs import WALL_INPUTS, Inputs, Wall, impulse_names
+from ..mechanics.start import Instability, instability
 from ..mechanics.stress import SectionStresses, section_stresses
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
@@ -144,11 +145,6 @@ class Simulation:
     def frequency(self) -> float:
         """Fundamental frequency about the equilibrium under gravity at the start [Hz]; 0: none."""
         return self.configuration.frequency
-
-    @property
-    def omega(self) -> float:
-        """Fundamental angular frequency [rad/s]; 0: none."""
-        return self.configuration.omega
 
     @property
     def tolerance(self) -> float:
@@ -360,6 +356,16 @@ class Simulation:
         self.front = replace(front, time=arc.end, y=y)
         self.peaks = self.peaks.stepped(self.front, found)
         self.arc, self.pending, self.controller = arc, event, controller
+
+    def instability(self) -> Instability:
+        """Return the numbers of unstable directions at the start.
+
+        Raises
+        ------
+        EquilibriumError
+            As :func:`prbm.mechanics.start.instability`.
+        """
+        return instability(self.system, self.values)
 
     def check_effort(self, step: float) -> None:
         """Reject a communication step [s] of the default experiment that needs too many steps.

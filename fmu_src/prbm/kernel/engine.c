@@ -147,6 +147,12 @@ EXPORTED bool prbm_start(Engine *engine, double start_time, double tolerance, ch
     return succeed(ok, &problem, message);
 }
 
+EXPORTED bool prbm_instability(Engine *engine, int *counts, char *message) {
+    Problem problem = {""};
+    return succeed(simulation_instability(engine->simulation, counts, counts + 1, &problem),
+                   &problem, message);
+}
+
 EXPORTED bool prbm_check_step(const Engine *engine, double step, char *message) {
     Problem problem = {""};
     return succeed(simulation_check_step(engine->simulation, step, &problem), &problem, message);

@@ -29,6 +29,9 @@ EXPORTED void prbm_close(Engine *engine);
 EXPORTED bool prbm_set(Engine *engine, int first, int count, const double *values, char *message);
 /* Start the motion.  If the tolerance is 0, solver.tolerance is used. */
 EXPORTED bool prbm_start(Engine *engine, double start_time, double tolerance, char *message);
+/* Count the unstable directions of the equilibrium under gravity, and of the held shape at release,
+ * into counts (2,). */
+EXPORTED bool prbm_instability(Engine *engine, int *counts, char *message);
 EXPORTED bool prbm_check_step(const Engine *engine, double step, char *message);
 /* Simulate to a time.  Return the number of recorded impacts, -1 on failure.  A failure, also one
  * of memory for the record, leaves the simulation and the record unchanged.  A call returns after

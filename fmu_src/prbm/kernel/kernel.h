@@ -46,5 +46,6 @@
 #include "core/contact.h"
 #include "core/statics.h"
 #include "core/modal.h"
+#include "core/start.h"
 
 #endif

@@ -27,6 +27,7 @@ FUNCTIONS = {
     "prbm_close": (None, _address),
     "prbm_set": (_bool, _address, _int, _int, _address, _bytes),
     "prbm_start": (_bool, _address, _double, _double, _bytes),
+    "prbm_instability": (_bool, _address, _address, _bytes),
     "prbm_check_step": (_bool, _address, _double, _bytes),
     "prbm_advance": (_int, _address, _double, _bytes),
     "prbm_abandon": (None, _address),

@@ -51,6 +51,10 @@ PRBM double simulation_time(const Simulation *simulation);
 PRBM bool simulation_start(Simulation *simulation, double start_time, double tolerance,
                            bool exchange, Problem *problem);
 
+/* Count the unstable directions of the equilibrium under gravity, and of the held shape at release. */
+PRBM bool simulation_instability(Simulation *simulation, int *rest, int *release,
+                                 Problem *problem);
+
 /* Reject a start whose communication step of the default experiment, in co-simulation, needs too
  * many integration steps. */
 PRBM bool simulation_check_effort(const Simulation *simulation, Problem *problem);

@@ -27,6 +27,7 @@ from ..interface import tables
 from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble, calculated
 from ..mechanics.compliant_stops import COMPLIANT_STATES
+from ..mechanics.start import Instability
 from ..mechanics.stress import SectionStresses, section_positions
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
@@ -158,13 +159,9 @@ class KernelSimulation:
         """The constant arrays, for the parameters that act from the next step on."""
         return self.configuration.system
 
-    @property
+    @cached_property
     def configuration(self) -> Configuration:
         """Mechanism, parameters, tolerances and scales, computed when they are needed."""
-        return self._configuration
-
-    @cached_property
-    def _configuration(self) -> Configuration:
         frequency, values = self.frequency, dict(self.values)
         system, known = assemble(self.mechanism, values), calculated(self.mechanism, values)
         scales = Scales.of(system, 2 * np.pi * frequency)
@@ -195,7 +192,7 @@ class KernelSimulation:
         with self._lock:
             self._set({**values, **given})
         if values != self.values:
-            vars(self).pop("_configuration", None)
+            vars(self).pop("configuration", None)
         self.values, self.given = values, given
 
     def _set(self, numbers: Mapping[str, float]) -> None:
@@ -232,6 +229,19 @@ class KernelSimulation:
         if count < 0:
             raise self._error()
         self._take_impacts(count)
+
+    def instability(self) -> Instability:
+        """Return the numbers of unstable directions at the start.
+
+        As :meth:`prbm.hybrid.simulation.Simulation.instability`.
+        """
+        counts = np.zeros(2, np.intc)
+        with self._lock:
+            if not self._library.prbm_instability(
+                self._address, counts.ctypes.data, self._message
+            ):  # fmt: skip
+                raise self._error()
+        return Instability(*counts.tolist())
 
     def check_effort(self, step: float) -> None:
         """Reject a communication step [s] of the default experiment that needs too many steps.
@@ -404,7 +414,7 @@ class KernelSimulation:
                 raise ParameterError(self._message.value.decode(errors="replace"))
             self.values, self.given = values, given
             self._wanted, self._outputs = wanted, None
-            vars(self).pop("_configuration", None)
+            vars(self).pop("configuration", None)
 
     def __getstate__(self) -> dict[str, Any]:
         return {"mechanism": self.mechanism, "saved": self.snapshot(), "record": self.record}

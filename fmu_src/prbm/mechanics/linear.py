@@ -141,7 +141,7 @@ class _SmallMotions:
         self.K_t = tangent_stiffness(
             system.K, shape.load, shape.B, shape.lam, self.e, system.arm, system.Phi
         )
-        self.modes = vibrations(system, self.e, self.K_t, self.rows)
+        self.modes = vibrations(system.mass_matrix(self.e), self.K_t, self.rows)
         values = system.values
         share = 2.0 * values["damping.zeta"]
         omega = 2.0 * np.pi * fundamental_frequency(system) if share else 0.0

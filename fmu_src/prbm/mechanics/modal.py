@@ -5,7 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.tolerances import SPRINGLESS_RATE, ZERO_FREQUENCY_RTOL, ZERO_MODE_RTOL
+from ..base.tolerances import (
+    RELEASE_MODE_RTOL,
+    SPRINGLESS_RATE,
+    ZERO_FREQUENCY_RTOL,
+    ZERO_MODE_RTOL,
+)
 from ..mechanism.parts import value
 from . import constraints
 from .arrays import Complex, Real
@@ -54,34 +59,31 @@ def modes(system: System, shape: Equilibrium) -> Modes:
     if shape.force != 0.0:
         B = np.vstack([B, system.holding_row(shape.q)])
         lam = np.append(lam, shape.force)
-    return _modes(system, shape.q, B, lam, shape.load)
+    e = system.directions(shape.q)
+    return _modes(system, e, system.mass_matrix(e), B, lam, shape.load)
 
 
-def _modes(system: System, q: Real, B: Complex, lam: Real, w: Complex) -> Modes:
+def _modes(system: System, e: Complex, M: Real, B: Complex, lam: Real, w: Complex) -> Modes:
     """Solve K_t phi = omega^2 M phi for phi on the tangent space of the loops.
 
     The tangent stiffness K_t is that of the loads w and of the multipliers lam along B.
     """
-    e = system.directions(q)
     K_t = tangent_stiffness(system.K, w, B, lam, e, system.arm, system.Phi)
-    return vibrations(system, e, K_t, system.loop_rows.jacobian(e))
+    return vibrations(M, K_t, system.loop_rows.jacobian(e))
 
 
-def vibrations(system: System, e: Complex, K_t: Real, rows: Real) -> Modes:
+def vibrations(M: Real, K_t: Real, rows: Real) -> Modes:
     """Return the solutions of K_t phi = omega^2 M phi with rows phi = 0.
 
     Parameters
     ----------
-    system : System
-        The mechanism.
-    e : (d,) complex
-        Directions of the shape.
+    M : (n, n)
+        Mass matrix [kg m^2].
     K_t : (n, n)
         Tangent stiffness [N m/rad].
     rows : (r, n)
         Gradients of the active constraints, which are independent of each other.
     """
-    M = system.mass_matrix(e)
     # Coordinates of unit inertia make the basis Z independent of how the inertias differ.
     scale = 1.0 / np.sqrt(M.diagonal())
     Z = scale[:, None] * np.linalg.qr((rows * scale).T, mode="complete")[0][:, len(rows) :]
@@ -89,6 +91,53 @@ def vibrations(system: System, e: Complex, K_t: Real, rows: Real) -> Modes:
     omega2, y = np.linalg.eigh(np.linalg.solve(L, np.linalg.solve(L, Z.T @ K_t @ Z).T))
     frequency = np.sign(omega2) * np.sqrt(np.abs(omega2)) / (2 * np.pi)
     return Modes(frequency, Z @ np.linalg.solve(L.T, y), M)
+
+
+def unstable_directions(frequency: Real, along: Real | None = None) -> int:
+    r"""Return the number of unstable directions of a shape, under dead loads or held.
+
+    Under dead loads it is the number of unstable modes.  Holding a displacement g whose response to
+    a small force, sum g_i^2/omega_i^2, is against the force removes one of them.  Motions without
+    stiffness, whose frequencies are round-off, are stable.
+
+    Parameters
+    ----------
+    frequency : (k,)
+        Frequencies of the modes [Hz], in rising order; negative if unstable.
+    along : (k,) or None
+        Change g_i of the held displacement by each mass-normalised mode; zero if it is round-off.
+        None: nothing is held.
+
+    Examples
+    --------
+    Two motions of 1 kg with -1 N/m and 3 N/m; the sum of both is held, and their difference stable:
+
+    >>> omega = np.array([-1.0, math.sqrt(3.0)])
+    >>> unstable_directions(omega / (2.0 * math.pi))
+    1
+    >>> unstable_directions(omega / (2.0 * math.pi), np.array([1.0, 1.0]))
+    0
+    """
+    least = ZERO_FREQUENCY_RTOL * float(np.abs(frequency).max(initial=0.0))
+    count = int(np.count_nonzero(frequency < -least))
+    if along is None or count == 0:
+        return count
+    free = np.abs(frequency) <= least
+    if np.any(along[free]):
+        return count
+    omega2 = np.sign(frequency[~free]) * frequency[~free] ** 2
+    return count - int(float(np.sum(along[~free] ** 2 / omega2)) < 0.0)
+
+
+def moved_by(system: System, q: Real, phi: Real) -> Real:
+    """Return the displacement of the released body by modes phi (n, k), (k,).
+
+    It is that along the direction of the release [m], or the rotation times the size if the release
+    is by an angle; zero if it is round-off.
+    """
+    moved = system.gradient(system.holding_row(q)[None], system.directions(q))[0] @ phi
+    turn = np.abs(phi).max(axis=0, initial=0.0)
+    return np.where(np.abs(moved) > RELEASE_MODE_RTOL * system.length * turn, moved, 0.0)
 
 
 def damping(system: System, found: Modes) -> tuple[Real, Real]:
@@ -189,7 +238,7 @@ def modes_at(system: System, q: Real) -> Modes:
     right = np.concatenate([load, np.zeros(len(B))])
     kkt = constraints.saddle(M, rows, rows)
     lam = -constraints.solve(kkt, right, system.n, system.length)[system.n :]
-    return _modes(system, q, B, lam, w)
+    return _modes(system, e, M, B, lam, w)
 
 
 def simulated_restitution(phi: Real, M: Real, before: Real, after: Real) -> float:

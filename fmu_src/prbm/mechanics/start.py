@@ -1,17 +1,67 @@
 """The shape from which a mechanism is released."""
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
 from ..base.errors import EquilibriumError, ParameterError, SimulationError
-from ..base.tolerances import RELEASE_MODE_RTOL
 from ..mechanism.parts import value
 from .arrays import Real
 from .constraints import project_positions
-from .modal import modes
+from .modal import modes, moved_by, unstable_directions
 from .statics import equilibrium
 from .system import Rows, System
+
+
+class Instability(NamedTuple):
+    """Numbers of unstable directions at the start.
+
+    Parameters
+    ----------
+    rest : int
+        Of the equilibrium under gravity, without stops.
+    release : int
+        Of the shape that is held at the displacement or the angle of the release; 0 if the release
+        is along a mode.
+    """
+
+    rest: int
+    release: int
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What a user should know about the unstable shapes."""
+        said = []
+        if self.rest:
+            said.append(
+                f"the equilibrium under gravity, without stops, is unstable in {self.rest} of its "
+                "directions: mode.frequency is 0"
+            )
+        if self.release:
+            said.append(
+                f"the shape at release is unstable in {self.release} of its directions while it "
+                "is held: a small disturbance determines how the motion begins; release closer to "
+                "a stable shape"
+            )
+        return tuple(said)
+
+
+def instability(system: System, values: Mapping[str, float]) -> Instability:
+    """Return the numbers of unstable directions at the start, for the values of all parameters.
+
+    Raises
+    ------
+    EquilibriumError
+        If no equilibrium under gravity, or with the displacement or the angle, is found.
+    """
+    release, rest = system.mechanism.release, modes(system, equilibrium(system))
+    held = 0
+    if not release.mode:
+        shape = equilibrium(system, value(release, release.start, values))
+        found = modes(system, shape)
+        held = unstable_directions(found.frequency, moved_by(system, shape.q, found.shape))
+    return Instability(unstable_directions(rest.frequency), held)
 
 
 def start_shape(system: System, values: Mapping[str, float], fraction: float = 1.0) -> Real:
@@ -72,9 +122,8 @@ def mode_shape(system: System, mode: int, amplitude: float) -> Real:
             "flexure model with more pivots"
         )
     phi = found.shape[:, mode - 1]
-    row = system.gradient(system.release, system.directions(rest.q))
-    moved = float(row @ phi)
-    if abs(moved) <= RELEASE_MODE_RTOL * system.length * float(np.abs(phi).max()):
+    moved = float(moved_by(system, rest.q, phi[:, None])[0])
+    if moved == 0.0:
         raise ParameterError(
             f"release.mode = {mode}: this mode does not move the released point of {name} along "
             "the direction of the release; choose another mode, release.point or direction"

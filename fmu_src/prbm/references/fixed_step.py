@@ -78,7 +78,7 @@ def march(
     simulation = Simulation(mechanism, values)
     system, n, y = simulation.system, simulation.system.n, simulation.front.y
     contacts = ContactState.free(len(mechanism.stops), len(mechanism.frictions))
-    equations = Equations(system, simulation.inputs, contacts, simulation.omega)
+    equations = Equations(system, simulation.inputs, contacts, simulation.configuration.omega)
     armed = [True] * len(mechanism.stops)
     times, states, impacts = [0.0], [y], []
     for k in range(1, round(stop_time / step) + 1):

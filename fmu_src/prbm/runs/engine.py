@@ -13,6 +13,7 @@ from ..hybrid.simulation import Simulation
 from ..kernel.library import library
 from ..kernel.simulation import KernelSimulation
 from ..mechanics.arrays import Real
+from ..mechanics.start import Instability
 from ..mechanics.stress import SectionStresses
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
@@ -72,6 +73,9 @@ class Engine(Protocol):
 
     def advance(self, time: float) -> None:
         """Continue the motion to a time [s]."""
+
+    def instability(self) -> Instability:
+        """Return the numbers of unstable directions at the start."""
 
     def check_effort(self, step: float) -> None:
         """Reject a communication step [s] that needs too many integration steps."""

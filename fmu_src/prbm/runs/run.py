@@ -129,9 +129,7 @@ def simulate(
     if tolerance is not None:
         tolerance = in_unit("tolerance", tolerance, "")
     motion = simulation(mechanism, values, tolerance=tolerance, engine=engine)
-    wanted = motion.values["solver.tolerance"] if tolerance is None else tolerance
-    if replaced := replaced_tolerance(wanted):
-        _log.warning("%s", replaced)
+    _warn(motion, motion.values["solver.tolerance"] if tolerance is None else tolerance)
     _check_effort(motion, spacing)
     _check_walls(motion, driver, source)
     impacts: list[Impact] = []
@@ -169,6 +167,14 @@ def _check_walls(motion: Engine, driver: Driver, source: Source | None) -> None:
 
 def _ignore(motion: Engine) -> None:
     """Observe nothing."""
+
+
+def _warn(motion: Engine, tolerance: float) -> None:
+    """Log a tolerance that is replaced, and what is unstable at the start."""
+    if replaced := replaced_tolerance(tolerance):
+        _log.warning("%s", replaced)
+    for sentence in motion.instability().sentences:
+        _log.warning("%s", sentence)
 
 
 def _check_effort(motion: Engine, spacing: float) -> None:

@@ -115,10 +115,13 @@ class Instance:
                 tolerance=self.tolerance,
             )
             simulation.check_effort(self.model.step)
+            unstable = simulation.instability()
         except PrbmError as error:
             self._refuse(START, str(error))
             return
         self.simulation = simulation
+        for sentence in unstable.sentences:
+            self.messages.warning(sentence)
         given = self.given["solver.tolerance"]
         replaced = replaced_tolerance(given if self.tolerance is None else self.tolerance)
         if replaced:

@@ -112,18 +112,16 @@ static void tangent_space(const System *system, const Complex *e, const double *
 
 /* Solve K_t phi = omega^2 M phi on the tangent space of the loops for the frequencies [Hz] (k,) and
  * the modes phi (n, k).  K_t includes the loads of the multipliers lam (r,) along the rows B, which
- * may have one row more than the loops.  M (n, n) becomes the mass matrix. */
-static bool modes_about(const System *system, const double *q, int r, const Complex *B,
-                        const double *lam, double *frequency, double *phi, double *M,
+ * may have one row more than the loops.  e and M: the directions and the mass matrix. */
+static bool modes_about(const System *system, const Complex *e, const double *M, int r,
+                        const Complex *B, const double *lam, double *frequency, double *phi,
                         Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
     int n = system->n, k = n - system->r;
-    Complex *e = take_complex(scratch, 1, system->d), *w = take_complex(scratch, 1, system->d);
+    Complex *w = take_complex(scratch, 1, system->d);
     double *K_t = take_matrix(scratch, n, n), *Z = take_matrix(scratch, n, k);
     double *K_z = take_matrix(scratch, k, k), *M_z = take_matrix(scratch, k, k);
     double *reduced = take_matrix(scratch, k, k);
-    directions(system, q, e);
-    mass_matrix(system, e, M, scratch);
     gravity_row(system, w);
     tangent_stiffness(system, r, w, B, lam, e, K_t);
     tangent_space(system, e, M, Z, scratch);
@@ -150,14 +148,57 @@ PRBM bool modes(const System *system, const Equilibrium *shape, double *frequenc
     size_t used = scratch->used;
     int n = system->n, r = system->r;
     Complex *B = take_complex(scratch, r + 1, system->d);
+    Complex *e = take_complex(scratch, 1, system->d);
     double *lam = take(scratch, (size_t)r + 1), *M = take_matrix(scratch, n, n);
+    directions(system, shape->q, e);
+    mass_matrix(system, e, M, scratch);
     stack_holding_at(system, shape->q, B, lam);
     copy(r, shape->lam, lam);
     lam[r] = shape->force;
     r += shape->force != 0.0;
-    bool found = modes_about(system, shape->q, r, B, lam, frequency, phi, M, scratch, problem);
+    bool found = modes_about(system, e, M, r, B, lam, frequency, phi, scratch, problem);
     scratch->used = used;
     return found;
+}
+
+PRBM int unstable_directions(int k, const double *frequency, const double *along) {
+    double least = ZERO_FREQUENCY_RTOL * largest(k, frequency), response = 0.0;
+    int count = 0;
+    bool yields = false;
+    for (int i = 0; i < k; i++) {
+        double f = frequency[i], g = along != NULL ? along[i] : 0.0;
+        count += f < -least;
+        if (fabs(f) <= least) {
+            yields = yields || g != 0.0;
+        } else {
+            response += (f < 0.0 ? -1.0 : 1.0) * (g * g) / (f * f);
+        }
+    }
+    return count - (count > 0 && !yields && response < 0.0);
+}
+
+PRBM void moved_by(const System *system, const double *q, const double *phi, double *moved,
+                   Scratch *scratch) {
+    size_t used = scratch->used;
+    int n = system->n, r = system->r, k = n - r;
+    Complex *B = take_complex(scratch, r + 1, system->d);
+    Complex *e = take_complex(scratch, 1, system->d);
+    double *c = take(scratch, (size_t)r + 1), *row = take(scratch, (size_t)n);
+    directions(system, q, e);
+    stack_holding_at(system, q, B, c);
+    Rows held = plain_rows(system, r + 1, B, c);
+    row_jacobian(&held, r, e, row);
+    for (int i = 0; i < k; i++) {
+        double turn = moved[i] = 0.0;
+        for (int j = 0; j < n; j++) {
+            moved[i] += row[j] * phi[j * k + i];
+            turn = greater(turn, fabs(phi[j * k + i]));
+        }
+        if (!(fabs(moved[i]) > RELEASE_MODE_RTOL * system->length * turn)) {
+            moved[i] = 0.0;
+        }
+    }
+    scratch->used = used;
 }
 
 /* Compute the frequencies (k,) about the equilibrium under gravity. */
@@ -219,15 +260,14 @@ PRBM bool slow_rates(const System *system, double *rate, double *fast, Scratch *
 /* Compute the multipliers lam of a shape held at rest by a force on the released body.  They solve
  * [M, rows^T; rows, 0] (a, -lam) = (Q, 0) for the loads Q, so that the accelerations a that remain
  * are as small as possible. */
-static bool resting_multipliers(const System *system, const double *q, const Complex *B,
-                                double *lam, double *M, Scratch *scratch, Problem *problem) {
+static bool resting_multipliers(const System *system, const double *q, const Complex *e,
+                                const double *M, const Complex *B, double *lam,
+                                Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
     int n = system->n, r = system->r + 1, size = n + r;
-    Complex *e = take_complex(scratch, 1, system->d), *w = take_complex(scratch, 1, system->d);
+    Complex *w = take_complex(scratch, 1, system->d);
     double *rows = take_matrix(scratch, r, n), *kkt = take_matrix(scratch, size, size);
     double *right = take(scratch, (size_t)size), *turned = take(scratch, (size_t)n);
-    directions(system, q, e);
-    mass_matrix(system, e, M, scratch);
     Rows held = plain_rows(system, r, B, NULL);
     jacobian(&held, e, rows);
     gravity_row(system, w);
@@ -253,9 +293,12 @@ PRBM bool fundamental_at(const System *system, const double *q, double *phi, dou
     Complex *B = take_complex(scratch, r, system->d);
     double *lam = take(scratch, (size_t)r), *frequency = take(scratch, (size_t)k);
     double *all = take_matrix(scratch, n, k);
+    Complex *e = take_complex(scratch, 1, system->d);
+    directions(system, q, e);
+    mass_matrix(system, e, M, scratch);
     stack_holding_at(system, q, B, lam);
-    bool found = resting_multipliers(system, q, B, lam, M, scratch, problem) &&
-                 modes_about(system, q, r, B, lam, frequency, all, M, scratch, problem);
+    bool found = resting_multipliers(system, q, e, M, B, lam, scratch, problem) &&
+                 modes_about(system, e, M, r, B, lam, frequency, all, scratch, problem);
     for (int i = 0; found && i < n; i++) {
         phi[i] = all[i * k];
     }

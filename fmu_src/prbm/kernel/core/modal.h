@@ -7,6 +7,12 @@
 /* Compute frequencies [Hz] (k,) and mass-normalised modes (n, k), k = n - r. */
 PRBM bool modes(const System *system, const Equilibrium *shape, double *frequency, double *phi,
                 Scratch *scratch, Problem *problem);
+/* Return the number of unstable directions of a shape with these frequencies (k,): under dead loads
+ * if along is NULL, or with a displacement held that the modes change by along (k,). */
+PRBM int unstable_directions(int k, const double *frequency, const double *along);
+/* Compute the displacement of the released body by modes phi (n, k); 0 if it is round-off. */
+PRBM void moved_by(const System *system, const double *q, const double *phi, double *moved,
+                   Scratch *scratch);
 PRBM bool fundamental_frequency(const System *system, double *frequency, Scratch *scratch,
                                 Problem *problem);
 /* Compute the rates [rad/s] of a mechanism without a fundamental frequency: the scales of velocities

@@ -30,25 +30,6 @@ static bool displace(const System *system, const double *phi, int k, double move
                           amplitude, k + 1);
 }
 
-/* Compute the displacement of the released point by a mode; false if it is round-off. */
-static bool moved_by(const System *system, const double *q, const double *phi, int k,
-                     double *moved, Scratch *scratch) {
-    size_t used = scratch->used;
-    int n = system->n, count = n - system->r;
-    Complex *e = take_complex(scratch, 1, system->d);
-    double *row = take(scratch, (size_t)n), turn = 0.0;
-    Rows release = plain_rows(system, 1, system->release, NULL);
-    directions(system, q, e);
-    row_jacobian(&release, 0, e, row);
-    *moved = 0.0;
-    for (int j = 0; j < n; j++) {
-        *moved += row[j] * phi[j * count + k];
-        turn = greater(turn, fabs(phi[j * count + k]));
-    }
-    scratch->used = used;
-    return fabs(*moved) > RELEASE_MODE_RTOL * system->length * turn;
-}
-
 /* Displace the rest shape under gravity along the mode of the release. */
 static bool mode_shape(const System *system, double amplitude, double *q, Scratch *scratch,
                        Problem *problem) {
@@ -56,7 +37,7 @@ static bool mode_shape(const System *system, double amplitude, double *q, Scratc
     int n = system->n, count = n - system->r, mode = system->mechanism->release.mode;
     Equilibrium rest = {q, take(scratch, (size_t)system->r + 1), 0.0};
     double *frequency = take(scratch, (size_t)count), *phi = take_matrix(scratch, n, count);
-    double moved = 0.0;
+    double *moved = take(scratch, (size_t)count);
     bool found = equilibrium(system, false, 0.0, &rest, scratch, problem) &&
                  modes(system, &rest, frequency, phi, scratch, problem);
     if (found && mode > count) {
@@ -64,15 +45,20 @@ static bool mode_shape(const System *system, double amplitude, double *q, Scratc
                      "release.mode = %d: the mechanism has %d modes; choose one of them, or a "
                      "flexure model with more pivots",
                      mode, count);
-    } else if (found && !moved_by(system, q, phi, mode - 1, &moved, scratch)) {
-        found = fail(problem,
-                     "release.mode = %d: this mode does not move the released point of %s along "
-                     "the direction of the release; choose another mode, release.point or "
-                     "direction",
-                     mode, system->mechanism->bodies[system->mechanism->release.body - 1].name);
     }
-    if (found && amplitude != 0.0) {
-        found = displace(system, phi, mode - 1, moved, amplitude, q, scratch, problem);
+    if (found) {
+        moved_by(system, q, phi, moved, scratch);
+        if (moved[mode - 1] == 0.0) {
+            const Body *body = &system->mechanism->bodies[system->mechanism->release.body - 1];
+            found = fail(problem,
+                         "release.mode = %d: this mode does not move the released point of %s "
+                         "along the direction of the release; choose another mode, release.point "
+                         "or direction",
+                         mode, body->name);
+        } else if (amplitude != 0.0) {
+            double by = moved[mode - 1];
+            found = displace(system, phi, mode - 1, by, amplitude, q, scratch, problem);
+        }
     }
     scratch->used = used;
     return found;
@@ -90,4 +76,32 @@ PRBM bool start_shape(const System *system, const double *values, double *q, Scr
     bool found = equilibrium(system, true, amount, &shape, scratch, problem);
     scratch->used = used;
     return found;
+}
+
+/* Count the unstable directions of the shape under gravity that is held at an amount, or free. */
+static bool unstable_shape(const System *system, bool held, double amount, int *count,
+                           Scratch *scratch, Problem *problem) {
+    size_t used = scratch->used;
+    int n = system->n, k = n - system->r;
+    Equilibrium shape = {take(scratch, (size_t)n), take(scratch, (size_t)system->r + 1), 0.0};
+    double *frequency = take(scratch, (size_t)k), *phi = take_matrix(scratch, n, k);
+    double *moved = take(scratch, (size_t)k);
+    bool found = equilibrium(system, held, amount, &shape, scratch, problem) &&
+                 modes(system, &shape, frequency, phi, scratch, problem);
+    if (found) {
+        moved_by(system, shape.q, phi, moved, scratch);
+        *count = unstable_directions(k, frequency, held ? moved : NULL);
+    }
+    scratch->used = used;
+    return found;
+}
+
+PRBM bool instability(const System *system, const double *values, int *rest, int *release,
+                      Scratch *scratch, Problem *problem) {
+    const Release *given = &system->mechanism->release;
+    bool held = given->start != START_AMPLITUDE;
+    *release = 0;
+    return unstable_shape(system, false, 0.0, rest, scratch, problem) &&
+           (!held || unstable_shape(system, true, evaluate(given->amount, values), release, scratch,
+                                    problem));
 }

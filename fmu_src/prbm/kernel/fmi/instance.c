@@ -307,6 +307,27 @@ PRBM void acknowledge(Instance *instance) {
     }
 }
 
+/* Log a warning if the equilibrium under gravity, or the held shape at release, is unstable. */
+static bool warn_of_instability(Instance *instance, Problem *problem) {
+    int rest = 0, release = 0;
+    if (!simulation_instability(instance->simulation, &rest, &release, problem)) {
+        return false;
+    }
+    if (rest > 0) {
+        report(&instance->journal, FMU_WARNING,
+               "the equilibrium under gravity, without stops, is unstable in %d of its directions: "
+               "mode.frequency is 0",
+               rest);
+    }
+    if (release > 0) {
+        report(&instance->journal, FMU_WARNING,
+               "the shape at release is unstable in %d of its directions while it is held: a small "
+               "disturbance determines how the motion begins; release closer to a stable shape",
+               release);
+    }
+    return true;
+}
+
 /* Log a warning if the tolerance of co-simulation is too loose to be used. */
 PRBM bool start_instance(Instance *instance, Problem *problem) {
     Simulation *simulation = instance->simulation;
@@ -315,12 +336,13 @@ PRBM bool start_instance(Instance *instance, Problem *problem) {
                           problem)) {
         return false;
     }
-    if (exchange) {
-        return true;
-    }
-    if (!simulation_check_effort(simulation, problem)) {
+    if (!warn_of_instability(instance, problem) ||
+        !(exchange || simulation_check_effort(simulation, problem))) {
         simulation_unstart(simulation);
         return false;
+    }
+    if (exchange) {
+        return true;
     }
     double wanted = simulation_requested(simulation, instance->tolerance);
     if (wanted > TOLERANCE_USED_MAX) {

@@ -145,3 +145,9 @@ PRBM bool start_motion(Simulation *sim, double start_time, double tolerance, Sim
     state->started = release_mechanism(sim, problem) && restart_peaks(sim, problem);
     return state->started;
 }
+
+PRBM bool simulation_instability(Simulation *simulation, int *rest, int *release,
+                                 Problem *problem) {
+    return instability(system_of(simulation), simulation->state.acting_values, rest, release,
+                       &simulation->scratch, problem);
+}
