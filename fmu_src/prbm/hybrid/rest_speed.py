@@ -33,12 +33,13 @@ def with_rest_speeds(mechanism: Mechanism, stops: set[str]) -> Mechanism:
 def of_stops(mechanism: Mechanism) -> list[float]:
     """Return a rest speed for each stop, from the motion with the default values [m/s].
 
-    It is the share ``REST_SPEED_RTOL`` of a typical closing speed, rounded to one digit: of
-    omega a, with the fundamental angular frequency omega and the amplitude a of the hit point along
-    the direction of the stop, or of its speed at the release, if that is larger.  The amplitude is
-    the larger of the distances of the released shape and of the wall from the equilibrium under
-    gravity; a wall farther away than the size of the mechanism does not count.  A stop that touches
-    a mechanism at rest has the amplitude ``REST_AMPLITUDE_RTOL`` times the size.
+    It is the share ``REST_SPEED_RTOL`` of a typical closing speed, rounded to six digits, which
+    round-off does not change.  The typical speed is omega a, with the fundamental angular frequency
+    omega and the amplitude a of the hit point along the direction of the stop, or the speed of that
+    point at the release, if that is larger.  The amplitude is the larger of the distances of the
+    released shape and of the wall from the equilibrium under gravity; a wall farther away than the
+    size of the mechanism does not count.  A stop that touches a mechanism at rest has the amplitude
+    ``REST_AMPLITUDE_RTOL`` times the size.
 
     Raises
     ------
@@ -62,4 +63,4 @@ def of_stops(mechanism: Mechanism) -> list[float]:
     typical = np.maximum(scales.rate * amplitude, rates)
     least = scales.rate * REST_AMPLITUDE_RTOL * scales.length
     typical = np.where(typical > scales.zero_speed, typical, least)
-    return [float(f"{REST_SPEED_RTOL * speed:.0e}") for speed in typical]
+    return [float(f"{REST_SPEED_RTOL * speed:.5e}") for speed in typical]
