@@ -22,11 +22,24 @@ static Place *place_origins(Memory *memory, size_t count, size_t d) {
     return origins;
 }
 
+/* Place the rows of stops and of points with friction. */
+static void place_contacts(System *system, Memory *memory) {
+    size_t d = (size_t)system->d, s = (size_t)system->s, f = (size_t)system->f;
+    system->gaps = place(memory, s * d, sizeof(Complex));
+    system->slides = place(memory, s * d, sizeof(Complex));
+    system->gaps_c = place(memory, s, sizeof(double));
+    system->gaps_z = place(memory, s, sizeof(Complex));
+    system->slides_z = place(memory, s, sizeof(Complex));
+    system->on = place(memory, s, sizeof(int));
+    system->rubs = place(memory, f * d, sizeof(Complex));
+    system->lifts = place(memory, f * d, sizeof(Complex));
+    system->lifts_c = place(memory, f, sizeof(double));
+}
+
 PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memory) {
     const Mechanism *m = mechanism;
     size_t n = (size_t)m->coordinate_count, r = (size_t)m->loop_count;
-    size_t p = (size_t)m->mass_count, s = (size_t)m->stop_count, f = (size_t)m->friction_count;
-    size_t b = (size_t)m->body_count, d = (size_t)m->direction_count;
+    size_t p = (size_t)m->mass_count, b = (size_t)m->body_count, d = (size_t)m->direction_count;
     System result = {0};
     result.mechanism = mechanism;
     result.n = (int)n;
@@ -35,8 +48,8 @@ PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memor
     result.wide = even_length((int)d);
     result.mapped = m->map.mapped;
     result.r = (int)r;
-    result.s = (int)s;
-    result.f = (int)f;
+    result.s = m->stop_count;
+    result.f = m->friction_count;
     result.b = (int)b;
     result.q0 = place(memory, n, sizeof(double));
     result.rest = place(memory, n, sizeof(double));
@@ -50,15 +63,7 @@ PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memor
     result.S = place(memory, d, sizeof(Complex));
     result.loops = place(memory, r * d, sizeof(Complex));
     result.loops_c = place(memory, r, sizeof(double));
-    result.gaps = place(memory, s * d, sizeof(Complex));
-    result.slides = place(memory, s * d, sizeof(Complex));
-    result.gaps_c = place(memory, s, sizeof(double));
-    result.gaps_z = place(memory, s, sizeof(Complex));
-    result.slides_z = place(memory, s, sizeof(Complex));
-    result.on = place(memory, s, sizeof(int));
-    result.rubs = place(memory, f * d, sizeof(Complex));
-    result.lifts = place(memory, f * d, sizeof(Complex));
-    result.lifts_c = place(memory, f, sizeof(double));
+    place_contacts(&result, memory);
     result.release = place(memory, d, sizeof(Complex));
     result.released.A = place(memory, d, sizeof(Complex));
     result.bodies = place_frames(memory, b, d);
