@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from many_parts import cantilever
+from many_parts import cantilever, rich
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.kinetics import inertia
@@ -137,3 +137,16 @@ def test_no_configuration_has_smaller_pivots_than_the_coupling(rng):
         U = np.exp(1j * rng.uniform(-np.pi, np.pi, n))
         M = (U.conj()[:, None] * G * U).real
         assert np.all(pivots(M) >= pivots(G) * (1.0 - 1e-9))
+
+
+@pytest.mark.parametrize("model", ["PRBDM2R", "Rich", "GuideBeam"])
+def test_no_shape_has_a_gradient_beyond_the_reach_of_the_rows(model, rng):
+    """Arms that stretch have a length of exp(s); walls on bodies turn with them."""
+    given = rich() if model == "Rich" else mechanism(model)
+    system = assemble(given, given.values())
+    for rows in (system.loop_rows, system.gap_rows, system.slide_rows):
+        for _ in range(20):
+            q = system.q0 + rng.normal(size=system.n)
+            q[system.strains] = -np.abs(q[system.strains])
+            gradient = np.abs(rows.jacobian(system.directions(q)))
+            assert np.all(gradient <= rows.reach() * (1 + 1e-12) + 1e-15)

@@ -113,16 +113,18 @@ def _lapack() -> ModuleType:
     return lapack
 
 
-def factor_saddle(kkt: Real, n: int, length: float) -> Factors:
+def factor_saddle(kkt: Real, scale: Real) -> Factors:
     """Factor a saddle-point matrix, or reject it as singular.
 
-    It is singular if a row has vanished, or if a pivot of the scaled matrix, whose elements are
-    near one, is less than ``SINGULAR_RTOL``: its solution would be round-off.
+    It is singular if a pivot of the scaled matrix, whose elements are near one, is less than
+    ``SINGULAR_RTOL``: its solution would be round-off.
 
     Parameters
     ----------
-    kkt, n, length
-        As for :func:`scales`.
+    kkt : (n + r, n + r)
+        Saddle-point matrix, which is overwritten.
+    scale : (n + r,)
+        Scales D.
 
     Raises
     ------
@@ -130,15 +132,17 @@ def factor_saddle(kkt: Real, n: int, length: float) -> Factors:
         If the matrix is singular: two constraints contradict or repeat each other, a constraint
         does not depend on the position, or a motion has no mass.
     """
-    scale = scales(kkt, n, length)
-    lu, pivots, _ = _lapack().dgetrf(kkt * scale * scale[:, None], overwrite_a=True)
-    _check_pivots(np.abs(lu.diagonal()))
+    kkt *= scale
+    kkt *= scale[:, None]
+    lu, pivots, _ = _lapack().dgetrf(kkt, overwrite_a=True)
+    _check_pivots(lu.diagonal())
     return Factors(lu, pivots, scale)
 
 
-def _check_pivots(pivots: Real) -> None:
+def _check_pivots(diagonal: Real) -> None:
     """Reject a scaled matrix with these pivots if one of them is round-off."""
-    if not pivots.min() > SINGULAR_RTOL * pivots.max():
+    pivots = np.abs(diagonal).tolist()
+    if not min(pivots) > SINGULAR_RTOL * max(pivots):
         raise SimulationError(SINGULAR)
 
 
@@ -163,12 +167,12 @@ def solve_saddle(factors: Factors, right: Real) -> Real:
 
 
 def solve(kkt: Real, right: Real, n: int, length: float) -> Real:
-    """Solve a saddle-point system as :func:`factor_saddle` and :func:`solve_saddle`, without SciPy.
+    """Solve a saddle-point system with :func:`scales`, without SciPy.
 
     Raises
     ------
     SimulationError
-        As :func:`factor_saddle`.
+        As :func:`factor_saddle`, or if all elements of a row are round-off.
     """
     scale = scales(kkt, n, length)
     A = kkt * scale * scale[:, None]

@@ -67,7 +67,7 @@ def response(M: Real, held: Real, rows: Real, length: float) -> Real:
     Raises
     ------
     SimulationError
-        As :func:`prbm.mechanics.constraints.factor_saddle`.
+        As :func:`prbm.mechanics.constraints.solve`.
 
     Examples
     --------

@@ -62,7 +62,7 @@ class ContactProblem:
         Raises
         ------
         SimulationError
-            As :func:`prbm.mechanics.constraints.factor_saddle`.
+            As :func:`prbm.mechanics.constraints.solve`.
         """
         return self.response_beside(self.loops, rows)
 

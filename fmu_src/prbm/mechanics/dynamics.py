@@ -1,15 +1,14 @@
 r"""The equations of motion for one state of the contacts.
 
-    [ M    R^T ] [  a   ]   [ Q - C v^2 ]
-    [ R     0  ] [ -lam ] = [ Re(B e) v^2 ]
+    M a - R^T lam = Phi^T (Re(w e) + Im(Hq w^2)) - K (q - rest + beta v),    R a = Re(B e w^2)
 
-M is the mass matrix, a the accelerations, lam the multipliers and Q the loads.  R has the rows of
-the loops, of the held stops and of the sticking contacts.  The terms are formed for the directions,
-with the squares w^2 of the rates of the arms in place of v^2 (:mod:`prbm.mechanics.system`).  Then
-they are pulled back to the coordinates (:mod:`prbm.mechanics.direction_map`).  The force of a held
-stop that slips acts along its gap and, by Coulomb's law, along its wall; its column in R^T
-therefore differs from its row in R.  Stops with the compliant law are loads while they are pressed
-(:mod:`prbm.mechanics.compliant_stops`).
+M is the mass matrix, a the accelerations and lam the multipliers.  R has the rows of the loops, of
+the held stops and of the sticking contacts.  Mass matrix, forces and rows are formed for the
+directions e with the rates w of the arms (:mod:`prbm.mechanics.system`), and pulled back to the
+coordinates by Phi (:mod:`prbm.mechanics.direction_map`).  Forces of friction, of inputs and of
+pressed stops with the compliant law (:mod:`prbm.mechanics.compliant_stops`) are added to the loads.
+The force of a held stop that slips acts along its gap and, by Coulomb's law, along its wall; its
+column in R^T therefore differs from its row in R.
 """
 
 from typing import NamedTuple
@@ -22,7 +21,7 @@ from .arrays import Complex, Real
 from .compliant_stops import CompliantState, CompliantStops, Pressure
 from .contact_state import ContactMode, ContactState
 from .inputs import Inputs
-from .kinetics import kinetic_energy, mass_accelerations
+from .kinetics import kinetic_energy, mass_accelerations, turned_moments
 from .system import FIXED, Rows, System
 
 
@@ -39,7 +38,7 @@ class Evaluation(NamedTuple):
     M : (n, n)
         Mass matrix [kg m^2].
     factors : Factors
-        Factors of the matrix of the equations, for :meth:`Equations.project_near`.
+        Factors of the equations, for :meth:`Equations.project_near`.
     pressure : Pressure or None
         Forces of the pressed compliant stops, if there are any.
     """
@@ -93,11 +92,7 @@ class Equations:
         self._number_contacts()
         self._collect_loads()
         self._stack_rows()
-        self._stack_terms()
-        # Springs and their damping in one product with (q, v): see torques.
-        damping = self.beta * system.K
-        self._K_y = np.block([[system.K, damping], [0 * system.K, damping]])
-        self._straight = np.concatenate([system.K @ system.rest, np.zeros(self.n)])
+        self.scale = self._scale()
 
     def _number_contacts(self) -> None:
         """Sort the contacts by their modes, and number their rows."""
@@ -146,22 +141,11 @@ class Equations:
         self.rows = Rows(system, B, c, z, on)
         self.positions = self.rows.first(self.first_stick)
 
-    def _stack_terms(self) -> None:
-        """Stack inertia, constraints and loads, and extend Phi to the multipliers: see _solve."""
-        d, B, size = self.d, 1j * self.rows.spread, self.d + len(self.rows)
-        self._terms = np.zeros((size, size + 1), complex)
-        self._terms[:d, :d] = self.system.H
-        self._terms[d:, :d] = B
-        self._terms[:d, d:size] = B.conj().T
-        self._terms[:d, size] = 1j * self.w.conj()
-        self._J = np.diag(np.concatenate([self.system.J, np.zeros(len(self.rows))]))
-        self._ones = np.ones(size + 1, complex)
-        self._stretching = bool(len(self.system.stretches))
-        self._identity = self.system.Phi.identity
-        self._last = np.zeros(size + 1, complex if self._stretching else float)
-        self._last[size] = 1.0
-        self._Phi = np.eye(size, self.n + len(self.rows), self.n - d)
-        self._Phi[:d, : self.n] = self.system.Phi.Phi
+    def _scale(self) -> Real:
+        """Return scales with which the elements of the equations are at most near one, (n + r,)."""
+        scale = 1.0 / np.sqrt(self.system.straight_masses)
+        longest = (self.rows.reach() * scale).max(axis=1, initial=0.0)
+        return np.concatenate([scale, 1.0 / longest])
 
     def with_contacts(self, contacts: ContactState) -> "Equations":
         """Return the equations for another state of the contacts."""
@@ -197,58 +181,15 @@ class Equations:
         SimulationError
             If the equations are singular.
         """
-        torques = self.torques(np.concatenate([q, v]))
-        return self._solve(t, q, v, torques[: self.n], extras)
-
-    def torques(self, y: Real) -> Real:
-        """Return the torques of springs and their damping, and those of the damping alone.
-
-        Parameters
-        ----------
-        y : (2 n,)
-            Angles, rates [rad], [rad/s].
-
-        Returns
-        -------
-        (2 n,)
-            K (q - q0) + beta K v, then beta K v [N m].
-        """
-        result: Real = self._K_y.dot(y) - self._straight
-        return result
-
-    def _solve(
-        self, t: float, q: Real, v: Real, torques: Real, extras: Real | None = None
-    ) -> Evaluation:
-        """Solve the equations for given torques of the springs.
-
-        One product gives all terms, with u = (e, 1, ..., 1):
-
-            X = diag(u)^H [ H    (i B)^H   i w^H ] diag(u).
-                          [ i B     0        0   ]
-
-        The real part of the first columns is the matrix of the equations without J, that of the
-        directions.  The imaginary part times (v^2, 0, 1) is the right side: -C v^2
-        (:func:`prbm.mechanics.kinetics.inertia`), the loads and the convective terms Re(B e) v^2.
-        """
-        n, d, e, w = self.n, self.d, self.system.directions(q), self.system.turning(v)
-        u, squares = self._ones.copy(), self._last.copy()
-        u[:d] = e
-        squares[:d] = w * w
-        X = self._terms * u
-        X *= u[:-1].conj()[:, None]
-        kkt = X.real[:, :-1] + self._J
-        right: Real = X.dot(squares).imag if self._stretching else X.imag.dot(squares)
-        if len(self.rows.carried):
-            carried = d + self.rows.carried
-            kkt[carried, :d] = self.rows.by_direction(e)[self.rows.carried]
-            kkt[:d, carried] = kkt[carried, :d].T
-            right[carried] = self.rows.carried_convective(e, w)
-        if not self._identity:
-            kkt, right = self._Phi.T @ kkt @ self._Phi, self._Phi.T @ right
+        system, e, w = self.system, self.system.directions(q), self.system.turning(v)
+        Hq = turned_moments(system.H, e)
+        M = system.Phi.congruence(Hq.real) + system.inertia
+        Q = system.Phi.pull(forces.generalised(self.w, e) + Hq.dot(w * w).imag)
+        Q -= system.K.dot(q - system.rest + self.beta * v)
+        R, bent = self.rows.terms(e, w)
+        kkt = constraints.saddle(M, R, R)
         if self.moving_walls:
-            right[n + self.first_hold : n + self.first_stick] -= self.held_motions(t)[2]
-        M, Q = kkt[:n, :n], right[:n]
-        Q -= torques
+            bent[self.first_hold : self.first_stick] -= self.held_motions(t)[2]
         if self.driven:
             Q += self.moment
         if self.mass_damping:
@@ -257,16 +198,16 @@ class Equations:
         if self.pressed:
             gaps, rates = self.gaps(t, e, extras), self.gap_rates(t, e, v, extras)
             pressure = self.compliant.pressure(gaps, rates)
-            Q += pressure.force @ self.system.gap_rows.jacobian(e)[self.pressed]
+            Q += pressure.force @ system.gap_rows.jacobian(e)[self.pressed]
         for c in self.slipping_points:
             limit = self.friction_limit(c, e, pressure)
             Q -= self.contacts.modes[c].slip * limit * self.slip_row(c, e)
         for i in self.slipping_stops:
-            share = -self.stop_friction[i] * self.contacts.modes[i].slip
-            kkt[:n, n + self.hold_row(i)] += share * self.slip_row(i, e)
-        factors = constraints.factor_saddle(kkt, n, self.system.length)
-        x = constraints.solve_saddle(factors, right)
-        return Evaluation(x[:n], -x[n:], M, factors, pressure)
+            share = self.stop_friction[i] * self.contacts.modes[i].slip
+            kkt[: self.n, self.n + self.hold_row(i)] -= share * self.slip_row(i, e)
+        factors = constraints.factor_saddle(kkt, self.scale)
+        x = constraints.solve_saddle(factors, np.concatenate([Q, bent]))
+        return Evaluation(x[: self.n], -x[self.n :], M, factors, pressure)
 
     # -- rates of the state --
 
@@ -278,9 +219,8 @@ class Equations:
         """Return dy/dt as :meth:`rate`, and the evaluation there."""
         n = self.n
         q, v, extras = y[:n], y[n : 2 * n], y[2 * n + 2 :]
-        torques = self.torques(y[: 2 * n])
-        evaluation = self._solve(t, q, v, torques[:n], extras)
-        loss, power = v.dot(torques[n:]), 0.0
+        evaluation = self.evaluate(t, q, v, extras)
+        loss, power = self.beta * v.dot(self.system.K.dot(v)), 0.0
         if self.mass_damping:
             loss += 2.0 * self.mass_damping * kinetic_energy(evaluation.M, v)
         if self.slipping_points or self.slipping_stops:

@@ -49,8 +49,13 @@ def inertia(H: Complex, J: Real, e: Complex) -> tuple[Real, Real]:
     >>> M.item()
     12.0
     """
-    Hq = e.conj()[:, None] * H * e
+    Hq = turned_moments(H, e)
     return Hq.real + J, -Hq.imag
+
+
+def turned_moments(H: Complex, e: Complex) -> Complex:
+    """Return Hq = diag(e)^H H diag(e), (d, d) [kg m^2]: see :func:`inertia`."""
+    return e.conj()[:, None] * H * e
 
 
 def kinetic_energy(M: Real, v: Real) -> float:

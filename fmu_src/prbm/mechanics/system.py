@@ -35,7 +35,7 @@ from ..mechanism.description import Mechanism
 from .arrays import Complex, Real, Whole
 from .direction_map import DirectionMap
 from .free_body import Connection
-from .kinetics import inertia
+from .kinetics import turned_moments
 
 ANGLE = ("angle", "omega")  # Names of the variables of a coordinate that is an angle.
 STRAIN = ("strain", "strain_rate")  # Those of a coordinate that is a stretch.
@@ -141,7 +141,7 @@ def jacobian(B: Complex, e: Complex) -> Real:
 
 def convective(B: Complex, e: Complex, w: Real | Complex) -> Real:
     """Return -(d/dt dx/dtheta) theta' = Re(B e w^2), which equals -(d/dt dx/dq) v."""
-    result: Real = ((B * e) @ (w * w)).real
+    result: Real = (B * e).dot(w * w).real
     return result
 
 
@@ -207,10 +207,21 @@ class Rows:
         """Return dx/dtheta [m/rad], (r, d)."""
         result = jacobian(self.spread, e)
         if len(self.carried):
-            f = e[self.on].conj()
-            result[self.carried] = -(f[:, None] * self.spread[self.carried] * e).imag
-            result[self.carried, self.on] += self._carried_values(self.B @ e, e).imag
+            result[self.carried] = self._carried_by_direction(e)
         return result
+
+    def _carried_by_direction(self, e: Complex) -> Real:
+        """Return dx/dtheta of the carried rows [m/rad]."""
+        f = e[self.on].conj()
+        result: Real = -(f[:, None] * self.spread[self.carried] * e).imag
+        result[np.arange(len(self.on)), self.on] += self._carried_values(self.B @ e, e).imag
+        return result
+
+    def reach(self) -> Real:
+        """Return the largest |dx/dq| with arms of their drawn length, (r, n) [m/rad]."""
+        most = np.abs(self.spread)
+        most[self.carried, self.on] += np.abs(self.B).sum(axis=1)[self.carried] + np.abs(self.z)
+        return most @ np.abs(self.system.Phi.Phi)
 
     def rates(self, e: Complex, v: Real) -> Real:
         """Return x' [m/s], (..., r); e and v may be stacks (..., d), (..., n)."""
@@ -227,10 +238,19 @@ class Rows:
         w = self.system.turning(v)
         result = convective(self.B, e, w)
         if len(self.carried):
-            result[self.carried] = self.carried_convective(e, w)
+            result[self.carried] = self._carried_convective(e, w)
         return result
 
-    def carried_convective(self, e: Complex, w: Real | Complex) -> Real:
+    def terms(self, e: Complex, w: Real | Complex) -> tuple[Real, Real]:
+        """Return :meth:`jacobian` and :meth:`convective` for the rates w (d,) of the arms."""
+        turned = self.spread * e
+        slopes, bent = -turned.imag, turned.dot(w * w).real
+        if len(self.carried):
+            slopes[self.carried] = self._carried_by_direction(e)
+            bent[self.carried] = self._carried_convective(e, w)
+        return self.system.Phi.pull(slopes), bent
+
+    def _carried_convective(self, e: Complex, w: Real | Complex) -> Real:
         """Return the convective terms of the carried rows [m/s^2]."""
         f, turn = e[self.on].conj(), w[self.on].real
         B = self.B[self.carried]
@@ -355,6 +375,16 @@ class System:
         return result
 
     @cached_property
+    def inertia(self) -> Real:
+        """Rotary inertia about the mass centres of the parts, Phi^T diag(J) Phi [kg m^2]."""
+        return self.Phi.congruence(np.diag(self.J))
+
+    @cached_property
+    def straight_masses(self) -> Real:
+        """Diagonal of the mass matrix in the straight shape, (n,) [kg m^2]."""
+        return self.mass_matrix(self.directions(self.q0)).diagonal()
+
+    @cached_property
     def gap_rows(self) -> Rows:
         """The gaps of all stops, without the positions of their walls [m]."""
         return Rows(self, self.gaps, self.gaps_c, self.gaps_z, self.on)
@@ -461,7 +491,7 @@ class System:
 
     def mass_matrix(self, e: Complex) -> Real:
         """Return the mass matrix M, (n, n) [kg m^2]."""
-        return self.Phi.congruence(inertia(self.H, np.diag(self.J), e)[0])
+        return self.Phi.congruence(turned_moments(self.H, e).real) + self.inertia
 
     def gradient(self, B: Complex, e: Complex) -> Real:
         """Return dx/dq [m/rad], (..., n), of rows x = Re(B E) + c, (..., d)."""
