@@ -264,6 +264,8 @@ def draw(found: Sequence[Growth], file: Path) -> None:
                 color=line.get_color(),
                 label=f"without the Schur complement, {one.exponent_without_schur:.2f}",
             )  # fmt: skip
+    axes.set_xticks([2, 5, 10, 20, 50], labels=["2", "5", "10", "20", "50"])
+    axes.minorticks_off()
     axes.grid(which="major", alpha=0.3)
     axes.legend(fontsize="small")
     figure.savefig(file, dpi=150)
