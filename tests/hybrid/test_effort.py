@@ -1,5 +1,7 @@
 """Loose tolerances are replaced, and the number of integration steps is limited."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from prbm.base import tolerances
 from prbm.base.errors import SimulationError
 from prbm.base.tolerances import TOLERANCE_USED_MAX
 from prbm.files.mechanism_file import shipped
-from prbm.hybrid import simulation
+from prbm.hybrid import effort
 from prbm.hybrid.simulation import Simulation
 from prbm.runs.run import simulate
 from support import energy_balance, mechanism
@@ -17,6 +19,11 @@ from support import energy_balance, mechanism
 each_engine = pytest.mark.parametrize("engine", [Simulation, KernelSimulation])
 THICK = {"flexure.thickness": 0.03}  # m, where 0.1 mm is meant
 LIMIT = f"enum {{ EFFORT_MAX = {tolerances.EFFORT_MAX} }};"
+NO_BURST = (
+    "generated.h",
+    f"enum {{ BURST_STEPS_MAX = {tolerances.BURST_STEPS_MAX} }};",
+    "enum { BURST_STEPS_MAX = 20 };",
+)
 FEW = ("generated.h", LIMIT, "enum { EFFORT_MAX = 20 };")
 
 
@@ -71,7 +78,7 @@ def test_the_effort_of_one_communication_step_is_limited(monkeypatch, engine):
     """A long step fails and changes nothing; shorter steps succeed."""
     guide = mechanism("PRBDM2R")
     if engine == "package":
-        monkeypatch.setattr(simulation, "EFFORT_MAX", 20)
+        monkeypatch.setattr(effort, "EFFORT_MAX", 20)
         sim = Simulation(guide)
     else:
         sim = KernelSimulation(guide, changes=(FEW,))
@@ -85,6 +92,52 @@ def test_the_effort_of_one_communication_step_is_limited(monkeypatch, engine):
     monkeypatch.undo()
     expected.advance(0.03)
     assert sim.outputs()["shuttle.x"] == pytest.approx(expected.outputs()["shuttle.x"], abs=1e-9)
+
+
+BURSTS = [
+    ("PRBDM2R", {"force.impulse.moment": 9128.0}),
+    ("PRBDM", {"force.impulse.y": 9128.0}),
+    ("PRBDM3R", {"force.impulse.moment": -1.7}),
+]
+
+
+@pytest.mark.parametrize(("model", "impulse"), BURSTS)
+def test_a_burst_of_steps_is_rejected_with_its_kinetic_energy(model, impulse):
+    """The steps are bounded however long the communication step; the message has the energy.
+
+    No energy is lost before: that of the message is at most the work of the impulse.
+    """
+    sim = KernelSimulation(mechanism(model))
+    sim.advance(1e-3)
+    before = sim.outputs()
+    sim.set(impulse)
+    for end in (2e-3, 0.1, 10.0):
+        with pytest.raises(KernelMistake, match="the kinetic energy is") as error:
+            sim.advance(end)
+        assert sim.outputs()["energy.kinetic"] == before["energy.kinetic"]
+    found = re.search(r"^(\d+) integration .* energy is (\S+) J", str(error.value))
+    assert found is not None
+    assert tolerances.BURST_STEPS_MAX <= int(found[1]) <= 2 * tolerances.BURST_STEPS_MAX
+    sim.advance(1e-3 + 1e-9)
+    out = sim.outputs()
+    assert 0.0 < float(found[2]) < 1.001 * (out["energy.work"] + before["energy.kinetic"])
+
+
+@pytest.mark.parametrize("engine", ["package", pytest.param("kernel", marks=pytest.mark.slow)])
+def test_the_steps_of_the_fastest_mode_are_no_burst(monkeypatch, engine):
+    """If no other steps are accepted, they suffice for a motion without events."""
+    axial, end = mechanism("PRBDM2RAxial"), 3e-3
+    if engine == "package":
+        monkeypatch.setattr(effort, "BURST_STEPS_MAX", 20)
+        sim = Simulation(axial)
+    else:
+        sim = KernelSimulation(axial, changes=(NO_BURST,))
+    sim.advance(end)
+    if engine == "package":
+        assert sim.step_count > 5 * 20
+    sim.set({"force.impulse.moment": 1.0})
+    with pytest.raises((SimulationError, KernelMistake), match="the kinetic energy is"):
+        sim.advance(end + 1e-3)
 
 
 @each_engine

@@ -145,6 +145,8 @@ STEPS_MAX = 1e9  # Longest steps to one target time; more are a mistake of units
 
 DEFAULT_EFFORT_MAX = 1000.0  # Integration steps in a step of the default experiment.
 EFFORT_MAX = 1000000  # Integration steps from one communication point to the next.
+BURST_STEPS_MAX = 10000  # Integration steps within EVENT_WINDOW_RTOL, besides the following.
+FASTEST_STEPS_FACTOR = 2.0  # Of the stable steps of the fastest mode: steps that are accepted.
 
 # --- communication times -----------------------------------------------------------------------
 TIME_SUM_RTOL = 1e-12  # Of a time: round-off of importers that add up steps.

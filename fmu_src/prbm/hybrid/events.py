@@ -144,13 +144,17 @@ def apply(configuration: Configuration, front: Front, event: Event) -> tuple[Fro
 
 @dataclass(frozen=True)
 class EventWindow:
-    """The number of events since a time [s], by which a simulation that chatters is rejected."""
+    """The number of events since a time [s], by which a simulation that chatters is rejected.
+
+    A change of the phase at a compliant stop does not count: force and motion are continuous there,
+    and the steps are counted, see :mod:`prbm.hybrid.effort`.
+    """
 
     since: float
     count: int = 0
 
-    def counting(self, event: Event, configuration: Configuration, front: Front) -> "EventWindow":
-        """Return the window with one more event, which occurs at the front.
+    def counting(self, event: Event, configuration: Configuration) -> "EventWindow":
+        """Return the window with one more event.
 
         Raises
         ------
@@ -158,6 +162,8 @@ class EventWindow:
             If there are more than ``EVENTS_MAX`` within ``EVENT_WINDOW_RTOL`` of the period.
         """
         window = self
+        if event.kind is EventKind.SWITCH:
+            return window
         if event.time - window.since > EVENT_WINDOW_RTOL * configuration.scales.time:
             window = EventWindow(event.time)
         window = EventWindow(window.since, window.count + 1)
@@ -165,20 +171,7 @@ class EventWindow:
             raise SimulationError(
                 f"more than {EVENTS_MAX} events (last: {event.kind.name.lower()}) within "
                 f"{event.time - window.since:.3g} s at t = {event.time:.9g} s: the contact "
-                f"chatters; {_remedy(configuration, front, event)}"
+                "chatters; raise rest_speed or damping.beta, lower the restitution, or give "
+                "the body room between its walls"
             )
         return window
-
-
-def _remedy(configuration: Configuration, front: Front, event: Event) -> str:
-    """Return what ends the chatter of a contact."""
-    if event.kind is EventKind.SWITCH:
-        depth = -float(front.gaps_and_rates()[0][event.contact])
-        return (
-            f"{configuration.mechanism.stops[event.contact].name} is indented by {depth:.3g} m: "
-            "reduce the preload or the stiffness"
-        )
-    return (
-        "raise rest_speed or damping.beta, lower the restitution, or give the body room between "
-        "its walls"
-    )

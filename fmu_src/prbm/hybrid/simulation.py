@@ -18,7 +18,6 @@ from ..base.errors import ParameterError, SimulationError
 from ..base.names import unknown
 from ..base.tolerances import (
     DENSE_FACTOR,
-    EFFORT_MAX,
     INTERPOLATION_FACTOR,
     NODE_STEP_RTOL,
     REVERSAL_DELAY_RTOL,
@@ -37,6 +36,7 @@ from ..mechanism.parameters import number
 from . import compliant, contact_modes, contact_peaks, events, impacts, snapshot, walls
 from .arc import Arc, Node
 from .configuration import Configuration, Magnitudes
+from .effort import Effort
 from .events import Event, EventKind, EventWindow
 from .front import Front, Latched
 from .given import changed_values, checked_times, start_values
@@ -213,7 +213,7 @@ class Simulation:
             If the time is not a number.
         SimulationError
             If the target time is invalid, the step size becomes too small, too many events
-            occur, or more than ``EFFORT_MAX`` integration steps are needed.
+            occur, or too many integration steps are needed, see :mod:`prbm.hybrid.effort`.
         """
         time = number("time", time, "s")
         if not math.isfinite(time) or time < self.time:
@@ -246,18 +246,15 @@ class Simulation:
         )
         if self.changed or moved != self.inputs.walls:
             self._restart(moved)
-        last = self.step_count + EFFORT_MAX
+        effort = Effort(self.front.time)
         while True:
             if self.pending is not None and self.pending.time <= time:
                 self._apply(self.pending)
             if self.front.time >= time:
                 break
-            if self.step_count >= last:
-                raise SimulationError(
-                    f"t = {time:.12g} s is not reached in {EFFORT_MAX} integration steps, which "
-                    f"end at t = {self.front.time:.9g} s with steps of {self.controller.h:.3g} s: "
-                    "make shorter communication steps, or check units and stiffnesses"
-                )
+            effort = effort.counting(
+                self.configuration, self.front, self.fastest, time, self.controller.h
+            )
             self._take_step()
         self.time = time
         self._output_cache = None
@@ -301,7 +298,7 @@ class Simulation:
 
     def _apply(self, event: Event) -> None:
         """Apply an event at the front."""
-        self.window = self.window.counting(event, self.configuration, self.front)
+        self.window = self.window.counting(event, self.configuration)
         front = contact_peaks.latched_until(self.configuration, self.front, self.arc, event.time)
         self._set_front(*events.apply(self.configuration, front, event))
         if event.kind is EventKind.IMPACT:

@@ -9,6 +9,7 @@
 #include "hybrid/configuration.h"
 #include "hybrid/contact_modes.h"
 #include "hybrid/contact_peaks.h"
+#include "hybrid/effort.h"
 #include "hybrid/errors.h"
 #include "hybrid/events.h"
 #include "hybrid/impacts.h"
@@ -165,20 +166,8 @@ typedef struct {
 
 typedef enum { REACHED, AT_EVENT, AFTER_STEPS } Ending;
 
-/* Reject a target time that has not been reached after the given number of integration steps. */
-static bool check_effort(const State *state, double time, int steps, Problem *problem) {
-    if (steps < EFFORT_MAX) {
-        return true;
-    }
-    return fail(problem,
-                "t = %.12g s is not reached in %d integration steps, which end at t = %.9g s with "
-                "steps of %.3g s: make shorter communication steps, or check units and "
-                "stiffnesses",
-                time, EFFORT_MAX, state->front_time, state->step_size);
-}
-
-/* Continue a communication step that has begun.  *effort: integration steps since it began. */
-static bool proceed(Simulation *sim, double time, Stops stops, int *effort, Ending *ending,
+/* Continue a communication step that has begun. */
+static bool proceed(Simulation *sim, double time, Stops stops, Effort *effort, Ending *ending,
                     Problem *problem) {
     State *state = &sim->state;
     for (int steps = 0;; steps++) {
@@ -195,7 +184,7 @@ static bool proceed(Simulation *sim, double time, Stops stops, int *effort, Endi
         if (*ending == REACHED || steps >= stops.steps) {
             return true;
         }
-        if (!check_effort(state, time, (*effort)++, problem) || !take_step(sim, problem)) {
+        if (!count_step(sim, time, effort, problem) || !take_step(sim, problem)) {
             return false;
         }
     }
@@ -207,16 +196,15 @@ static void interrupt(State *state, double now, double time) {
     state->interrupted = now < time;
 }
 
-static bool advance_some(Simulation *sim, double time, Stops stops, bool *event,
+static bool advance_some(Simulation *sim, double time, Stops stops, Effort *effort, bool *event,
                          Problem *problem) {
     State *state = &sim->state;
     Ending ending;
-    int effort = 0;
     if (!begin_step(sim, time, problem)) {
         return false;
     }
     state->interrupted = false;
-    if (!proceed(sim, time, stops, &effort, &ending, problem)) {
+    if (!proceed(sim, time, stops, effort, &ending, problem)) {
         return false;
     }
     *event = ending == AT_EVENT;
@@ -238,8 +226,8 @@ static void prepare_step(Simulation *sim, double time) {
     }
 }
 
-PRBM bool simulation_advance_some(Simulation *simulation, double time, bool each, bool *event,
-                                  Problem *problem) {
+PRBM bool simulation_advance_some(Simulation *simulation, double time, bool each, Effort *effort,
+                                  bool *event, Problem *problem) {
     Simulation *sim = simulation;
     const Stops stops = {true, each ? 1 : INT_MAX};
     *event = false;
@@ -251,15 +239,15 @@ PRBM bool simulation_advance_some(Simulation *simulation, double time, bool each
         return true;
     }
     prepare_step(sim, time);
-    return attempt(sim, advance_some(sim, time, stops, event, problem), problem);
+    return attempt(sim, advance_some(sim, time, stops, effort, event, problem), problem);
 }
 
 /* Begin a communication step at its first part, and continue it by a number of steps. */
-static bool advance_part(Simulation *sim, double time, int steps, int *effort, bool *reached,
+static bool advance_part(Simulation *sim, double time, int steps, Effort *effort, bool *reached,
                          Problem *problem) {
     State *state = &sim->state;
     Ending ending;
-    if (*effort == 0) {
+    if (effort->steps == 0) {
         if (!begin_step(sim, time, problem)) {
             return false;
         }
@@ -275,11 +263,11 @@ static bool advance_part(Simulation *sim, double time, int steps, int *effort, b
     return true;
 }
 
-PRBM bool simulation_advance_part(Simulation *simulation, double time, int steps, int *effort,
+PRBM bool simulation_advance_part(Simulation *simulation, double time, int steps, Effort *effort,
                                   bool *reached, Problem *problem) {
     Simulation *sim = simulation;
     *reached = false;
-    if (*effort == 0) {
+    if (effort->steps == 0) {
         if (!check_time(sim, time, problem)) {
             return false;
         }
@@ -298,7 +286,7 @@ PRBM void simulation_abandon(Simulation *simulation) {
 }
 
 PRBM bool simulation_advance(Simulation *simulation, double time, Problem *problem) {
-    int effort = 0;
+    Effort effort = {0, 0, 0.0};
     bool reached;
     return simulation_advance_part(simulation, time, INT_MAX, &effort, &reached, problem);
 }

@@ -19,7 +19,7 @@ struct Engine {
     double *record;   /* (room, prbm_impact_size) */
     int count, room;  /* numbers of impacts */
     bool incomplete;  /* an impact could not be recorded */
-    int effort;       /* integration steps of an advance that is unfinished, 0: none is */
+    Effort effort;    /* of an advance that is unfinished; no steps: none is */
     int before;       /* number of impacts before it */
 };
 
@@ -168,7 +168,7 @@ EXPORTED int prbm_advance(Engine *engine, double time, char *message) {
     Problem problem = {""};
     Simulation *sim = engine->simulation;
     bool reached;
-    if (engine->effort == 0) {
+    if (engine->effort.steps == 0) {
         engine->before = engine->count;
         engine->incomplete = false;
     }
@@ -182,7 +182,7 @@ EXPORTED int prbm_advance(Engine *engine, double time, char *message) {
     if (ok && !reached) {
         return ENGINE_UNFINISHED;
     }
-    engine->effort = 0;
+    engine->effort.steps = 0;
     if (!succeed(ok, &problem, message)) {
         engine->count = engine->before;
         return -1;
@@ -191,10 +191,10 @@ EXPORTED int prbm_advance(Engine *engine, double time, char *message) {
 }
 
 EXPORTED void prbm_abandon(Engine *engine) {
-    if (engine->effort > 0) {
+    if (engine->effort.steps > 0) {
         simulation_abandon(engine->simulation);
         engine->count = engine->before;
-        engine->effort = 0;
+        engine->effort.steps = 0;
     }
 }
 

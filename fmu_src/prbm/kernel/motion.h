@@ -69,18 +69,25 @@ PRBM double simulation_requested(const Simulation *simulation, double tolerance)
 
 /* Simulate to a time, and apply the events before it. */
 PRBM bool simulation_advance(Simulation *simulation, double time, Problem *problem);
-/* The same in parts of at most so many integration steps, with the same result.  *effort must be 0
- * at the first part; it is the number of steps so far.  *reached: the time has been reached.  Until
- * then only this function and simulation_abandon may be called. */
-PRBM bool simulation_advance_part(Simulation *simulation, double time, int steps, int *effort,
+/* Integration steps of a communication step. */
+typedef struct {
+    int steps;    /* number so far */
+    int before;   /* number of them before the present span of time */
+    double since; /* begin of that span [s] */
+} Effort;
+/* The same in parts of at most so many integration steps, with the same result.  effort->steps must
+ * be 0 at the first part.  *reached: the time has been reached.  Until then only this function and
+ * simulation_abandon may be called. */
+PRBM bool simulation_advance_part(Simulation *simulation, double time, int steps, Effort *effort,
                                   bool *reached, Problem *problem);
 /* Restore the state before the first part. */
 PRBM void simulation_abandon(Simulation *simulation);
 /* Simulate to a time, but return early at the first event, or after an internal step if each is
  * true.  simulation_time returns the time reached.  *event: whether an event is pending, which
- * simulation_handle_event applies.  The walls move as in a step to the given time. */
-PRBM bool simulation_advance_some(Simulation *simulation, double time, bool each, bool *event,
-                                  Problem *problem);
+ * simulation_handle_event applies.  The walls move as in a step to the given time.  effort->steps must
+ * be 0 at the first call of a communication step. */
+PRBM bool simulation_advance_some(Simulation *simulation, double time, bool each, Effort *effort,
+                                  bool *event, Problem *problem);
 /* Event mode: apply the pending event, if any, changed impulses and changed velocities of walls. */
 PRBM bool simulation_handle_event(Simulation *simulation, Problem *problem);
 

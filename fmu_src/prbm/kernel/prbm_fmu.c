@@ -65,6 +65,7 @@
 #include "hybrid/impacts.c"
 #include "hybrid/moved.c"
 #include "hybrid/stability.c"
+#include "hybrid/effort.c"
 #include "hybrid/peaks.c"
 #include "hybrid/release.c"
 #include "hybrid/guards.c"

@@ -64,9 +64,10 @@ static bool advance_by_events(Instance *instance, double target, Outcome *outcom
     Simulation *simulation = instance->simulation;
     bool stops = instance->event_mode && instance->early_return, each = instance->update != NULL;
     bool enough = false;
+    Effort effort = {0, 0, 0.0};
     do {
         bool event = false;
-        if (!simulation_advance_some(simulation, target, each, &event, problem)) {
+        if (!simulation_advance_some(simulation, target, each, &effort, &event, problem)) {
             return false;
         }
         outcome->event |= event && instance->event_mode;

@@ -202,6 +202,14 @@ static bool point_mobility(Simulation *sim, int stop, double *result, Problem *p
     return ok;
 }
 
+PRBM bool damping_rate(Simulation *sim, int stop, double depth, double *rate, Problem *problem) {
+    const ComplianceLaw *law = &sim->equations.laws[stop];
+    double speed = sim->state.touching[stop].reference_speed;
+    bool ok = point_mobility(sim, stop, rate, problem);
+    *rate *= law->damping * elastic_force(law, depth) / speed;
+    return ok;
+}
+
 static void shorten_step(Simulation *sim, int stop, double inverse_mass) {
     const Touching *touching = &sim->state.touching[stop];
     const ComplianceLaw *law = &sim->equations.laws[stop];
@@ -216,8 +224,7 @@ static void shorten_step(Simulation *sim, int stop, double inverse_mass) {
     sim->state.step_size = lesser(h, sim->state.step_size);
 }
 
-/* The kinetic energy at the front with the rates v. */
-static double kinetic_energy(Simulation *sim, const double *v) {
+PRBM double kinetic_energy(Simulation *sim, const double *v) {
     size_t mark = sim->scratch.used;
     int n = system_of(sim)->n;
     ContactProblem *at = contact_problem_at(sim, sim->state.front);

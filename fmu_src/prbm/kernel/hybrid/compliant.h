@@ -18,5 +18,9 @@ PRBM bool settles_here(Simulation *sim, bool *result, Problem *problem);
  * states of the stop. */
 PRBM void fold_give(Wall *wall, double t, double *extra);
 PRBM void fold_gives(Simulation *sim); /* of all compliant stops at the front */
+/* The kinetic energy at the front with the rates v [J]. */
+PRBM double kinetic_energy(Simulation *sim, const double *v);
+/* Compute the rate at which the damping of a pressed contact changes its speed [1/s]. */
+PRBM bool damping_rate(Simulation *sim, int stop, double depth, double *rate, Problem *problem);
 
 #endif
