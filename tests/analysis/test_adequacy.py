@@ -90,6 +90,8 @@ def test_a_finding_names_shape_displacement_both_values_and_remedy():
     assert str(frequency).endswith("set axial = true for the flexures")
     unstable = replace(frequency, found=-3.0)
     assert "mode 2 is unstable with inextensible flexures" in str(unstable)
+    free = replace(frequency, found=0.0)
+    assert "mode 2 is free with inextensible flexures" in str(free)
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from scipy.special import ellipk
 
-from prbm.analysis.equilibria import rest_positions
-from prbm.analysis.load_path import CLOSED, load_path
+from prbm.analysis.holding import curve
+from prbm.analysis.load_path import load_path
+from prbm.analysis.path_following import CLOSED
 from prbm.base.errors import EquilibriumError
 from prbm.files.mechanism_file import load
 from prbm.mechanics.assembly import assemble
@@ -134,7 +135,7 @@ def test_the_branch_of_a_buckled_leaf_is_the_elastica():
     guide = replace(column, flexure_types=leaf)
     system = pushed(guide, **{"gravity.y": 0.0})
     critical = math.pi**2 * 200e9 * 20e-3 * 1e-3**3 / 12 / (4 * 0.3**2)
-    path = load_path(system, {}, {"push.y": -1.6 * critical}, branches=True)
+    path = load_path(system, {}, {"push.y": -1.6 * critical}, branches=1)
     (branch,) = path.branches  # The other one is its mirror image.
     assert branch.ended is None
     assert branch.points[0].share * 1.6 == pytest.approx(1.0, rel=1e-6)
@@ -150,9 +151,9 @@ def test_the_branch_of_a_buckled_leaf_is_the_elastica():
 def test_a_bistable_mechanism_rests_again_where_the_load_has_gone():
     """The path of CurvedBistable passes its rest positions; those of a held path are the same."""
     system = pushed(mechanism("CurvedBistable"), **{"gravity.y": 0.0})
-    path = load_path(system, {}, {"push.y": -40.0}, branches=True)
+    path = load_path(system, {}, {"push.y": -40.0}, branches=1)
     rests = [(point, system.amount(point.shape.q)) for kind, point in path.events if kind == "rest"]
-    expected = rest_positions(system, np.linspace(3e-3, 6.5e-3, 8))
+    expected = curve(system, [3e-3, 6.5e-3]).rests
     assert [place for _, place in rests] == pytest.approx([x.displacement for x in expected])
     assert [point.unstable == 0 for point, _ in rests] == [x.stable for x in expected]
     (snap,) = (x for x in path.branches if x.points[0].unstable == 0)

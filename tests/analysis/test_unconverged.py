@@ -1,11 +1,8 @@
 """Searches of the tools that do not converge are errors with a remedy."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 
-from prbm.analysis import equilibria
 from prbm.analysis.fit import Free, Frequency, fit, problem, valley
 from prbm.base.errors import EquilibriumError
 from prbm.data.uncertainty import Estimate, EvaluationError
@@ -20,25 +17,6 @@ from support import mechanism
 def bistable():
     guide = mechanism("Bistable")
     return assemble(guide, guide.values())
-
-
-def test_an_equilibrium_that_is_not_found_is_rejected(monkeypatch):
-    monkeypatch.setattr(equilibria, "brentq", partial(equilibria.brentq, maxiter=1))
-    system = bistable()
-    rise = system.values["strut.rise"]
-    with pytest.raises(EquilibriumError, match=r"between .* m was not found in 1 iterations"):
-        equilibria.rest_positions(system, [0.45 * rise, 1.7 * rise])
-
-
-def test_a_jump_of_the_holding_force_through_zero_is_not_a_rest_position(monkeypatch):
-    """A steep, continuous force has a rest position; a force that jumps from -1 to 1 N has none."""
-    system = bistable()
-    monkeypatch.setattr(equilibria, "holding_force", lambda _, d: np.tanh((d - 3e-3) / 1e-7))
-    (rest,) = equilibria.rest_positions(system, [0.0, 5e-3])
-    assert rest.displacement == pytest.approx(3e-3, abs=1e-12)
-    monkeypatch.setattr(equilibria, "holding_force", lambda _, d: 1.0 if d > 3e-3 else -1.0)
-    with pytest.raises(EquilibriumError, match=r"changes its sign in a jump at 0\.003 m"):
-        equilibria.rest_positions(system, [0.0, 5e-3])
 
 
 def test_a_valley_whose_fits_do_not_converge_is_rejected(monkeypatch):

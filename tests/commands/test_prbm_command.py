@@ -221,13 +221,32 @@ def test_rest_positions_and_snap_through_of_the_bistable_mechanism_are_symmetric
     assert run("equilibrium Bistable --from -1mm --to 25mm --points 20 --out .") == cli.OK
     rows = table("Bistable-stability.csv")
     stable, unstable, snap = "stable rest position", "unstable rest position", "snap-through"
-    assert rows["kind"] == [stable, unstable, stable, snap, snap]
+    assert rows["kind"] == [stable, unstable, stable, "limit point", "limit point", snap, snap]
     places = np.array(rows["displacement [m]"], float)
     rise = load("Bistable").values()["strut.rise"]
     np.testing.assert_allclose(places[:3], [0.0, rise, 2 * rise], atol=1e-9)
     assert places[3] + places[4] == pytest.approx(2 * rise, abs=1e-7)
     forces = np.array(rows["force [N]"], float)
     assert forces[3] == pytest.approx(-forces[4], rel=1e-9)
+    np.testing.assert_array_equal([places[5:], forces[5:]], [places[3:5], forces[3:5]])
+
+
+def test_a_held_curve_names_its_events_and_the_branches_at_them(capsys):
+    """The curved beams buckle before the force has its extremum; all branches are unstable."""
+    line = "equilibrium CurvedBistable --set gravity.y=0 --from 0 --to 2mm --points 9 --branches"
+    assert run(f"{line} --out .") == cli.OK
+    printed = capsys.readouterr().out
+    assert "bifurcation at 1.39" in printed
+    assert "bifurcation of 3 directions at 1.39" in printed
+    assert "limit point at 1.74" in printed
+    assert "branch 1 from 1.39" in printed
+    rows = table("CurvedBistable-branches.csv")
+    assert set(rows["branch"]) >= {"1", "2"}
+    assert max(np.array(rows["force [N]"], float)) < 17.5
+    held = table("CurvedBistable-equilibrium.csv")
+    held_unstable = np.array(held["unstable directions, held"], int)
+    assert np.array_equal(held_unstable > 0, np.array(held["displacement [m]"], float) > 1.391e-3)
+    assert run("equilibrium CurvedBistable --from 0 --to 2mm --branches -1") == cli.MISTAKE
 
 
 def test_small_loads_on_a_loaded_body_have_its_compliance_and_stiffness(capsys):
@@ -272,7 +291,7 @@ def test_a_load_that_varies_passes_limit_points_and_bifurcations(capsys):
     assert run(line) == cli.OK
     rows = table("CurvedBistable-load-path.csv")
     printed = capsys.readouterr().out
-    assert [x for x in rows["event"] if x][:2] == ["bifurcation", "limit point"]
+    assert [x for x in rows["event"] if x][:3] == ["bifurcation", "bifurcation", "limit point"]
     assert float(rows["force.y [N]"][-1]) == -40.0
     assert "bifurcation at 1.39" in printed
     assert "limit point at 1.74" in printed

@@ -8,8 +8,8 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from prbm.analysis import holding
-from prbm.analysis.equilibria import force_curve, holding_force, rest_positions, snap
 from prbm.mechanics.assembly import assemble
+from prbm.mechanics.statics import equilibrium
 from prbm.plots.holding import holding_figure
 from support import mechanism, run
 
@@ -43,19 +43,23 @@ def speed(start: float, d: float) -> float:
 
 def test_holding_force_is_that_of_four_struts() -> None:
     d = np.linspace(-0.3, 2.4, 28) * RISE
-    np.testing.assert_allclose(force_curve(SYSTEM, d), [force(x) for x in d], atol=1e-9)
+    found = holding.curve(SYSTEM, d).points
+    np.testing.assert_array_equal([point.displacement for point in found], d)
+    np.testing.assert_allclose([point.force for point in found], [force(x) for x in d], atol=1e-9)
+    one_by_one = [equilibrium(SYSTEM, x).force for x in d]
+    np.testing.assert_allclose(one_by_one, [force(x) for x in d], atol=1e-9)
 
 
 def test_there_are_two_stable_equilibria_and_an_unstable_one_between_them() -> None:
     """The shapes are the straight one, its mirror image, and that with the shortest struts."""
-    found = rest_positions(SYSTEM, np.array([-0.3, 0.4, 1.3, 2.3]) * RISE)
+    found = holding.curve(SYSTEM, np.array([-0.3, 2.3]) * RISE).rests
     assert [rest.stable for rest in found] == [True, False, True]
     np.testing.assert_allclose([r.displacement for r in found], [0, RISE, 2 * RISE], atol=1e-12)
 
 
 @pytest.mark.parametrize("ends", [(0.0, 2.0), (-0.5, 1.0), (0.0, 1.0)])
 def test_rest_positions_at_the_ends_of_a_range_are_found(ends) -> None:
-    found = rest_positions(SYSTEM, np.linspace(*ends, 12) * RISE)
+    found = holding.curve(SYSTEM, np.array(ends) * RISE).rests
     places = [k * RISE for k in (0, 1, 2) if ends[0] <= k <= ends[1]]
     np.testing.assert_allclose([r.displacement for r in found], places, atol=1e-9)
 
@@ -65,13 +69,9 @@ def test_snap_force_is_the_extremum_of_the_closed_form() -> None:
     minimum = minimize_scalar(
         lambda d: -force(d), bounds=(0, RISE), method="bounded", options=options
     )
-    found = snap(SYSTEM, 0.0, RISE)
-    assert found is not None
-    d, largest = found
+    (d, largest), back = holding.curve(SYSTEM, np.array([-0.1, 2.1]) * RISE).snaps
     assert largest == pytest.approx(-minimum.fun, rel=1e-12)
     assert d == pytest.approx(minimum.x, abs=1e-7)  # The extremum is flat.
-    back = snap(SYSTEM, 2 * RISE, RISE)
-    assert back is not None
     assert back[1] == pytest.approx(-largest, rel=1e-9)
 
 
@@ -90,7 +90,7 @@ def test_clamping_the_struts_to_the_ground_adds_their_bending_stiffness() -> Non
     system = assemble(clamped, clamped.values(values))
     EI = EA * values["strut.thickness"] ** 2 / 12
     across = 4 * 3 * EI / LENGTH**3 * (SPAN / LENGTH) ** 2
-    additional = (holding_force(system, 1e-6) - force(1e-6)) / 1e-6
+    additional = (equilibrium(system, 1e-6).force - force(1e-6)) / 1e-6
     assert additional == pytest.approx(across, rel=0.01)
 
 

@@ -19,6 +19,8 @@ from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
 
+import numpy as np
+
 from ..base.errors import ParameterError, PrbmError
 from ..base.unit_text import frequency_text, length_unit
 from ..mechanics.assembly import assemble
@@ -135,7 +137,7 @@ class Finding:
         found, better = (_text(self.quantity, x) for x in (self.found, self.better))
         if self.quantity is Quantity.FREQUENCY:
             subject = f"{self.where}: mode {self.mode} is"
-            found, better = (x if x == "unstable" else f"at {x}" for x in (found, better))
+            found, better = (x if x in WORDS else f"at {x}" for x in (found, better))
         else:
             subject = f"{self.where}: the modal restitution of a rigid impact is"
         if self.cause is Cause.INEXTENSIBLE:
@@ -156,10 +158,13 @@ class Skipped:
         return f"the flexure model was not compared with a finer one: {self.reason}"
 
 
+WORDS = ("free", "unstable")  # Modes without a stiffness, and with a negative one.
+
+
 def _text(quantity: Quantity, x: float) -> str:
     if quantity is Quantity.RESTITUTION:
         return f"{x:.3f}"
-    return frequency_text(x) if x > 0.0 else "unstable"
+    return frequency_text(x) if x > 0.0 else WORDS[int(x < 0.0)]
 
 
 # --- the comparison -------------------------------------------------------------------------------
@@ -271,7 +276,9 @@ class _Model:
                 result[Quantity.RESTITUTION, 0] = C
         else:
             held = equilibrium(system, shape.held, dict(shape.loads))
-        lowest = modes(system, held).frequency[:count].tolist()
+        found = modes(system, held)
+        acting = np.abs(found.frequency) > found.rounding
+        lowest = np.where(acting, found.frequency, 0.0)[:count].tolist()
         return result | {(Quantity.FREQUENCY, k): f for k, f in enumerate(lowest, start=1)}
 
 

@@ -15,13 +15,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..base.errors import EquilibriumError
 from ..base.progress import Progress
-from ..mechanics.arrays import Real
-from ..mechanics.modal import modes
+from ..mechanics.arrays import Real, Whole
+from ..mechanics.modal import modes, moved_by, unstable_directions
 from ..mechanics.statics import Equilibrium, equilibrium, holding_stiffness
 from ..mechanics.system import System, unit
-from .equilibria import RestPosition, rest_positions, snap
+from .equilibrium_curve import LoadPath, PathPoint
+from .load_path import HeldPath, held_path
+from .path_following import REST, TURN
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,8 @@ class Held:
     frequency : float
         Fundamental frequency of the free body about the shape, with the force as a constant load
         [Hz]; negative if unstable.
+    unstable, unstable_held : int
+        Numbers of unstable directions of the free body under that load, and of the held one.
     """
 
     displacement: float
@@ -53,6 +56,8 @@ class Held:
     across: float
     angle: float
     frequency: float
+    unstable: int
+    unstable_held: int
 
 
 def described(system: System, displacement: float, shape: Equilibrium) -> Held:
@@ -70,9 +75,12 @@ def described(system: System, displacement: float, shape: Equilibrium) -> Held:
     release = system.mechanism.release
     frame, e = system.released, system.directions(shape.q)
     moved = unit(release.direction).conjugate() * complex(frame.c + frame.A @ e - frame.drawn)
+    found = modes(system, shape)
+    along = moved_by(system, shape.q, found.shape)
     return Held(
         displacement, shape.force, holding_stiffness(system, shape), moved.imag,
-        float(shape.q[frame.j]), float(modes(system, shape).frequency[0]),
+        float(shape.q[frame.j]), float(found.frequency[0]),
+        unstable_directions(found.frequency), unstable_directions(found.frequency, along),
     )  # fmt: skip
 
 
@@ -88,31 +96,109 @@ def held(system: System, displacement: float) -> Held:
 
 
 @dataclass(frozen=True)
+class RestPosition:
+    """A static shape of the mechanism without a holding force.
+
+    Parameters
+    ----------
+    displacement : float
+        Displacement of the released body along the direction of the release, from the straight
+        shape [m]; its rotation [rad] if the release is by an angle.
+    stable : bool
+        Whether the shape is stable.
+    shape : Equilibrium
+        The shape.
+    """
+
+    displacement: float
+    stable: bool
+    shape: Equilibrium
+
+
+@dataclass(frozen=True)
+class Event:
+    """A limit point or a bifurcation of the held shapes.
+
+    Parameters
+    ----------
+    kind : str
+        ``"limit point"``, where the holding force has an extremum; ``"bifurcation"``, where the
+        mechanism buckles out of the shapes that are followed; ``"displacement limit"``, where the
+        displacement turns back, so that the held mechanism snaps.
+    displacement : float
+        Displacement [m], or rotation [rad].
+    force : float
+        Holding force [N], or moment [N m].
+    critical : int
+        Number of directions that become unstable or stable under a dead load.
+    """
+
+    kind: str
+    displacement: float
+    force: float
+    critical: int
+
+
+@dataclass(frozen=True)
+class Branch:
+    """Shapes that branch off at a bifurcation.
+
+    Parameters
+    ----------
+    displacements, forces : (k,)
+        Displacements [m] or rotations [rad], and holding forces [N] or moments [N m].
+    unstable : (k,) int
+        Numbers of unstable directions under dead loads.
+    rests : tuple of RestPosition
+        Rest positions, in the order of the branch.
+    events : tuple of Event
+        Limit points and bifurcations, in the order of the branch.
+    ended : str or None
+        Why the branch ends within the range; None: it does not.
+    """
+
+    displacements: Real
+    forces: Real
+    unstable: Whole
+    rests: tuple[RestPosition, ...]
+    events: tuple[Event, ...]
+    ended: str | None
+
+
+@dataclass(frozen=True)
 class Curve:
     """The holding force over a range of displacements.
 
     Parameters
     ----------
     points : tuple of Held
-        Points in the order of the displacements.
+        Points in the order of the path: at a displacement there are several if the path turns back.
     rests : tuple of RestPosition
-        Rest positions, in the order of the displacements.
+        Rest positions, in the order of the path.
+    events : tuple of Event
+        Limit points and bifurcations, in the order of the path.
     snaps : tuple of (float, float)
         Displacement [m] and holding force [N] at which a growing load that moves the mechanism
-        from a stable rest position towards a neighbouring one makes it snap.
+        from a stable rest position towards a neighbouring one makes it snap: the first limit point
+        or bifurcation.
+    branches : tuple of Branch
+        The branches at the bifurcations, if they have been followed.
     ended : str or None
         Why the curve ends before the last displacement; None: it does not.
     """
 
     points: tuple[Held, ...]
     rests: tuple[RestPosition, ...]
+    events: tuple[Event, ...]
     snaps: tuple[tuple[float, float], ...]
+    branches: tuple["Branch", ...] = ()
     ended: str | None = None
 
 
 def curve(
-    system: System, displacements: Sequence[float] | Real, progress: Progress | None = None
-) -> Curve:
+    system: System, displacements: Sequence[float] | Real, progress: Progress | None = None,
+    branches: int = 0,
+) -> Curve:  # fmt: skip
     """Return the holding forces at displacements, with rest positions and snap-throughs.
 
     Parameters
@@ -120,36 +206,73 @@ def curve(
     system : System
         The mechanism.
     displacements : (k,)
-        Increasing displacements [m], or rotations [rad].  Between neighbouring displacements the
-        force changes its sign at most once.
+        Increasing displacements [m], or rotations [rad].  The path is followed between the first
+        and the last one.
     progress : callable or None
         Called with the completed fraction, from 0 to 1.
+    branches : int
+        Branches to follow, see :func:`prbm.analysis.load_path.load_path`.
 
     Raises
     ------
     EquilibriumError
-        If no static shape with one of the first two displacements is found, or the search for a
-        rest position fails.
+        If no static shape with the displacement at which the path begins is found, or a motion of
+        it has no stiffness.
     """
-    points: list[Held] = []
-    ended = None
-    for x in displacements:
-        try:
-            points.append(held(system, float(x)))
-        except EquilibriumError as error:
-            if len(points) < 2:
-                raise
-            ended = str(error)
-            break
+    low, high = float(displacements[0]), float(displacements[-1])
+    followed = held_path(system, low, high, branches)
+    shapes = followed.shapes(displacements)
+    points = []
+    for k, (x, shape) in enumerate(shapes):
+        points.append(described(system, x, shape))
         if progress is not None:
-            progress(len(points) / len(displacements))
-    found = rest_positions(
-        system, displacements[: len(points)], np.array([point.force for point in points])
+            progress((k + 1) / len(shapes))
+    path = followed.path
+    return Curve(
+        tuple(points),
+        *_events(followed, path),
+        _snaps(followed),
+        tuple(
+            Branch(
+                np.array([followed.amount(p) for p in one.points]),
+                np.array([followed.force(p) for p in one.points]),
+                np.array([p.unstable for p in one.points]),
+                *_events(followed, one),
+                one.ended,
+            )
+            for one in path.branches
+        ),
+        path.ended,
     )
-    snaps = [
-        snap(system, start.displacement, end.displacement)
-        for pair in pairwise(found)
-        for start, end in (pair, pair[::-1])
-        if start.stable
-    ]
-    return Curve(tuple(points), tuple(found), tuple(x for x in snaps if x is not None), ended)
+
+
+def _events(
+    followed: HeldPath, path: LoadPath
+) -> tuple[tuple[RestPosition, ...], tuple[Event, ...]]:
+    """Return the rest positions, and the limit points and bifurcations of a path."""
+    rests = tuple(_rest(followed, p) for kind, p in path.events if kind == REST)
+    return rests, tuple(
+        Event(kind, followed.amount(p), followed.force(p), p.critical)
+        for kind, p in path.events
+        if kind != REST
+    )
+
+
+def _rest(followed: HeldPath, point: PathPoint) -> RestPosition:
+    return RestPosition(followed.amount(point), point.unstable == 0, followed.shape(point))
+
+
+def _snaps(followed: HeldPath) -> tuple[tuple[float, float], ...]:
+    """Return where a growing load makes the mechanism snap, from each stable rest position.
+
+    The load moves it towards the neighbouring rest positions.
+    """
+    events = [(kind, p) for kind, p in followed.path.events if kind != TURN]
+    rests = [k for k, (kind, _) in enumerate(events) if kind == REST]
+    found = []
+    for first, last in pairwise(rests):
+        between = [p for _, p in events[first + 1 : last]]
+        for start, order in ((first, between), (last, between[::-1])):
+            if between and events[start][1].unstable == 0:
+                found.append((followed.amount(order[0]), followed.force(order[0])))
+    return tuple(found)

@@ -231,7 +231,10 @@ def _equilibrium(commands: Commands) -> None:
     load_argument(parser)
     text = "follow the shapes while a load varies, such as force.y=0:-20N, through limit points"
     add("--vary", metavar="NAME=A:B", help=text)
-    add("--branches", action="store_true", help="follow the branches of --vary at bifurcations")
+    add(
+        "--branches", type=int, nargs="?", const=1, default=0, metavar="DEPTH",
+        help="follow the branches at bifurcations, too; 2: also their branches",
+    )  # fmt: skip
     add("--stiffness", metavar="BODY", help="print the compliance and stiffness matrix of a body")
     add("--at", metavar="BODY.POINT", help="point of --stiffness (default: the centre of mass)")
     add("--from", dest="start", metavar="A", help="first displacement of a force curve [m]")

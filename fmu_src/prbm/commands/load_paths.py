@@ -4,7 +4,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..analysis.load_path import LoadPath, PathPoint, load_path
+from ..analysis.equilibrium_curve import LoadPath, PathPoint
+from ..analysis.load_path import load_path
 from ..files.settings import UserMistake, quantity
 from ..mechanics.arrays import Real
 from ..mechanics.inputs import load_units
@@ -55,7 +56,7 @@ def load_text(loads: Mapping[str, float]) -> str:
 
 def vary(
     text: str, loads: Mapping[str, float], mechanism: Mechanism, system: System, output: Output,
-    branches: bool = False,
+    branches: int = 0,
 ) -> None:  # fmt: skip
     """Print, write and draw the shapes while a load varies, with limit points and bifurcations."""
     name, ends, si = given_load(mechanism, "--vary", text)
@@ -76,9 +77,16 @@ def vary(
         _print(one, *curve, label, system)
     output.table(
         f"{mechanism.name}-load-path.csv",
-        ["branch", f"{unit.amount} [{unit.si}]", label, "unstable directions", "event"],
         [
-            [number, float(x), float(load), point.unstable, _event(one, point)]
+            "branch",
+            f"{unit.amount} [{unit.si}]",
+            label,
+            "unstable directions",
+            "critical directions",
+            "event",
+        ],
+        [
+            [number, float(x), float(load), point.unstable, point.critical, _event(one, point)]
             for number, (one, curve) in enumerate(zip(paths, curves, strict=True))
             for x, load, point in zip(*curve, one.points, strict=True)
         ],
@@ -94,6 +102,12 @@ def _curve(system: System, path: LoadPath, low: float, high: float) -> tuple[Rea
     """Return the displacements and the loads of the points of a path."""
     amounts = np.array([system.amount(point.shape.q) for point in path.points])
     return amounts, np.array([low + point.share * (high - low) for point in path.points])
+
+
+def _directions(point: PathPoint) -> str:
+    """Return the number of unstable directions as text, with those that are critical."""
+    critical = f" and {point.critical} critical" if point.critical else ""
+    return f"{point.unstable}{critical}"
 
 
 def _event(path: LoadPath, point: PathPoint) -> str:
@@ -112,7 +126,7 @@ def _print(
     chosen = sorted({*range(0, count, every), count - 1})
     rows = [
         [rounded(unit.factor * amounts[k], scale, ".5g"), rounded(varied[k], largest),
-         str(path.points[k].unstable)]
+         _directions(path.points[k])]
         for k in chosen
     ]  # fmt: skip
     print(aligned([f"at [{unit.shown}]", label, "unstable directions"], rows))

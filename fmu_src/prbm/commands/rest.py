@@ -123,8 +123,10 @@ def _check_options(options: argparse.Namespace) -> None:
         raise UserMistake("--load and --stiffness exclude --from and --to: give one or the other")
     if options.vary and (ranged or options.held or options.stiffness):
         raise UserMistake("--vary excludes --held, --stiffness, --from and --to")
-    if options.branches and not options.vary:
-        raise UserMistake("--branches are those of --vary NAME=A:B: give both")
+    if options.branches < 0:
+        raise UserMistake(f"--branches {options.branches}: must be at least 0")
+    if options.branches and not (options.vary or ranged):
+        raise UserMistake("--branches are those of --vary NAME=A:B, or of --from and --to")
     if options.at and not options.stiffness:
         raise UserMistake("--at is the point of --stiffness BODY: give both")
 
@@ -142,23 +144,24 @@ def _range(
         raise UserMistake(f"--from {low:g} {unit.si} must be below --to {high:g} {unit.si}")
     if not 3 <= options.points <= POINTS_MAX:
         raise UserMistake(f"--points {options.points}: must lie between 3 and {POINTS_MAX}")
-    curve = holding.curve(system, np.linspace(low, high, options.points), reporter())
-    every = -(-options.points // 11)
+    amounts = np.linspace(low, high, options.points)
+    curve = holding.curve(system, amounts, reporter(), options.branches)
+    every = -(-len(curve.points) // 11)
     _print(head, curve.points[::every], system)
     if every > 1:
         print(f"every {every}th of {len(curve.points)} points; write all with --out DIR")
+    if any(point.unstable_held for point in curve.points):
+        print("*: unstable also while it is held, or beyond a displacement limit")
     if curve.ended:
-        print(
-            f"the curve ends at {unit.factor * curve.points[-1].displacement:.6g} {unit.shown}: "
-            f"{curve.ended}"
-        )
-    for rest in curve.rests:
-        _print_rest(rest.displacement, rest.stable, system)
+        print(f"the curve ends: {curve.ended}")
+    _print_events(curve.rests, curve.events, system)
     if not curve.rests:
         print("no rest position in this range")
+    effort = unit.si_effort.replace(".", " ")
     for x, force in curve.snaps:
-        effort = unit.si_effort.replace(".", " ")
         print(f"snap-through at {unit.factor * x:.6g} {unit.shown}, under {force:.5g} {effort}")
+    for number, branch in enumerate(curve.branches, 1):
+        _print_branch(number, branch, system)
     output.table(f"{mechanism.name}-equilibrium.csv", _csv_head(unit), _rows(curve.points))
     output.table(
         f"{mechanism.name}-stability.csv",
@@ -166,9 +169,23 @@ def _range(
         [
             *([f"{_stability(x.stable)} rest position", x.displacement, 0.0]
               for x in curve.rests),
+            *([event.kind, event.displacement, event.force] for event in curve.events),
             *(["snap-through", x, force] for x, force in curve.snaps),
         ],
     )  # fmt: skip
+    if curve.branches:
+        output.table(
+            f"{mechanism.name}-branches.csv",
+            ["branch", f"{unit.amount} [{unit.si}]", f"{unit.effort} [{unit.si_effort}]",
+             "unstable directions"],
+            [
+                [number, float(x), float(force), int(count)]
+                for number, branch in enumerate(curve.branches, 1)
+                for x, force, count in zip(
+                    branch.displacements, branch.forces, branch.unstable, strict=True
+                )
+            ],
+        )  # fmt: skip
     turns = mechanism.release.turns
     output.figure(
         f"{mechanism.name}-equilibrium.png",
@@ -176,8 +193,51 @@ def _range(
     )
 
 
+def _print_branch(number: int, branch: holding.Branch, system: System) -> None:
+    """Print where a branch begins, its stable part and its largest force."""
+    unit = held_unit(system.mechanism)
+    effort = unit.si_effort.replace(".", " ")
+    largest = branch.forces[np.abs(branch.forces).argmax()]
+    stable = branch.displacements[1:][branch.unstable[1:] == 0]
+    part = (
+        f"stable from {unit.factor * stable.min():.6g} to {unit.factor * stable.max():.6g} "
+        f"{unit.shown}"
+        if len(stable)
+        else "unstable"
+    )
+    print(
+        f"branch {number} from {unit.factor * branch.displacements[0]:.6g} {unit.shown}, under "
+        f"{branch.forces[0]:.5g} {effort}: {part}; largest force {largest:.5g} {effort}; "
+        f"{branch.ended or 'it leaves the range'}"
+    )
+    for rest in branch.rests:
+        if rest.stable:
+            _print_rest(rest.displacement, rest.stable, system)
+
+
+def _print_events(
+    rests: Sequence[holding.RestPosition], events: Sequence[holding.Event], system: System
+) -> None:
+    """Print rest positions, and limit points and bifurcations with their forces."""
+    unit = held_unit(system.mechanism)
+    for rest in rests:
+        _print_rest(rest.displacement, rest.stable, system)
+    for event in events:
+        several = f" of {event.critical} directions" if event.critical > 1 else ""
+        print(
+            f"{event.kind}{several} at {unit.factor * event.displacement:.6g} {unit.shown}, under "
+            f"{event.force:.5g} {unit.si_effort.replace('.', ' ')}"
+        )
+
+
 def _stability(stable: bool) -> str:
     return "stable" if stable else "unstable"
+
+
+def _frequency(point: holding.Held) -> str:
+    """Return the frequency as text; a star marks shapes that are unstable while they are held."""
+    text = f"{point.frequency:.5g}" if point.frequency > 0.0 else "unstable"
+    return f"{text}*" if point.unstable_held else text
 
 
 def _print_rest(displacement: float, stable: bool, system: System) -> None:
@@ -200,13 +260,17 @@ def _csv_head(unit: HeldUnit) -> list[str]:
     return [
         f"{unit.amount} [{unit.si}]", f"holding {unit.effort} [{unit.si_effort}]",
         f"stiffness [{unit.si_stiffness}]", "across [m]", "angle [rad]",
-        "fundamental frequency [Hz]",
+        "fundamental frequency [Hz]", "unstable directions", "unstable directions, held",
     ]  # fmt: skip
 
 
 def _rows(points: Sequence[holding.Held]) -> list[list[float]]:
     """Return the rows of the table of held shapes, in SI units."""
-    return [[p.displacement, p.force, p.stiffness, p.across, p.angle, p.frequency] for p in points]
+    return [
+        [p.displacement, p.force, p.stiffness, p.across, p.angle, p.frequency, p.unstable,
+         p.unstable_held]
+        for p in points
+    ]  # fmt: skip
 
 
 def _print(head: str, points: Sequence[holding.Held], system: System) -> None:
@@ -227,7 +291,7 @@ def _table(points: Sequence[holding.Held], system: System) -> str:
             rounded(p.force, largest),
             "-" if math.isnan(p.stiffness) else f"{p.stiffness:.5g}",
             rounded(1e6 * p.across, 1e3), rounded(1e3 * p.angle, 1e3),
-            f"{p.frequency:.5g}" if p.frequency > 0.0 else "unstable",
+            _frequency(p),
         ]
         for p in points
     ]  # fmt: skip

@@ -193,8 +193,8 @@ def solve_bordered(kkt: Real, column: Real, row: Real, right: Real, n: int, leng
         Derivative of the equations by the parameter of the path.
     row : (n + r + 1,)
         Row of the step along the path, the parameter last.
-    right : (n + r + 1,)
-        Right side.
+    right : (n + r + 1,) or (n + r + 1, k)
+        Right sides.
 
     Raises
     ------
@@ -208,8 +208,12 @@ def solve_bordered(kkt: Real, column: Real, row: Real, right: Real, n: int, leng
     wide, high = np.abs(A[-1]).max() or 1.0, np.abs(A[:-1, -1]).max() or 1.0
     A[-1] /= wide
     A[:, -1] /= high
-    _check_pivots(_pivots(A))
-    x: Real = scale * np.linalg.solve(A, scale * right / np.append(np.ones(len(kkt)), wide))
+    lu, pivots, _ = _lapack().dgetrf(A, overwrite_a=True)
+    _check_pivots(np.abs(lu.diagonal()))
+    spread = scale if right.ndim == 1 else scale[:, None]
+    scaled = spread * right
+    scaled[-1] /= wide
+    x: Real = spread * _lapack().dgetrs(lu, pivots, scaled)[0]
     x[-1] /= high
     return x
 

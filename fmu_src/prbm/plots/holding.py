@@ -12,6 +12,7 @@ from ..drawing.style import IMPACT, PAST, REST, own_style
 from ..mechanics.arrays import Real
 from .scene import plain
 
+EVENT_MARKERS = {"limit point": "D", "bifurcation": "s", "displacement limit": "^"}
 SIDEWAYS_RTOL = 1e-9  # Sideways motion below this fraction of the displacement is round-off.
 
 
@@ -21,8 +22,9 @@ def holding_figure(curve: Curve, title: str, turns: bool = False) -> Figure:
 
     With ``turns``, a moment holds the body at rotations.
 
-    Stable rest positions are filled circles, unstable ones are open circles; diamonds mark the
-    displacements at which the mechanism snaps through under a force.
+    Forces under which the shape is unstable, as dead loads, are dashed.  Stable rest positions are
+    filled circles, unstable ones are open circles; limit points, bifurcations and displacement
+    limits have markers of their own.
     """
     x = np.array([point.displacement for point in curve.points])
     factor, label = amount_axis(x, turns)
@@ -58,10 +60,16 @@ def _frequencies(curve: Curve) -> Real:
 def _draw_force(axes: Axes, curve: Curve, factor: float, turns: bool) -> None:
     """Draw the holding force, the rest positions and the points of snap-through."""
     scale, newton = _force_unit(max(abs(point.force) for point in curve.points))
+    x = np.array([factor * p.displacement for p in curve.points])
+    y = np.array([scale * p.force for p in curve.points])
+    for branch in curve.branches:
+        along, load = factor * branch.displacements, scale * branch.forces
+        axes.plot(along, load, "--", color=REST, linewidth=0.8)
+        axes.plot(along, np.where(branch.unstable == 0, load, np.nan), color=REST, linewidth=1.4)
+    axes.plot(x, y, "--", color=PAST, linewidth=1.0)
     axes.plot(
-        [factor * p.displacement for p in curve.points], [scale * p.force for p in curve.points],
-        color=PAST, linewidth=1.4,
-    )  # fmt: skip
+        x, np.where([p.unstable == 0 for p in curve.points], y, np.nan), color=PAST, linewidth=1.8
+    )
     axes.axhline(0.0, color="#808080", linewidth=0.8)
     for stable, label in ((True, "stable rest position"), (False, "unstable rest position")):
         rests = [factor * rest.displacement for rest in curve.rests if rest.stable is stable]
@@ -70,10 +78,11 @@ def _draw_force(axes: Axes, curve: Curve, factor: float, turns: bool) -> None:
                 rests, np.zeros(len(rests)), "o", color=REST, markersize=7,
                 markerfacecolor=REST if stable else "white", label=label,
             )  # fmt: skip
-    if curve.snaps:
-        snaps = np.array(curve.snaps) * (factor, scale)
-        axes.plot(*snaps.T, "D", color=IMPACT, markersize=5, label="snap-through")
-    if curve.rests:
+    for kind, marker in EVENT_MARKERS.items():
+        at = [(factor * e.displacement, scale * e.force) for e in curve.events if e.kind == kind]
+        if at:
+            axes.plot(*zip(*at, strict=True), marker, color=IMPACT, markersize=5, ls="", label=kind)
+    if curve.rests or curve.events:
         axes.legend(fontsize=9, frameon=False)
     axes.set_ylabel(f"holding moment [{newton} m]" if turns else f"holding force [{newton}]")
 
@@ -95,7 +104,7 @@ def _draw_frequency(axes: Axes, curve: Curve, factor: float) -> None:
     scale, unit = frequency_unit(float(hertz.max()))
     shown = np.where(hertz > 0.0, scale * hertz, np.nan)
     axes.plot(factor * x, shown, color=PAST, linewidth=1.2)
-    if (hertz <= 0.0).any():
+    if (hertz <= 0.0).any() and not (np.diff(x) < 0.0).any():
         axes.annotate(
             "shaded: unstable when released", (0.5, 0.06), xycoords="axes fraction", ha="center",
             fontsize=9, color=IMPACT,
@@ -106,8 +115,8 @@ def _draw_frequency(axes: Axes, curve: Curve, factor: float) -> None:
 
 def _shade_unstable(every: list[Axes], x: Real, hertz: Real) -> None:
     """Shade the displacements at which the released mechanism is unstable."""
-    if not (hertz <= 0.0).any():
-        return
+    if not (hertz <= 0.0).any() or (np.diff(x) < 0.0).any():
+        return  # All shapes are stable, or there are several at a displacement.
     for axes in every:
         axes.fill_between(
             x, 0.0, 1.0, where=hertz <= 0.0, color=IMPACT, alpha=0.08, linewidth=0,

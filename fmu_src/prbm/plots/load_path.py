@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..analysis.load_path import LoadPath
+from ..analysis.equilibrium_curve import LoadPath
 from ..drawing.style import IMPACT, PAST, REST, own_style
 from ..mechanics.arrays import Real
 from .holding import amount_axis
