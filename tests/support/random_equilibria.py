@@ -6,7 +6,7 @@ Laws, for each mechanism:
 - A shape that is reported to be stable under a dead load keeps a motion that begins there with a
   kick of 1e-4 of the scale of velocities, with a damping ratio of 0.3 and without stops.
 
-``python tests/random_equilibria.py --count 2000`` prints a table of the reasons and all failures.
+``python tests/support/random_equilibria.py --count 2000`` prints a table of the reasons and all failures.
 """
 
 import argparse
@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 
 if __name__ == "__main__":  # Tests have these folders already.
-    ROOT = Path(__file__).resolve().parent.parent
-    sys.path[:0] = [str(ROOT / "fmu_src"), str(ROOT / "tests" / "support")]
+    ROOT = Path(__file__).resolve().parent.parent.parent
+    sys.path[:0] = [str(ROOT / "fmu_src")]
 
 from prbm.analysis.equilibrium_curve import LoadPath, PathPoint
 from prbm.analysis.load_path import HeldPath, held_path, load_path
