@@ -39,6 +39,7 @@ PYTHON_ONLY = {
     "hybrid/front": "in C, the fields of `hybrid/state.h` that continue",
     "hybrid/given": "checks of Python values; FMUs check theirs in `kernel/fmi/`",
     "hybrid/records": "for the tools: the list of all impacts",
+    "hybrid/rest_speed": "for the files: rest speeds of stops that state none",
 }
 """Modules without a C file, and why."""
 

@@ -1403,12 +1403,16 @@ def equations(name, count=2):
 
 
 def condition(evaluation):
-    """Return the condition number of the equations of an evaluation."""
+    """Return the condition number of the equations of an evaluation, or of M if that is larger.
+
+    The kernel eliminates the accelerations by the factors of M: N. J. Higham, Accuracy and
+    Stability of Numerical Algorithms, section 13.3.
+    """
     lu, pivots, _ = evaluation.factors
     kkt = (np.tril(lu, -1) + np.eye(len(lu))) @ np.triu(lu)
     for row, pivot in reversed(list(enumerate(pivots))):
         kkt[[row, pivot]] = kkt[[pivot, row]]
-    return scaled_condition(kkt)
+    return max(scaled_condition(kkt), scaled_condition(np.asarray(evaluation.M)))
 
 
 @twin(
