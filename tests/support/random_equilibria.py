@@ -6,7 +6,8 @@ Laws, for each mechanism:
 - A shape that is reported to be stable under a dead load keeps a motion that begins there with a
   kick of 1e-4 of the scale of velocities, with a damping ratio of 0.3 and without stops.
 
-``python tests/support/random_equilibria.py --count 2000`` prints a table of the reasons and all failures.
+``python tests/support/random_equilibria.py --count 2000`` prints a table of the reasons and all
+failures.
 """
 
 import argparse
