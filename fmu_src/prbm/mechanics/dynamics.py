@@ -80,7 +80,7 @@ class Equations:
     ) -> None:
         self.system, self.inputs, self.contacts, self.omega = system, inputs, contacts, omega
         values, mechanism = system.values, system.mechanism
-        self.n, self.d = system.n, system.d
+        self.n = system.n
         self.beta = values["damping.beta"]
         self.mass_damping = 2.0 * values["damping.zeta"] * omega
         self.stop_friction = [value(s, "friction", values) for s in mechanism.stops]
@@ -145,7 +145,7 @@ class Equations:
         """Return scales with which the elements of the equations are at most near one, (n + r,)."""
         scale = 1.0 / np.sqrt(self.system.straight_masses)
         longest = (self.rows.reach() * scale).max(axis=1, initial=0.0)
-        return np.concatenate([scale, 1.0 / longest])
+        return np.concatenate([scale, 1.0 / np.where(longest > 0.0, longest, 1.0)])
 
     def with_contacts(self, contacts: ContactState) -> "Equations":
         """Return the equations for another state of the contacts."""
