@@ -42,6 +42,7 @@ PERIODS = 8  # Of the fundamental mode; the amplitude falls to exp(-15).
 STEPS_MAX = 40_000  # Integration steps of a motion that is simulated.
 RANGE = 0.15  # Of the size, or 3 times in radians: range of displacements.
 TURN = 0.3  # rad by the largest load, if the mechanism were linear.
+PROGRESS = 5  # Mechanisms between printed lines.
 FREQUENCY_SLOT = 11  # Of the scalars of a saved state in the kernel: the fundamental frequency.
 
 
@@ -166,12 +167,17 @@ def kick(
 def main(seeds: Iterable[int]) -> Findings:
     """Check mechanisms, and print what has been found."""
     findings = Findings()
-    for seed in seeds:
+    for number, seed in enumerate(seeds, 1):
+        before = len(findings.failures)
         check(seed, findings)
+        for failure in findings.failures[before:]:
+            print(failure, flush=True)
+        if number % PROGRESS == 0:
+            print(f"{number} mechanisms, {findings.kicked} shapes kicked", flush=True)
     for (what, why), count in sorted(findings.reasons.items(), key=lambda x: (x[0][0], -x[1])):
         print(f"{count:6d}  {what}: {why}")
     print(f"{findings.kicked:6d}  stable shapes kicked, {findings.slow} more are too fast")
-    print("\n".join(findings.failures) or "no failure")
+    print(f"{len(findings.failures):6d}  failures")
     return findings
 
 
