@@ -13,7 +13,7 @@ import pytest
 from fmpy import simulate_fmu
 
 from browser import NARROW, WIDE, chromium
-from prbm.files.mechanism_file import load, shipped
+from prbm.files.mechanism_file import load, read_mechanism, shipped
 from prbm.fmu import native_fmu, python_fmu
 from prbm.fmu.explorer import explorer
 from prbm.fmu.native_fmu import build
@@ -579,3 +579,127 @@ def test_accessibility_rules_find_nothing_serious(browser, guide, tmp_path, size
     for page in (guide, written(tmp_path, load(str(OTHERS["accelerometer"])))):
         browser.open(page, size=size, prefers_color_scheme=scheme)
         browser.check_accessibility()
+
+
+# --- time, the run before, and the file's own parameters ------------------------------------------
+
+
+def texts(browser, selector: str) -> list[str]:
+    """Return the texts of elements."""
+    script = "return [...document.querySelectorAll(arguments[0])].map((node) => node.textContent)"
+    return list(browser.run(script, selector))
+
+
+def test_a_duration_is_simulated_and_part_of_the_link(browser, guide):
+    """The impacts are those of the default run before the new end."""
+    whole = browser.open(guide)
+
+    def entered(text):
+        field = browser.find("#duration")
+        field.clear()
+        field.send_keys(text + "\n")
+
+    shorter = browser.changed(lambda: entered("0.1 s"))
+    assert 0 < int(shorter["impacts"]) < int(whole["impacts"])
+    again = browser.open(guide, "#stop-time=0.1")
+    assert again["impacts"] == shorter["impacts"]
+    assert browser.run("return document.getElementById('duration').value") == "0.1"
+    assert browser.driver.current_url.endswith("#stop-time=0.1")
+    entered("-1")
+    assert "not a positive number" in browser.message()
+
+
+def test_the_time_axis_is_halved_by_each_zoom_and_follows_the_film(browser, guide):
+    browser.open(guide, prefers_reduced_motion="reduce")
+    ends = "return document.querySelector('canvas').getBoundingClientRect()"
+    box = browser.run(ends)
+    move = """
+        const canvas = document.querySelector('canvas');
+        const x = arguments[0];
+        canvas.dispatchEvent(new PointerEvent('pointerdown', {clientX: x, pointerId: 1}));
+    """
+    browser.run("HTMLCanvasElement.prototype.setPointerCapture = () => {}")
+    right = box["x"] + box["width"] - 12
+    browser.run(move, right)
+    assert texts(browser, "#clock") == ["1\u202fs"]
+    browser.run(move, box["x"])
+    browser.find("#closer").click()
+    browser.find("#closer").click()
+    browser.run(move, right)
+    assert texts(browser, "#clock") == ["0.25\u202fs"]
+    for _ in range(2):
+        browser.find("#farther").click()
+    assert not browser.find("#farther").is_enabled()
+
+
+def test_the_run_before_a_change_is_drawn_until_it_is_hidden(browser, guide):
+    """A shape of the first run, beside the shape of the changed one."""
+    browser.open(guide, prefers_reduced_motion="reduce")
+    drawn = "return [...document.querySelectorAll('.before')].map((n) => n.getAttribute('d') || '')"
+    assert not any(browser.run(drawn))
+    body = browser.run("return document.querySelector('.body').getAttribute('d')")
+    browser.changed(lambda: enter(browser, "release.displacement", "-5"))
+    assert body in browser.run(drawn)
+    assert browser.run("return document.querySelector('.body').getAttribute('d')") != body
+    browser.find("#show-before").click()
+    assert not any(browser.run(drawn))
+
+
+def test_parameters_of_the_file_come_first_and_move_a_wall_of_their_own(browser, tmp_path):
+    """The wall follows the pointer: its position is 2 mm minus twice the parameter."""
+    guide = mechanism("PRBDM")
+    own = replace(guide.geometry[0], name="clearance", value=1e-3, minimum=-1.0, maximum=1.0)
+    stop = replace(guide.stops[0], position="0.002 - 2*clearance")
+    changed = replace(guide, geometry=(*guide.geometry, own), stops=(stop,))
+    browser.open(written(tmp_path, changed), prefers_reduced_motion="reduce")
+    first = texts(browser, "#fields details:first-child label")
+    assert {*first} >= {"flexure.length", "clearance"}
+    handle = browser.find(".wall-handle")
+    assert handle.get_attribute("aria-label").endswith("clearance")
+    place = "return document.querySelector('.wall-handle').getBoundingClientRect().x"
+    before = browser.run(place)
+    actions = pytest.importorskip("selenium.webdriver").ActionChains(browser.driver)
+    browser.changed(lambda: actions.drag_and_drop_by_offset(handle, -20, 0).perform())
+    assert browser.run(place) - before == pytest.approx(-20, abs=2)
+
+
+def test_modes_stay_between_walls_or_the_walls_are_pale(browser, tmp_path):
+    """Without gravity the rest position is in front of a wall; with it, beyond the wall."""
+    guide = mechanism("PRBDM")
+    free = replace(guide, gravity=(0.0, 0.0), stops=(replace(guide.stops[0], position=2e-3),))
+    for chosen, crossing in ((free, False), (guide, True)):
+        browser.open(written(tmp_path, chosen), prefers_reduced_motion="reduce")
+        browser.find("#tab-modes").click()
+        assert ("crossing" in browser.find("#live").get_attribute("class")) == crossing
+        assert ("passes walls" in texts(browser, "#modes .hint")[0]) == crossing
+        hit, wall = (
+            browser.run(f"return document.querySelector('{part}').getBoundingClientRect()")
+            for part in (".hit", ".wall")
+        )
+        assert (hit["x"] + hit["width"] / 2 <= wall["x"] + 1.5) != crossing
+
+
+def test_flexures_have_the_colour_of_their_stress(browser, guide):
+    """It falls from the released towards the straight shape, as the bending does."""
+    browser.open(guide, prefers_reduced_motion="reduce")
+    share = "return document.querySelector('.flexure').style.getPropertyValue('--stress')"
+    seek = """
+        const field = document.getElementById('scrub');
+        field.value = arguments[0];
+        field.dispatchEvent(new Event('input'));
+    """
+    found = []
+    for time in (0, 20, 38):
+        browser.run(seek, time)
+        found.append(int(browser.run(share)[:-1]))
+    assert 100 >= found[0] > found[1] > found[2]
+    assert found[2] < 0.4 * found[0]
+    assert "stress 0 to" in texts(browser, "#stress-key")[0]
+
+
+def test_rotations_are_in_degrees(browser, tmp_path):
+    """As the angle of the release: the first value of the plot is that of the field."""
+    pivot = read_mechanism(ROOT / "fmu_src" / "prbm" / "files" / "templates" / "pivot.toml")
+    browser.open(written(tmp_path, pivot), prefers_reduced_motion="reduce")
+    field = browser.find('input[data-name="release.angle"]').get_attribute("value")
+    assert texts(browser, ".plot .reading")[0] == f"{field.replace('-', chr(0x2212))}°"

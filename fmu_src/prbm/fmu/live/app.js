@@ -3,6 +3,9 @@
 const RUN_AGE_MIN = 120; // Milliseconds that a run gets before a drag replaces it.
 const RUN_TIME_UNNOTICED = 500; // Milliseconds after which the page shows how much is computed.
 const PLOT_PERIOD = 50; // Milliseconds between two drawings of the plots while the film runs.
+const RUN_ROWS_MAX = 20000; // Rows of a run; a longer one has longer steps between them.
+const ZOOM_FACTOR = 2; // Of the time axis, with each press of a button.
+const ZOOM_MAX = 1000;
 
 class Page {
   constructor(description, kernel, tables) {
@@ -20,12 +23,20 @@ class Page {
       ),
     );
     const slot = new Map(description.outputs.map((output) => [output.name, output.slot]));
-    const peaks = description.flexures.map(({ name }) => `${name}.peak_stress`);
-    this.outputs.push(...peaks.filter((name) => slot.has(name)));
+    for (const output of ["peak_stress", "stress"]) {
+      const stresses = description.flexures.map(({ name }) => `${name}.${output}`);
+      const wanted = stresses.filter((name) => slot.has(name) && !this.outputs.includes(name));
+      this.outputs.push(...wanted);
+    }
     this.slots = this.outputs.map((name) => slot.get(name));
+    const stops = [...description.stops.keys()];
+    this.rigid = new Set(stops.filter((k) => !slot.has(`${description.stops[k].name}.peak_force`)));
     this.column = new Map(this.outputs.map((name, k) => [name, k]));
     this.run = null;
+    this.before = null; // Run and shapes before the last change.
     this.runs = 0;
+    this.stopTime = description.stopTime;
+    this.zoom = 1;
     this.build();
   }
 
@@ -48,9 +59,9 @@ class Page {
     this.plots = plotList(description, this.column).map(
       (plot) => new Plot(plot, byId("plots"), seek),
     );
-    this.modes = new ModeView(byId("modes"), description, (shape) =>
-      this.stage.draw(this.shapes, shape),
-    );
+    const draw = (shape) => this.stage.draw(this.shapes, shape);
+    const wall = (k) => this.wall(k);
+    this.modes = new ModeView(byId("modes"), description, draw, wall);
     const handles = [
       ...(description.stops.length ? ["a wall"] : []),
       ...(this.stage.bodyHandle ? ["the released body"] : []),
@@ -64,7 +75,14 @@ class Page {
   }
 
   listen() {
-    byId("reset").addEventListener("click", () => this.apply(new Map(), true));
+    byId("reset").addEventListener("click", () => {
+      this.setDuration(this.description.stopTime);
+      this.apply(new Map(), true);
+    });
+    byId("duration").addEventListener("change", ({ target }) => this.timed(target.value));
+    byId("closer").addEventListener("click", () => this.zoomed(this.zoom * ZOOM_FACTOR));
+    byId("farther").addEventListener("click", () => this.zoomed(this.zoom / ZOOM_FACTOR));
+    byId("show-before").addEventListener("change", () => this.show(true));
     byId("copy").addEventListener("click", () => this.copy());
     byId("download").addEventListener("click", () => this.download());
     byId("show-links").addEventListener("change", (event) =>
@@ -139,8 +157,84 @@ class Page {
     }
   }
 
+  // -- time --
+
+  // The duration, if it is not the default one, else null.
+  get ownDuration() {
+    return this.stopTime === this.description.stopTime ? null : this.stopTime;
+  }
+
+  // Take a duration [s], and show it in its field.
+  setDuration(stopTime) {
+    this.stopTime = stopTime;
+    this.film.setDuration(stopTime);
+    const kind = prefixed(this.description.stopTime, "s");
+    byId("duration").value = digits(stopTime * kind.factor, 7);
+    byId("duration-unit").textContent = unitText(kind.shown);
+    this.zoomed(1);
+  }
+
+  // Take the text of the field of the duration.
+  timed(text) {
+    const kind = prefixed(this.description.stopTime, "s");
+    const x = parsed(withoutUnit(text, kind)) / kind.factor;
+    if (!(x > 0 && Number.isFinite(x))) {
+      this.say(`The duration \u201c${text.trim()}\u201d is not a positive number in ${kind.shown}.`);
+      return;
+    }
+    this.setDuration(x);
+    this.wanted ??= this.changes;
+    this.begin();
+  }
+
+  // The number of steps between the rows of a run, and their size [s].
+  get steps() {
+    const usual = this.description.stopTime / this.description.step;
+    const wanted = this.stopTime / this.description.step;
+    const count = Math.round(Math.min(Math.max(usual, wanted), Math.max(usual, RUN_ROWS_MAX)));
+    return [count, count === Math.round(wanted) ? this.description.step : this.stopTime / count];
+  }
+
+  // Show a share of the time axis, about the present time.
+  zoomed(zoom) {
+    this.zoom = Math.min(Math.max(zoom, 1), ZOOM_MAX);
+    const length = this.stopTime / this.zoom;
+    this.from = Math.min(Math.max(this.film.now - length / 2, 0), this.stopTime - length);
+    byId("closer").disabled = this.zoom >= ZOOM_MAX;
+    byId("farther").disabled = this.zoom === 1;
+    this.show(true);
+  }
+
+  // The span of time that the plots show; it follows the film.
+  span(now) {
+    const length = this.stopTime / this.zoom;
+    if (now < this.from || now > this.from + length) {
+      this.from = Math.min(Math.max(now - 0.1 * length, 0), this.stopTime - length);
+    }
+    return [this.from, this.from + length];
+  }
+
+  // -- changes --
+
+  // Keep the present run, to show it beside the one with a change.  While a handle or slider moves,
+  // the run before its first change is kept.
+  keepBefore(ended) {
+    if (!this.moving && this.run?.finished && this.before?.run !== this.run) {
+      this.before?.shapes.simulation.close();
+      this.before = { run: this.run, shapes: this.shapes };
+    }
+    this.moving = !ended;
+  }
+
+  // The run before the last change, if it is shown, else null.
+  get shownBefore() {
+    const wanted = byId("show-before").checked && this.before?.run !== this.run;
+    return wanted ? this.before : null;
+  }
+
   // Start a simulation with changes, at once or when the present one has been shown.
   apply(changes, now) {
+    this.keepBefore(now);
     this.wanted = changes;
     if (now || !this.busy || performance.now() - this.started > RUN_AGE_MIN) {
       this.begin();
@@ -148,8 +242,13 @@ class Page {
   }
 
   follow() {
-    const { changes, problems } = changesOf(location.hash, this.known);
+    const { changes, stopTime, problems } = changesOf(location.hash, this.known);
     this.touched = null;
+    const valid = stopTime > 0 && Number.isFinite(stopTime);
+    this.setDuration(valid ? stopTime : this.description.stopTime);
+    if (stopTime !== null && !valid) {
+      problems.push("The link has an invalid duration, which was ignored.");
+    }
     this.apply(changes, true);
     if (problems.length) {
       this.say([byId("message").textContent, ...problems].filter(Boolean).join(" "));
@@ -166,28 +265,30 @@ class Page {
     try {
       const numbers = [...changes].map(([name, value]) => [this.known.get(name).slot, value]);
       simulation = new Simulation(this.kernel, this.mechanism, this.slots, new Map(numbers));
-      run = new Run(
-        simulation,
-        Math.round(this.description.stopTime / this.description.step),
-        this.description.step,
-      );
+      run = new Run(simulation, ...this.steps);
     } catch (error) {
       simulation?.close();
       this.refuse(error, changes);
       return;
     }
     this.stop?.();
-    this.simulation?.close();
+    if (this.simulation !== this.before?.shapes.simulation) {
+      this.simulation?.close();
+    }
     [this.changes, this.simulation, this.run] = [changes, simulation, run];
     this.shapes = new Shapes(this.description, this.values(), simulation);
     this.started = performance.now();
     this.busy = true;
     this.say("");
     this.known.forEach((_, name) => this.controls.show(name, this.value(name)));
-    showFragment(changes);
+    showFragment(changes, this.ownDuration);
     this.state("running");
     this.stop = compute(run, () => this.progress());
     this.show();
+    if (!this.played && !reducedMotion.matches) {
+      this.played = true;
+      this.film.play(true);
+    }
     if (this.modes.active) {
       this.modes.open(this.shapes);
     }
@@ -223,7 +324,9 @@ class Page {
       this.busy = false;
       this.finish();
     }
-    this.show(run.finished);
+    if (run.finished || performance.now() - (this.plotted ?? 0) > PLOT_PERIOD) {
+      this.show(true);
+    }
     if (this.wanted && (run.finished || performance.now() - this.started > RUN_AGE_MIN)) {
       this.begin();
     }
@@ -245,11 +348,8 @@ class Page {
       this.say(`${run.error.message}.`);
     }
     this.stage.fit(this.shapes, run);
-    this.film.stopTime = run.error ? Math.max(run.time, run.step) : description.stopTime;
+    this.film.stopTime = run.error ? Math.max(run.time, run.step) : this.stopTime;
     this.state("done");
-    if (this.runs === 1 && !reducedMotion.matches) {
-      this.film.play(true);
-    }
   }
 
   state(text) {
@@ -277,11 +377,18 @@ class Page {
     if (!this.stage.bounds) {
       this.stage.fit(this.shapes, run);
     }
+    const before = this.shownBefore;
+    byId("before").hidden = !this.before || this.modes.active;
     if (!this.modes.active) {
       this.stage.draw(this.shapes, this.shapes.at(run.coordinates(now)), this.flashes(now));
+      const earlier = before && Math.min(now, before.run.time);
+      this.stage.drawBefore(
+        before && [before.shapes, before.shapes.at(before.run.coordinates(earlier))],
+      );
+      this.stage.colour(this.stresses(now));
     }
     film.show();
-    byId("clock").textContent = timeText(now, this.description.stopTime);
+    byId("clock").textContent = timeText(now, this.stopTime);
     const time = performance.now();
     if (whole || !film.playing || time - (this.plotted ?? 0) > PLOT_PERIOD) {
       this.plotted = time;
@@ -292,8 +399,10 @@ class Page {
   showNumbers(now) {
     const { run, description } = this;
     const time = performance.now();
+    const span = this.span(now);
+    const before = this.shownBefore?.run;
     this.plots.forEach((plot) =>
-      plot.draw(run, now, plot.plot.walls ? this.wallLines() : [], description.stopTime),
+      plot.draw(run, now, plot.plot.walls ? this.wallLines() : [], span, before),
     );
     const key = `${this.runs} ${run.count} ${this.started}`;
     if (key !== this.listed) {
@@ -306,6 +415,30 @@ class Page {
         (slow ? `Computing, ${share}\u202f% done \u00b7 ` : "") + brief(pairs);
       showImpacts(byId("impacts"), description, run, (time) => this.film.seek(time));
     }
+  }
+
+  // The stress of each flexure at a time, as a share of the largest one of the run, which is shown
+  // beside the drawing; null without stress outputs.
+  stresses(now) {
+    const { run, description } = this;
+    const columns = description.flexures.map(({ name }) => this.column.get(`${name}.stress`));
+    const known = columns.filter((column) => column !== undefined);
+    const key = byId("stress-key");
+    key.hidden = known.length === 0;
+    if (known.length === 0) {
+      return null;
+    }
+    if (this.coloured !== run || this.colouredRows !== run.count) {
+      [this.coloured, this.colouredRows] = [run, run.count];
+      const impact = run.impacts.find(({ stop }) => this.rigid.has(stop));
+      const row = impact ? Math.floor(impact.time / run.step) : run.count - 1;
+      this.most = mostly(run, known, row);
+      key.textContent = `stress 0 to ${stressText(this.most)}`;
+    }
+    const row = Math.min(run.count - 1, Math.round(now / run.step));
+    return columns.map((column) =>
+      column === undefined || this.most <= 0 ? 0 : Math.min(1, run.at(row, column) / this.most),
+    );
   }
 
   // The positions of the walls on the ground, as displacements along the plotted axis [m].
@@ -345,7 +478,10 @@ class Page {
     byId("clock").hidden = modes;
     if (modes && !this.modes.active) {
       this.film.play(false);
+      this.stage.drawBefore(null);
+      this.stage.colour(null);
       this.modes.open(this.shapes);
+      this.show();
     } else if (!modes) {
       this.modes.close();
       this.show();
@@ -355,7 +491,7 @@ class Page {
   // -- results --
 
   async copy() {
-    const link = linkWith(this.changes);
+    const link = linkWith(this.changes, this.ownDuration);
     try {
       await navigator.clipboard.writeText(link);
       byId("done").textContent = "Link copied.";
@@ -366,11 +502,11 @@ class Page {
 
   // Simulate again with all outputs, and save them as CSV.
   download() {
-    const { outputs, stopTime, step, name } = this.description;
+    const { outputs, name } = this.description;
     const numbers = [...this.changes].map(([key, value]) => [this.known.get(key).slot, value]);
     const slots = outputs.map((output) => output.slot);
     const simulation = new Simulation(this.kernel, this.mechanism, slots, new Map(numbers));
-    const run = new Run(simulation, Math.round(stopTime / step), step);
+    const run = new Run(simulation, ...this.steps);
     byId("done").textContent = "Computing all outputs\u2026";
     compute(run, () => {
       if (run.finished) {

@@ -1,7 +1,9 @@
 """The description of a mechanism that its live page reads, as plain values for JSON."""
 
 import math
+import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from ...interface.tables import slots
@@ -58,6 +60,7 @@ def content(
     release = mechanism.release
     centres = {body.name: body.centre for body in mechanism.bodies}
     released = centres[release.body] if release.point is None else release.point
+    own = {parameter.name for parameter in mechanism.geometry}
     typical = {v.unit: v.nominal for v in variables if v.causality == "output" and v.nominal}
     return {
         "name": mechanism.name,
@@ -65,7 +68,7 @@ def content(
         "stopTime": experiment.stop_time,
         "step": experiment.step,
         "quantities": [
-            _quantity(v, slot[v.name], typical)
+            _quantity(v, slot[v.name], typical) | {"own": v.name in own}
             for v in variables
             if v.causality in ("parameter", "input")
         ],
@@ -88,7 +91,7 @@ def content(
         "joints": [
             {"name": joint.name, "ends": _ends(mechanism, joint)} for joint in mechanism.joints
         ],
-        "stops": [_stop(stop) for stop in mechanism.stops],
+        "stops": [_stop(stop, mechanism) for stop in mechanism.stops],
         "probes": [
             {
                 "name": probe.name,
@@ -194,7 +197,41 @@ def _field(part: Part, name: str) -> Json:
     return _expression(quantity) if isinstance(quantity, str) else [0.0, {f"{part.name}.{name}": 1}]
 
 
-def _stop(stop: Stop) -> dict[str, Json]:
+def _moved_by(stop: Stop, mechanism: Mechanism) -> tuple[str, float]:
+    """Return the quantity that moves a wall, and the displacement of the wall per unit of it.
+
+    It is the position of the stop.  If that is an expression of one parameter, it is this parameter
+    or, if the parameter moves other parts too, the input of the wall.
+    """
+    own = _given(stop, "position")
+    if own is not None:
+        return own, 1.0
+    terms = affine(str(stop.position)).terms
+    if len(terms) == 1:
+        ((name, ratio),) = dict(terms).items()
+        others = replace(mechanism, stops=tuple(s for s in mechanism.stops if s != stop))
+        if ratio and not re.search(rf"(?<![\w.]){re.escape(name)}(?![\w.])", _expressions(others)):
+            return name, float(ratio)
+    return f"{stop.name}.displacement", 1.0
+
+
+def _expressions(mechanism: Mechanism) -> str:
+    """Return a text with the expressions of all parts."""
+    parts = (
+        "bodies",
+        "flexure_types",
+        "joints",
+        "stops",
+        "frictions",
+        "forces",
+        "ground",
+        "release",
+    )
+    return " ".join(repr(getattr(mechanism, part)) for part in parts)
+
+
+def _stop(stop: Stop, mechanism: Mechanism) -> dict[str, Json]:
+    quantity, ratio = _moved_by(stop, mechanism)
     return {
         "name": stop.name,
         "body": stop.body,
@@ -204,7 +241,8 @@ def _stop(stop: Stop) -> dict[str, Json]:
         "offset": _field(stop, "offset"),
         "position": _field(stop, "position"),
         "displacement": f"{stop.name}.displacement",
-        "quantity": _given(stop, "position") or f"{stop.name}.displacement",
+        "quantity": quantity,
+        "ratio": ratio,
     }
 
 

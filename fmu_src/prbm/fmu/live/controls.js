@@ -2,7 +2,8 @@
 
 const SLIDER_STEPS = 1000;
 const BOUND_SHOWN_MAX = 100; // Bounds that are this often as large as the slider are not shown.
-const FIRST_GROUPS = 2; // Groups that are open at first.
+const FIRST_GROUPS = 2; // Groups that are open at first, and that of the file's own parameters.
+const OWN = "[[geometry]]"; // Parameters that the mechanism file defines.
 const LAST = ["damping", "friction", "gravity", "base", "solver"];
 
 class Controls {
@@ -14,15 +15,16 @@ class Controls {
     this.rows = new Map();
     const groups = new Map();
     for (const quantity of description.quantities) {
-      const key = quantity.kind === "input" ? "inputs" : quantity.group;
+      const key = quantity.own ? OWN : quantity.kind === "input" ? "inputs" : quantity.group;
       groups.set(key, [...(groups.get(key) ?? []), quantity]);
     }
     const names = [...groups.keys()].sort((a, b) => rank(a, description) - rank(b, description));
     names.forEach((name, k) => {
-      const rows = groups.get(name).map((quantity) => this.row(quantity, name === "inputs"));
+      const full = name === "inputs" || name === OWN;
+      const rows = groups.get(name).map((quantity) => this.row(quantity, full));
       const summary = element("summary", {}, heading(name), element("span", { class: "count" }));
       const details = element("details", {}, summary, ...rows);
-      details.open = k < FIRST_GROUPS;
+      details.open = k < FIRST_GROUPS + Number(names[0] === OWN);
       parent.append(details);
     });
   }
@@ -136,6 +138,9 @@ class Controls {
 
 // The order of a group: stops and the release, bodies and flexures, inputs, then the rest.
 function rank(name, description) {
+  if (name === OWN) {
+    return -1;
+  }
   if (description.stops.some((stop) => stop.name === name)) {
     return 0;
   }
@@ -155,6 +160,9 @@ function labelled(name) {
 }
 
 function heading(name) {
+  if (name === OWN) {
+    return "Parameters of the mechanism file";
+  }
   const text = words(name);
   return text.charAt(0).toUpperCase() + text.slice(1);
 }

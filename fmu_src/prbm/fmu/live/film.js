@@ -23,6 +23,13 @@ class Film {
     this.listen();
   }
 
+  // Take another duration [s], with speeds that suit it.
+  setDuration(stopTime) {
+    this.stopTime = stopTime;
+    this.nodes.speed.replaceChildren();
+    this.listSpeeds();
+  }
+
   listSpeeds() {
     const best = FILM_SECONDS / this.stopTime;
     const power = 10 ** Math.floor(Math.log10(best) - 1);

@@ -2,14 +2,17 @@
 
 const MODES_MAX = 8; // Modes in the list.
 const MODE_AMPLITUDE = 0.1; // Largest displacement, as a share of the size of the mechanism.
+const CLEARANCE_MIN = 0.1; // Of this amplitude: a mode with less room between walls passes them.
 const SMALL_ANGLE = 1e-4; // rad; amplitude at which a mode is linear.
 const MODE_PERIOD = 1.6; // Seconds of the film of one period.
 const DIRECTION_RTOL = 0.3; // Smaller shares of the displacement of a body do not say how it moves.
 const MOVING_RTOL = 0.05; // Parts with a smaller share of the largest displacement are not named.
 
 class ModeView {
-  // Parameters: the parent element, the description of the page, and the function draw(shape).
-  constructor(parent, description, draw) {
+  // Parameters: the parent element, the description of the page, and the functions draw(shape),
+  // and wall(k), the position of a wall [m].
+  constructor(parent, description, draw, wall) {
+    this.wall = wall;
     this.parent = parent;
     this.description = description;
     this.draw = draw;
@@ -73,6 +76,12 @@ class ModeView {
     this.setSlopes(this.found.modes[k].shape);
     const moves = this.parts().sort((a, b) => b[1] - a[1]);
     this.scale = (MODE_AMPLITUDE * this.shapes.size) / moves[0][1];
+    const free = this.clearance();
+    const crossing = free < CLEARANCE_MIN * this.scale;
+    byId("live").classList.toggle("crossing", crossing);
+    if (!crossing) {
+      this.scale = Math.min(this.scale, free);
+    }
     const shares = moves
       .filter(([, size]) => size > MOVING_RTOL * moves[0][1])
       .map(([name, size, how]) => {
@@ -86,7 +95,8 @@ class ModeView {
       `Mode ${k + 1} moves: ${shares.join(", ")}` +
       (resting.length ? `. Hardly moves: ${resting.join(", ")}.` : ".") +
       " Percentages are of the largest displacement." +
-      " Undamped, about the rest position under gravity, without stops.";
+      " Undamped, about the rest position under gravity, without stops." +
+      (crossing ? " The motion that is drawn passes walls, which are pale." : "");
     this.paint(1);
   }
 
@@ -108,6 +118,22 @@ class ModeView {
       this.rest.map((x, i) => x + amplitude * this.slopes[i]),
       true,
     );
+  }
+
+  // Return the amplitude of the mode at which a hit point reaches its wall, from the rest position.
+  clearance() {
+    const small = (SMALL_ANGLE * this.shapes.size) / Math.max(...this.slopes.map(Math.abs));
+    const [rest, moved] = [this.moved(0), this.moved(small)];
+    const gap = (k, { poses }) => {
+      const { point, into } = this.shapes.wall(k, this.wall(k), poses);
+      const [x, y] = minus(point, this.shapes.hitPoint(k, poses));
+      return x * into[0] + y * into[1];
+    };
+    const free = this.description.stops.map((_, k) => {
+      const rate = Math.abs(gap(k, moved) - gap(k, rest)) / small;
+      return gap(k, rest) / Math.max(rate, 1e-300);
+    });
+    return Math.min(...free, Infinity);
   }
 
   // Return the largest displacement of each body and flexure for a mode of amplitude 1, and how the

@@ -8,8 +8,13 @@ const POINTS_MAX = 2000; // Corners of a drawn curve.
 const CURVES_MAX = 5; // Curves of a plot, each in its own colour.
 const SHARE_SHOWN = 0.98; // Share of the values after a rigid impact that the scale shows.
 const PEAK_FACTOR = 1.5; // Peaks that are larger than the others, by this factor, are cut off.
+const BEFORE_FACTOR = 3; // A run before is cut off where it is larger, by this factor.
 const LIMIT_FACTOR = 3; // Limits that are farther from the values, by this factor, are not drawn.
-const FIXED_UNITS = { Pa: { factor: 1e-6, shown: "MPa" } }; // Other units get a prefix of SI.
+const FIXED_UNITS = {
+  Pa: { factor: 1e-6, shown: "MPa" },
+  rad: { factor: 180 / Math.PI, shown: "deg" },
+  "rad/s": { factor: 180 / Math.PI, shown: "deg/s" },
+}; // Other units get a prefix of SI.
 
 // Return the plots of a mechanism: title, unit, and series with the columns of a run.  A plot may have
 // limits, which are lines with a label and a value, and a note below it.
@@ -103,10 +108,11 @@ function mostly(run, columns, row) {
   return Math.max(before, values[Math.floor(SHARE_SHOWN * (values.length - 1))] ?? 0);
 }
 
-// Return the least and the largest value of a column, zero included.
-function range(run, column) {
+// Return the least and the largest value of a column in a span of time, zero included.
+function range(run, column, [from, to]) {
   let [low, high] = [0, 0];
-  for (let row = 0; row < run.count; row++) {
+  const last = Math.min(run.count - 1, Math.ceil(to / run.step));
+  for (let row = Math.floor(from / run.step); row <= last; row++) {
     const x = run.at(row, column);
     low = x < low ? x : low;
     high = x > high ? x : high;
@@ -151,7 +157,8 @@ class Plot {
       const box = this.canvas.getBoundingClientRect();
       const share =
         (event.clientX - box.left - INSET.left) / (box.width - INSET.left - INSET.right);
-      return Math.min(1, Math.max(0, share)) * this.stopTime;
+      const [from, to] = this.span;
+      return from + Math.min(1, Math.max(0, share)) * (to - from);
     };
     this.canvas.addEventListener("pointerdown", (event) => {
       this.canvas.setPointerCapture(event.pointerId);
@@ -165,9 +172,10 @@ class Plot {
   }
 
   // Draw the run up to the time of the film in full colours, and the rest of it in pale ones.
-  // walls: the values of lines that are always in sight.
-  draw(run, now, walls, stopTime) {
-    this.stopTime = stopTime;
+  // walls: the values of lines that are always in sight.  span: the first and the last time that is
+  // shown.  before: the run before the last change, drawn in dots, if there is one.
+  draw(run, now, walls, span, before) {
+    this.span = span;
     const width = this.canvas.clientWidth;
     const ratio = window.devicePixelRatio || 1;
     if (this.canvas.width !== Math.round(width * ratio)) {
@@ -179,16 +187,17 @@ class Plot {
     pen.clearRect(0, 0, width, PLOT_HEIGHT);
     const style = getComputedStyle(document.getElementById("live"));
     this.colour = (name) => style.getPropertyValue(`--${name}`).trim();
-    this.setScales(run, walls, width);
+    this.setScales(run, walls, width, before);
     this.drawAxes(pen, width);
     this.drawImpacts(pen, run, now);
     this.drawLines(pen, [...walls, ...this.limits.map(({ value }) => value)], width);
+    this.drawBefore(pen, before);
     this.drawSeries(pen, run, now);
     this.drawCursor(pen, run, now);
   }
 
-  setScales(run, walls, width) {
-    const ranges = this.plot.series.map(({ column }) => range(run, column));
+  setScales(run, walls, width, before) {
+    const ranges = this.plot.series.map(({ column }) => range(run, column, this.span));
     let low = Math.min(...ranges.map((sides) => sides[0]));
     let high = Math.max(...ranges.map((sides) => sides[1]));
     let largest = Math.max(high, -low);
@@ -203,6 +212,12 @@ class Plot {
     });
     this.tiny = high === low ? Infinity : ZERO_RTOL * largest;
     high = this.cutPeaks(run, high);
+    if (before && high > low) {
+      const earlier = this.plot.series.map(({ column }) => range(before, column, this.span));
+      const most = BEFORE_FACTOR * Math.max(high, -low);
+      low = Math.max(Math.min(low, ...earlier.map(([a]) => a)), -most);
+      high = Math.min(Math.max(high, ...earlier.map(([, b]) => b)), most);
+    }
     const near = this.limits.map(({ value }) => value).filter((x) => x <= LIMIT_FACTOR * high);
     low = Math.min(low, ...walls);
     high = Math.max(high, ...walls, ...near);
@@ -216,7 +231,8 @@ class Plot {
     this.high = high > 0 ? high + room : high;
     const inner = width - INSET.left - INSET.right;
     const tall = PLOT_HEIGHT - INSET.top - INSET.bottom;
-    this.x = (time) => INSET.left + (inner * time) / this.stopTime;
+    const [from, to] = this.span;
+    this.x = (time) => INSET.left + (inner * (time - from)) / (to - from);
     this.y = (value) => INSET.top + (tall * (this.high - value)) / (this.high - this.low);
   }
 
@@ -265,8 +281,10 @@ class Plot {
     pen.fillText(unitText(shown), 0, 0);
     pen.restore();
     pen.textBaseline = "top";
-    const time = prefixed(this.stopTime, "s");
-    const marks = ticks(0, this.stopTime * time.factor, Math.max(3, Math.min(8, width / 90)));
+    const [from, to] = this.span;
+    const time = prefixed(to, "s");
+    const count = Math.max(3, Math.min(8, width / 90));
+    const marks = ticks(from * time.factor, to * time.factor, count);
     for (const [k, tick] of marks.entries()) {
       const x = this.x(tick / time.factor);
       const last = k === marks.length - 1;
@@ -277,7 +295,8 @@ class Plot {
   }
 
   drawImpacts(pen, run, now) {
-    for (const impact of run.impacts) {
+    const [from, to] = this.span;
+    for (const impact of run.impacts.filter(({ time }) => from <= time && time <= to)) {
       const x = this.x(impact.time);
       pen.strokeStyle = this.colour("impact");
       pen.globalAlpha = impact.time <= now ? 0.55 : 0.15;
@@ -302,12 +321,10 @@ class Plot {
   }
 
   drawSeries(pen, run, now) {
-    const every = Math.max(1, Math.floor(run.count / POINTS_MAX));
-    const end = Math.min(run.count - 1, Math.floor(now / run.step));
-    pen.save();
-    pen.beginPath();
-    pen.rect(0, INSET.top - 2, this.canvas.clientWidth, PLOT_HEIGHT);
-    pen.clip();
+    const [first, last] = this.rowsShown(run);
+    const every = Math.max(1, Math.floor((last - first) / POINTS_MAX));
+    const end = Math.max(first, Math.min(last, Math.floor(now / run.step)));
+    this.clip(pen);
     pen.lineWidth = 1.8;
     pen.lineJoin = "round";
     this.plot.series.forEach(({ column }, k) => {
@@ -320,10 +337,48 @@ class Plot {
         }
         pen.stroke();
       };
-      stroke(end, run.count - 1, 0.22);
-      stroke(0, end, 1);
+      stroke(end, last, 0.22);
+      stroke(first, end, 1);
     });
     pen.restore();
+  }
+
+  // Draw the curves of the run before the last change in dots.
+  drawBefore(pen, before) {
+    if (!before) {
+      return;
+    }
+    const [first, last] = this.rowsShown(before);
+    const every = Math.max(1, Math.floor((last - first) / POINTS_MAX));
+    this.clip(pen);
+    pen.lineWidth = 1.2;
+    pen.globalAlpha = 0.7;
+    pen.setLineDash([2, 3]);
+    this.plot.series.forEach(({ column }, k) => {
+      pen.strokeStyle = this.colour(`s${k}`);
+      pen.beginPath();
+      for (let row = first; row <= last; row += every) {
+        pen.lineTo(this.x(row * before.step), this.y(before.at(row, column)));
+      }
+      pen.stroke();
+    });
+    pen.restore();
+  }
+
+  // Return the first and the last row of a run in the span that is shown, and beside it.
+  rowsShown(run) {
+    const [from, to] = this.span;
+    const last = Math.min(run.count - 1, Math.ceil(to / run.step));
+    return [Math.max(0, Math.min(last, Math.floor(from / run.step))), last];
+  }
+
+  // Keep a pen within the axes, until it is restored.
+  clip(pen) {
+    const width = this.canvas.clientWidth - INSET.left - INSET.right;
+    pen.save();
+    pen.beginPath();
+    pen.rect(INSET.left - 2, INSET.top - 2, width + 4, PLOT_HEIGHT);
+    pen.clip();
   }
 
   drawCursor(pen, run, now) {

@@ -23,6 +23,7 @@ class Stage {
     for (const name of [
       "ground",
       "straight",
+      "before",
       "flexures",
       "bodies",
       "links",
@@ -46,6 +47,7 @@ class Stage {
       return node;
     };
     this.straight = flexures.map(() => add("straight", "path", { class: "straight" }));
+    this.before = [...flexures, ...bodies].map(() => add("before", "path", { class: "before" }));
     this.flexures = flexures.map(({ profile }) =>
       add("flexures", "path", { class: profile ? "flexure shaped" : "flexure" }),
     );
@@ -317,6 +319,25 @@ class Stage {
     this.drawStops(shapes, shape, flashes);
   }
 
+  // Draw the outlines of a shape of the run before the last change; null: none.
+  drawBefore(earlier) {
+    const lines = earlier
+      ? [
+          ...earlier[1].lines.map((line) => this.outline(line)),
+          ...this.bodies.map((_, k) => `${this.path(earlier[0].body(k, earlier[1].poses))}Z`),
+        ]
+      : [];
+    this.before.forEach((node, k) => node.setAttribute("d", lines[k] ?? ""));
+  }
+
+  // Colour the flexures by shares of a largest stress; null: none is known.
+  colour(shares) {
+    this.flexures.forEach((node, k) => {
+      const share = shares ? (100 * shares[k]).toFixed(0) : 0;
+      node.style.setProperty("--stress", `${share}%`);
+    });
+  }
+
   circle(point, r) {
     const [x, y] = this.screen(point);
     return `M${(x - r).toFixed(2)},${y.toFixed(2)}a${r},${r} 0 1,0 ${2 * r},0a${r},${r} 0 1,0 ${-2 * r},0`;
@@ -334,7 +355,8 @@ class Stage {
       filled(this.flashes[k], { cx: wx, cy: wy, r, opacity: flash ? 1 - flash.age : 0 }, []);
       const [behind, beyond] = HANDLE_OFFSET.map((offset) => offset / this.pixels);
       const beside = turned(into, [behind, shapes.wallLength(k) / 2 + beyond]);
-      this.place(this.wallHandles[k], plus(point, beside), into, stop.quantity);
+      const along = times(1 / stop.ratio, into);
+      this.place(this.wallHandles[k], plus(point, beside), along, stop.quantity);
     });
     if (this.bodyHandle) {
       this.placeBodyHandle(shapes, shape);
