@@ -28,6 +28,7 @@ from ..hybrid.given import start_values
 from ..hybrid.simulation import Simulation
 from ..interface.variables import variables
 from ..mechanics.arrays import Real
+from ..mechanics.stress import with_stress
 from ..mechanism.description import Mechanism
 from ..runs.engine import PYTHON, check_engine, kernel_available
 from ..runs.experiment import experiment
@@ -211,7 +212,8 @@ def study(
         Increasing samples of one or two parameters or inputs by name, numbers in SI or texts with
         a unit, ``"-4 mm"``; or of numbers that are written as ``{name}`` in the texts of inputs.
     outputs : sequence of str
-        Outputs as of :func:`prbm.sweeps.sweep.sweep`: ``settling``, ``max(abs(shuttle.vx))``.
+        Outputs as of :func:`prbm.sweeps.sweep.sweep`: ``settling``, ``max(abs(shuttle.vx))``.  If
+        one of them is a stress, all flexures have stress outputs.
     minimise, maximise : str or None
         The output whose optimum is searched, at most one of them.
     values, inputs, stop_time, tolerance, engine
@@ -239,6 +241,8 @@ def study(
         raise ParameterError("minimise and maximise are both given; omit one of them")
     wanted = minimise if maximise is None else maximise
     texts = list(dict.fromkeys([*outputs, *([] if wanted is None else [wanted])]))
+    if any("stress" in text for text in texts):
+        mechanism = with_stress(mechanism)
     units = _units(mechanism)
     given = dict(in_si(mechanism, values))
     setup = Setup(
