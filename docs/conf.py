@@ -1,7 +1,9 @@
 """Settings of the documentation site, which ``python docs/build_site.py`` builds with Sphinx."""
 
+import os
 import sys
 from pathlib import Path
+from typing import Any
 
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE / "website"), str(HERE.parent / "fmu_src")]
@@ -30,7 +32,7 @@ python_use_unqualified_type_names = True
 toc_object_entries_show_parents = "hide"
 
 html_theme = "furo"
-html_title = "prbm-impact"
+html_title = f"prbm-impact {version}"
 html_math_renderer = "mathml"
 html_show_sourcelink = html_copy_source = False
 html_show_sphinx = html_show_copyright = False
@@ -49,3 +51,23 @@ html_theme_options = {
         "color-brand-content": "#7fbcf5",
     },
 }
+
+# Links to edit a page, if the address of the repository is known (see hatch_build.py).
+server, repository = (os.environ.get(f"GITHUB_{name}", "") for name in ("SERVER_URL", "REPOSITORY"))
+address = os.environ.get("PRBM_REPOSITORY") or (f"{server}/{repository}" if repository else "")
+if address:
+    html_theme_options |= {"source_repository": f"{address}/", "source_branch": "main"}
+
+
+def without_edit_link(
+    app: Any, page: str, template: str, context: dict[str, Any], tree: Any
+) -> None:
+    """Omit the link of a page that is made from other files."""
+    suffix = context.get("page_source_suffix") or ""
+    if page == "index" or not (HERE.parent / f"{page}{suffix}").is_file():
+        context.pop("page_source_suffix", None)
+
+
+def setup(app: Any) -> None:
+    """Connect the function above."""
+    app.connect("html-page-context", without_edit_link)

@@ -8,7 +8,7 @@ from pathlib import Path, PurePosixPath
 
 import gallery
 import links
-from sources import HEADING, HIDDEN, Sources, readers
+from sources import HEADING, HIDDEN, Sources, kinds, readers
 
 TEXT = Path(__file__).with_name("front.md")
 INDEX = PurePosixPath("docs/index.md")
@@ -38,11 +38,12 @@ def listed_pages(listed: Sequence[str]) -> list[str]:
 
 
 def contents(sources: Sources, index: str) -> str:
-    """Return the contents of the site: a tree for each kind of reader, and those for all."""
+    """Return the contents of the site: a tree for each kind of pages, and those beside them."""
     trees = [_tree("", FIRST)]
-    for reader, listed in readers(index).items():
-        trees.append(_tree(reader, [*listed_pages(listed), *notebooks(sources, reader)]))
-    return "\n".join([*trees, _tree("For all", FOR_ALL)])
+    for kind, listed in kinds(index).items():
+        more = [f for r in readers(index) for f in notebooks(sources, r)] if len(trees) == 1 else []
+        trees.append(_tree(kind, [*listed_pages(listed), *more]))
+    return "\n".join([*trees, _tree("Everything", FOR_ALL)])
 
 
 def notebooks(sources: Sources, reader: str) -> list[str]:

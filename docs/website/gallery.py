@@ -54,6 +54,30 @@ def plain(text: str) -> str:
     return re.sub(r"([\\`*_{}\[\]()#+\-.!<>$~|&])", r"\\\1", " ".join(text.split()))
 
 
+def families(mechanisms: list[Mechanism]) -> list[list[Mechanism]]:
+    """Return mechanisms that differ by their flexure models together: the titles begin alike.
+
+    The first mechanism of a family is the one whose title says that it is the first choice.
+    """
+    found: dict[str, list[Mechanism]] = {}
+    for mechanism in mechanisms:
+        found.setdefault(mechanism.title.partition(",")[0], []).append(mechanism)
+    return [
+        sorted(family, key=lambda m: "first choice" not in m.title) for family in found.values()
+    ]
+
+
+def family_card(family: list[Mechanism]) -> str:
+    """Return the entry of mechanisms that differ by their flexure models, as HTML."""
+    more = "".join(
+        f'<li><a href="{other.name}.html">{other.name}</a>: '
+        f"{html.escape(other.title.partition(',')[2].strip())}</li>\n"
+        for other in family[1:]
+    )
+    variants = f'<ul class="variants">\n{more}</ul>\n' if more else ""
+    return f'<div class="mechanism-family">\n{card(family[0])}\n{variants}</div>'
+
+
 def card(mechanism: Mechanism) -> str:
     """Return the entry of a mechanism in the gallery, as HTML."""
     title, text = html.escape(mechanism.title), html.escape(first_sentences(mechanism.description))
@@ -108,8 +132,8 @@ equations and all variables. `prbm build {name}` builds its FMUs.
 
 
 def gallery_page(mechanisms: list[Mechanism]) -> str:
-    """Return the page of the gallery, with an entry for each mechanism."""
-    cards = "\n".join(card(mechanism) for mechanism in mechanisms)
+    """Return the page of the gallery, with an entry for each family of mechanisms."""
+    cards = "\n".join(map(family_card, families(mechanisms)))
     names = "\n".join(mechanism.name for mechanism in mechanisms)
     return f"""---
 hide-toc: true
@@ -117,9 +141,9 @@ hide-toc: true
 
 # Gallery
 
-The shipped mechanisms, drawn at release. Each page simulates its mechanism in the browser: drag a
-wall or the released body, change a parameter, look at the modes. This needs no installation and no
-network.
+The shipped mechanisms, from their release on. Each page simulates its mechanism in the browser:
+drag a wall or the released body, change a parameter, look at the modes. This needs no installation
+and no network.
 
 ```{{raw}} html
 <div class="gallery">

@@ -13,6 +13,7 @@ TITLES = {"README.md": "Installation and first run"}  # The front page has the n
 LANGUAGES = {".py": "python", ".toml": "toml", ".c": "c", ".h": "c", ".sh": "sh", ".json": "json"}
 TITLE = re.compile(r"^# .+$", re.MULTILINE)
 HEADING = re.compile(r"^## (.+)$", re.MULTILINE)
+KIND = re.compile(r"^\| ([^|:]+): [^|]+ \|(.+)\|$", re.MULTILINE)
 HIDDEN = "```{toctree}\n:hidden:\n"
 
 
@@ -51,6 +52,22 @@ def readers(index: str) -> dict[str, list[str]]:
         result[reader] = [link for link in dict.fromkeys(listed) if link not in seen]
         seen.update(listed)
     return result
+
+
+def kinds(index: str) -> dict[str, list[str]]:
+    r"""Return the pages of each kind: tutorials, how-to guides, reference and explanation.
+
+    Parameters
+    ----------
+    index : str
+        The page that lists all pages, with a table of the kinds.
+
+    Examples
+    --------
+    >>> kinds("| kind | pages |\n|---|---|\n| A: learn | [x](x.md), [y](y.md) |\n")
+    {'A': ['x.md', 'y.md']}
+    """
+    return {found[1]: list(links.linked(found[2])) for found in KIND.finditer(index)}
 
 
 class Sources:

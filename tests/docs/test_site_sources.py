@@ -7,10 +7,13 @@ from pathlib import PurePosixPath
 
 import pytest
 
+import drawings
 import front
+import gallery
 import links
 import prbm
 import sources
+from prbm.files.mechanism_file import load, shipped
 from support import ROOT
 
 EXAMPLES = PurePosixPath("examples/README.md")
@@ -73,6 +76,9 @@ def test_every_page_has_one_place_in_the_contents():
     index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
     listed = [link for pages in sources.readers(index).values() for link in pages]
     assert len(listed) == len(set(listed))
+    kinds = [link for pages in sources.kinds(index).values() for link in pages]
+    assert sorted(kinds) == sorted(set(listed) - {"../examples/README.md"})
+    assert [*sources.kinds(index)] == ["Tutorials", "How-to guides", "Reference", "Explanation"]
     assert {f"{path.name}" for path in (ROOT / "docs").glob("*.md")} - {*listed} == {
         "index.md", "glossary.md"
     }  # fmt: skip
@@ -115,3 +121,15 @@ def test_the_reference_has_the_public_names_and_those_that_pages_and_examples_im
 def test_examples_of_the_docstrings_hold(module):
     failures, tests = doctest.testmod(import_module(module))
     assert (failures, tests > 0) == (0, True)
+
+
+@pytest.mark.slow
+def test_cards_of_the_gallery_differ_and_move():
+    """Mechanisms that differ by their flexure models share a card."""
+    mechanisms = [load(name) for name in shipped()]
+    families = gallery.families(mechanisms)
+    assert sorted(m.name for family in families for m in family) == sorted(shipped())
+    assert families[[family[0].name for family in families].index("GuideBeam")][1:]
+    drawn = [drawings.drawing(family[0]) for family in families]
+    assert len({re.sub(r"aria-label=.*|<title>.*", "", text) for text in drawn}) == len(drawn)
+    assert all("<animate" in text for text in drawn)

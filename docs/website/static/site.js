@@ -17,6 +17,11 @@ if (location.protocol === "file:") {
   DOCUMENTATION_OPTIONS.SHOW_SEARCH_SUMMARY = false;
 }
 
+// Drawings stand still for readers who prefer it.
+if (window.matchMedia("(prefers-reduced-motion: reduce)").matches) {
+  document.querySelectorAll("svg.mechanism").forEach((drawing) => drawing.pauseAnimations());
+}
+
 // Let the keyboard scroll code and tables that are wider than the page.
 function markScrollable() {
   for (const box of document.querySelectorAll("article pre, article .table-wrapper")) {
