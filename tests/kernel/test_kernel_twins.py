@@ -656,7 +656,7 @@ def test_saddle_point_systems_and_their_solutions_are_the_same():
             kernel().solve_saddle(factors, ours)
             assert_same(ours, solution, rel)
             known = constraints.factor_saddle(
-                expected.copy("F"), constraints.scales(expected, n, 1.0)
+                expected, n, 1.0, constraints.scales(expected, n, 1.0)
             )
             assert_same(constraints.solve_saddle(known, right), solution, rel)
             x = right.copy()
@@ -760,7 +760,7 @@ def test_repeated_solutions_with_one_factorization_are_the_same(sizes, split):
             kkt = constraints.saddle(M, columns, rows)
             rel = spread(np.linalg.cond(kkt) * np.linalg.cond(M))
             right = rng.normal(size=(2, n + r))
-            known = constraints.factor_saddle(kkt.copy("F"), constraints.scales(kkt, n, 1.0))
+            known = constraints.factor_saddle(kkt, n, 1.0, constraints.scales(kkt, n, 1.0))
             for one in right:
                 expected = constraints.solve_saddle(known, one)
                 assert_same(solved_again(factors, one, n), expected, rel)

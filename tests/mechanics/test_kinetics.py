@@ -9,6 +9,7 @@ import sympy as sp
 from many_parts import cantilever, elastic
 from prbm.base.errors import SimulationError
 from prbm.hybrid.simulation import Simulation
+from prbm.mechanics import constraints
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.dynamics import Equations
 from prbm.mechanics.kinetics import inertia
@@ -162,3 +163,16 @@ def test_a_constraint_that_no_motion_changes_makes_the_equations_singular():
     equations = Equations(system, sim.inputs, sim.contacts, 0.0)
     with pytest.raises(SimulationError, match="singular"):
         equations.rate(0.0, sim.state())
+
+
+@pytest.mark.parametrize("slope", [1.0, 1e-4, 1e-7, 1e-11])
+def test_a_row_near_a_dead_centre_counts_until_it_is_round_off(slope):
+    """Two coordinates of unit mass; the row (slope, 0) gives the multiplier 1/slope^2."""
+    kkt = constraints.saddle(np.eye(2), *2 * [np.array([[slope, 0.0]])])
+    if slope < 1e-10:
+        with pytest.raises(SimulationError, match="singular"):
+            constraints.factor_saddle(kkt, 2, 1.0, np.ones(3))
+        return
+    factors = constraints.factor_saddle(kkt, 2, 1.0, np.ones(3))
+    found = constraints.solve_saddle(factors, np.array([0.0, 3.0, 1.0]))
+    assert found == pytest.approx([1.0 / slope, 3.0, -1.0 / slope**2], rel=1e-9)

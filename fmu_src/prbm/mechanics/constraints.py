@@ -113,18 +113,19 @@ def _lapack() -> ModuleType:
     return lapack
 
 
-def factor_saddle(kkt: Real, scale: Real) -> Factors:
+def factor_saddle(kkt: Real, n: int, length: float, scale: Real) -> Factors:
     """Factor a saddle-point matrix, or reject it as singular.
 
-    It is singular if a pivot of the scaled matrix, whose elements are near one, is less than
-    ``SINGULAR_RTOL``: its solution would be round-off.
+    It is singular if a pivot of the matrix with its own :func:`scales`, whose elements are near
+    one, is less than ``SINGULAR_RTOL``: its solution would be round-off.
 
     Parameters
     ----------
-    kkt : (n + r, n + r)
-        Saddle-point matrix, which is overwritten.
+    kkt, n, length
+        As for :func:`scales`.
     scale : (n + r,)
-        Scales D.
+        Scales that make the elements of matrices of this kind at most near one.  If a pivot is
+        round-off with them, the scales of the matrix itself decide.
 
     Raises
     ------
@@ -132,17 +133,23 @@ def factor_saddle(kkt: Real, scale: Real) -> Factors:
         If the matrix is singular: two constraints contradict or repeat each other, a constraint
         does not depend on the position, or a motion has no mass.
     """
-    kkt *= scale
-    kkt *= scale[:, None]
-    lu, pivots, _ = _lapack().dgetrf(kkt, overwrite_a=True)
-    _check_pivots(lu.diagonal())
+    lu, pivots, _ = _lapack().dgetrf(kkt * scale * scale[:, None], overwrite_a=True)
+    if not _regular(lu.diagonal()):
+        scale = scales(kkt, n, length)
+        lu, pivots, _ = _lapack().dgetrf(kkt * scale * scale[:, None], overwrite_a=True)
+        _check_pivots(lu.diagonal())
     return Factors(lu, pivots, scale)
+
+
+def _regular(diagonal: Real) -> bool:
+    """Return whether no pivot of a scaled matrix is round-off."""
+    pivots = np.abs(diagonal).tolist()
+    return min(pivots) > SINGULAR_RTOL * max(pivots)
 
 
 def _check_pivots(diagonal: Real) -> None:
     """Reject a scaled matrix with these pivots if one of them is round-off."""
-    pivots = np.abs(diagonal).tolist()
-    if not min(pivots) > SINGULAR_RTOL * max(pivots):
+    if not _regular(diagonal):
         raise SimulationError(SINGULAR)
 
 

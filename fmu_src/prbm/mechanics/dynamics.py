@@ -205,7 +205,7 @@ class Equations:
         for i in self.slipping_stops:
             share = self.stop_friction[i] * self.contacts.modes[i].slip
             kkt[: self.n, self.n + self.hold_row(i)] -= share * self.slip_row(i, e)
-        factors = constraints.factor_saddle(kkt, self.scale)
+        factors = constraints.factor_saddle(kkt, self.n, system.length, self.scale)
         x = constraints.solve_saddle(factors, np.concatenate([Q, bent]))
         return Evaluation(x[: self.n], -x[self.n :], M, factors, pressure)
 
