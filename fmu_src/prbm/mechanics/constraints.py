@@ -144,7 +144,7 @@ def factor_saddle(kkt: Real, n: int, length: float, scale: Real) -> Factors:
 def _regular(diagonal: Real) -> bool:
     """Return whether no pivot of a scaled matrix is round-off."""
     pivots = np.abs(diagonal).tolist()
-    return min(pivots) > SINGULAR_RTOL * max(pivots)
+    return bool(min(pivots) > SINGULAR_RTOL * max(pivots))
 
 
 def _check_pivots(diagonal: Real) -> None:
