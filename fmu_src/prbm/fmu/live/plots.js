@@ -108,8 +108,9 @@ function mostly(run, columns, row) {
   return Math.max(before, values[Math.floor(SHARE_SHOWN * (values.length - 1))] ?? 0);
 }
 
-// Return the least and the largest value of a column in a span of time, zero included.
-function range(run, column, [from, to]) {
+// Return the least and the largest value of a column in a span of time, or in the whole run, zero
+// included.
+function range(run, column, [from, to] = [0, Infinity]) {
   let [low, high] = [0, 0];
   const last = Math.min(run.count - 1, Math.ceil(to / run.step));
   for (let row = Math.floor(from / run.step); row <= last; row++) {
