@@ -119,7 +119,7 @@ def test_an_interrupted_study_keeps_the_rows_before_the_interruption(monkeypatch
     )
     assert table("PRBDM-study.csv.partial")["stop.position [m]"] == ["0.0", "0.001"]
     assert not Path("PRBDM-study.csv").exists()
-    monkeypatch.undo()
+    monkeypatch.setattr(RowFile, "add", add)
     assert run(f"{line} --stop-time 1ms --step 1ms --out .") == cli.OK
     assert len(table("PRBDM-study.csv")["stop.position [m]"]) == 4
     assert not Path("PRBDM-study.csv.partial").exists()
