@@ -50,7 +50,9 @@ class Mishap(Fmi2Slave):
         if self.trouble == EXHAUSTS:
             import resource
 
-            used = int(Path("/proc/self/statm").read_text("ascii").split()[0]) * resource.getpagesize()
+            used = (
+                int(Path("/proc/self/statm").read_text("ascii").split()[0]) * resource.getpagesize()
+            )
             resource.setrlimit(resource.RLIMIT_AS, (used + 2**26, used + 2**26))
             self.y = float(len(bytearray(2**30)))
         mark = Path(os.environ["MISHAP_LOG"]).with_suffix(".mark")
