@@ -292,11 +292,12 @@ def test_a_communication_step_may_be_left_at_each_internal_step(model):
         for kernel in (whole, pieces):
             kernel.set(change)
         whole.advance(time)
+        effort = (ctypes.c_double * 2)()  # Two whole numbers and a time.
         while pieces.get("time") < time or event.value:
             if event.value:
                 pieces.call("simulation_handle_event")
             at = ctypes.byref(event)
-            pieces.call("simulation_advance_some", time, True, at)
+            pieces.call("simulation_advance_some", time, True, effort, at)
             left += 1
         assert pieces.outputs() == whole.outputs()
     assert left >= 20

@@ -24,7 +24,7 @@ FUNCTIONS = {
     "simulation_get": (BOOL, POINTER, INT, POINTER, POINTER),
     "simulation_start": (BOOL, POINTER, DOUBLE, DOUBLE, BOOL, POINTER),
     "simulation_advance": (BOOL, POINTER, DOUBLE, POINTER),
-    "simulation_advance_some": (BOOL, POINTER, DOUBLE, BOOL, POINTER, POINTER),
+    "simulation_advance_some": (BOOL, POINTER, DOUBLE, BOOL, POINTER, POINTER, POINTER),
     "simulation_handle_event": (BOOL, POINTER, POINTER),
     "simulation_restore": (BOOL, POINTER, POINTER, POINTER),
     "simulation_reset": (None, POINTER),

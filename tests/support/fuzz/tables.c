@@ -74,7 +74,7 @@ static double short_time(Simulation *simulation) {
 
 /* Advance to a time, and abandon a step of a stiff mechanism that takes too many steps. */
 static bool advance_or_abandon(Simulation *simulation, double time, Problem *problem) {
-    int effort = 0;
+    Effort effort = {0, 0, 0.0};
     bool reached = false;
     if (!simulation_advance_part(simulation, time, STEPS_OF_ADVANCE, &effort, &reached, problem)) {
         return false;
@@ -91,7 +91,7 @@ static void advance(Simulation *simulation) {
     bool event;
     read_all(simulation);
     if (advance_or_abandon(simulation, time, &problem) &&
-        simulation_advance_some(simulation, 2 * time, false, &event, &problem) && event) {
+        simulation_advance_some(simulation, 2 * time, false, &effort, &event, &problem) && event) {
         (void)simulation_handle_event(simulation, &problem);
     }
     read_all(simulation);
