@@ -89,6 +89,7 @@ static void advance(Simulation *simulation) {
     Problem problem;
     double time = short_time(simulation);
     bool event;
+    Effort effort = {0, 0, 0.0};
     read_all(simulation);
     if (advance_or_abandon(simulation, time, &problem) &&
         simulation_advance_some(simulation, 2 * time, false, &effort, &event, &problem) && event) {
