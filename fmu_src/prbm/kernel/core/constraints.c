@@ -69,6 +69,11 @@ PRBM Complex swing(const Rows *rows, int i, const Complex *e, const double *v) {
         Complex arm = product(B[arm_of(system, j)], e[j]);
         sum = plus(sum, scaled(direction_of(system, v, j), arm));
     }
+    for (int k = 0; k < system->shift_count; k++) {
+        int j = system->shifts[k];
+        Complex arm = product(B[arm_of(system, j)], e[j]);
+        sum = plus(sum, scaled(direction_of(system, v, j), arm));
+    }
     return sum;
 }
 
@@ -126,6 +131,11 @@ PRBM double row_convective(const Rows *rows, int i, const Complex *e, const doub
         double rate = direction_of(system, v, a) - turn, strain = direction_of(system, v, j);
         Complex more = complex_of(-strain * strain, -2.0 * rate * strain);
         sum = plus(sum, product(more, product(B[a], e[a])));
+    }
+    for (int k = 0; on != FIXED && k < system->shift_count; k++) {
+        int j = system->shifts[k];
+        Complex arm = product(B[arm_of(system, j)], e[j]);
+        sum = plus(sum, scaled(-2.0 * turn * direction_of(system, v, j), arm));
     }
     return on == FIXED ? sum.re : product(conjugate(e[on]), sum).re;
 }
