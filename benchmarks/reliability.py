@@ -23,17 +23,19 @@ from reliability.report import Part
 PARTS = {
     # Name: size of the long run, size of the short run.
     "calls": (5_200_000, 100_000),
+    "python_calls": (300, 40),
     "states": (20_000, 2_000),
     "draws": (2_000, 20),
     "texts": (5_000, 300),
     "faults": (20, 3),
     "hostile": (4, 2),
+    "readers": (5, 5),
     "threads": (8, 4),
     "versions": (3, 1),
 }
-"""Calls in total, damaged states in total, draws of each mechanism, texts of each kind, points of
-failure of each command, kinds of links and devices, threads, and environments with versions of
-dependencies."""
+"""Calls in total, actions of each Python FMU, damaged states in total, draws of each mechanism,
+texts of each kind, points of failure of each command, kinds of links and devices, kinds of files
+that cannot be read, threads, and environments with versions of dependencies."""
 
 
 def main() -> int:

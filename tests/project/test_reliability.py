@@ -5,7 +5,18 @@ import re
 import pytest
 
 from c_importer import ANVIL, needs
-from reliability import calls, draws, faults, hostile, states, texts, threads, versions
+from reliability import (
+    calls,
+    draws,
+    faults,
+    hostile,
+    python_calls,
+    readers,
+    states,
+    texts,
+    threads,
+    versions,
+)
 from reliability.driver import drive
 from reliability.report import Part
 
@@ -31,6 +42,23 @@ def test_oracles_report_penetration_energy_and_cost():
     limits = {"gap_atol": -1.0, "energy_rtol": -1.0, "energy_factor": 0.0, "call_seconds": 0.0}
     found = drive(ANVIL, 2, "cs", "calls", count=1, size=40, **limits)
     assert set(found.violations()) == {"penetrated", "energy_lost", "over_budget"}
+
+
+@pytest.mark.slow
+def test_arbitrary_calls_of_a_python_fmu_give_true_values_or_errors():
+    caller = python_calls.called("PRBDM2R", 60, 1)
+    assert caller.wrong == []
+    assert caller.steps > 10
+    assert caller.rejected > 3
+
+
+@pytest.mark.slow
+def test_oracles_of_python_fmus_report_penetration_energy_and_values(monkeypatch):
+    monkeypatch.setattr(python_calls, "GAP_ATOL", -1.0)
+    monkeypatch.setattr(python_calls, "ENERGY_RTOL", -1.0)
+    found = python_calls.called("PRBDM", 20, 1).wrong
+    assert any("gap" in line for line in found)
+    assert any("the balance changed" in line for line in found)
 
 
 @pytest.mark.slow
@@ -89,6 +117,18 @@ def test_links_pipes_and_devices_lose_nothing(name):
     runs, wrong = hostile.attacked(name)
     assert wrong == []
     assert runs >= len(hostile.PLACED)
+
+
+@pytest.mark.skipif(not faults.available(), reason="links and devices of Linux")
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[] if name == "mechanism" else pytest.mark.slow)
+        for name in readers.COMMANDS
+    ],
+)
+def test_devices_folders_and_broken_links_are_refused_as_files(name):
+    assert readers.attacked(name) == []
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real
 
-FINE, RAISES, CRASHES, EXITS, HANGS, CRASHES_ONCE, KILLS_WORKER = range(7)
+FINE, RAISES, CRASHES, EXITS, HANGS, CRASHES_ONCE, KILLS_WORKER, EXHAUSTS = range(8)
 
 
 class Mishap(Fmi2Slave):
@@ -47,6 +47,12 @@ class Mishap(Fmi2Slave):
         if self.trouble == KILLS_WORKER:
             os.kill(os.getppid(), signal.SIGKILL)
             time.sleep(1e6)
+        if self.trouble == EXHAUSTS:
+            import resource
+
+            used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+            resource.setrlimit(resource.RLIMIT_AS, (used + 2**26, used + 2**26))
+            self.y = float(len(bytearray(2**30)))
         mark = Path(os.environ["MISHAP_LOG"]).with_suffix(".mark")
         if self.trouble == CRASHES_ONCE and not mark.exists():
             mark.touch()

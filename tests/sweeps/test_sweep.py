@@ -23,7 +23,7 @@ from scipy import stats
 
 import prbm
 from coupled import integrator
-from mishap import CRASHES, CRASHES_ONCE, EXITS, FINE, HANGS, KILLS_WORKER, RAISES
+from mishap import CRASHES, CRASHES_ONCE, EXHAUSTS, EXITS, FINE, HANGS, KILLS_WORKER, RAISES
 from native_host import clocked
 from prbm.base.errors import ParameterError
 from prbm.commands.command_line import main
@@ -229,6 +229,16 @@ def test_a_crash_an_exit_a_hang_and_an_error_cost_one_row_each(mishap, log):
     fine = out["status"] == "ok"
     np.testing.assert_array_equal(out["y"][fine], out["x"][fine])
     assert runs(log) == Counter(table["x"])
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="limits the memory of a process of Linux")
+def test_a_run_without_memory_costs_one_row(mishap, log):
+    table = pd.DataFrame({"x": np.arange(4.0), "trouble": [FINE, EXHAUSTS, FINE, FINE]})
+    out = sweep(mishap, table, step=0.5, workers=1, retries=0)
+    assert out["status"].tolist() == ["ok", "failed", "ok", "ok"]
+    assert out["message"][1]
+    assert out["y"].drop(1).tolist() == [0.0, 2.0, 3.0]
 
 
 @pytest.mark.slow
