@@ -16,7 +16,7 @@ from reference_check import (
     DAMPED,
     EQUAL_RTOL,
     EXCHANGE_RTOL,
-    EXPERIMENT_NAMES,
+    EXPERIMENTS,
     compared,
     file_of,
     member,
@@ -30,7 +30,6 @@ pytestmark = [
     pytest.mark.skipif("FMUSIM" not in os.environ, reason="needs the variable FMUSIM"),
 ]  # fmt: skip
 INTERFACES = [(2, "cs"), (3, "cs"), (2, "me"), (3, "me")]
-EXPERIMENTS = pytest.mark.parametrize("experiment", EXPERIMENT_NAMES)
 interfaces = pytest.mark.parametrize(("fmi", "kind"), INTERFACES)
 
 

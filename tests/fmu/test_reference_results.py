@@ -24,6 +24,7 @@ from reference_check import (
     DAMPED,
     EXCHANGE_RTOL,
     EXPERIMENT_NAMES,
+    EXPERIMENTS,
     compared,
     file_of,
     member,
@@ -34,9 +35,6 @@ from support import COSTLY_MODELS, GUIDES, each_shipped, mechanism
 
 SCHEMAS = Path(fmpy.__file__).parent / "schema"
 pytestmark = [pytest.mark.fmu, pytest.mark.native]
-
-
-EXPERIMENTS = pytest.mark.parametrize("experiment", EXPERIMENT_NAMES)
 
 
 @EXPERIMENTS

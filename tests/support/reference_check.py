@@ -6,6 +6,7 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
+import pytest
 from fmpy import read_model_description
 
 from compliant_pivot import two_compliant_stops
@@ -20,6 +21,7 @@ EXCHANGE_RTOL = 1e-3
 RATIO_FACTOR = 10.0  # Of these, for modal_restitution.
 DAMPED = {"damping.zeta": 0.05}  # Without damping the motion between two stops is chaotic.
 EXPERIMENT_NAMES = ("default", "smoke", "validation")
+EXPERIMENTS = pytest.mark.parametrize("experiment", EXPERIMENT_NAMES)
 
 
 def member(fmu: Path, name: str) -> bytes:
