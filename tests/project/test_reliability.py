@@ -105,14 +105,13 @@ def test_files_are_old_or_new_after_a_fault_at_a_write(name):
     assert found["faults"] >= 6
 
 
+def slow_but(fast, names):
+    """Return parameters that are marked as slow, but for one."""
+    return [pytest.param(name, marks=[] if name == fast else pytest.mark.slow) for name in names]
+
+
 @pytest.mark.skipif(not faults.available(), reason="links, pipes and devices of Linux")
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=[] if name == "modes" else pytest.mark.slow)
-        for name in hostile.COMMANDS
-    ],
-)
+@pytest.mark.parametrize("name", slow_but("modes", hostile.COMMANDS))
 def test_links_pipes_and_devices_lose_nothing(name):
     runs, wrong = hostile.attacked(name)
     assert wrong == []
@@ -120,13 +119,7 @@ def test_links_pipes_and_devices_lose_nothing(name):
 
 
 @pytest.mark.skipif(not faults.available(), reason="links and devices of Linux")
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=[] if name == "mechanism" else pytest.mark.slow)
-        for name in readers.COMMANDS
-    ],
-)
+@pytest.mark.parametrize("name", slow_but("mechanism", readers.COMMANDS))
 def test_devices_folders_and_broken_links_are_refused_as_files(name):
     assert readers.attacked(name) == []
 
