@@ -129,7 +129,9 @@ def kick(
     if lowest <= found.rounding:
         return  # A motion without stiffness.
     try:
-        sim = KernelSimulation(guide, {"damping.zeta": RATIO, "release.velocity": 0.0, **loads})
+        # With a velocity, the state is found among the saved numbers, most of which are zeros.
+        start = {"damping.zeta": RATIO, "release.velocity": KICK, **loads}
+        sim = KernelSimulation(guide, start)
     except PrbmError:
         findings.reasons[("motion", "not started at the drawn shape")] += 1
         return
@@ -139,6 +141,7 @@ def kick(
     v = KICK * rate * phi / np.abs(phi).max()
     saved, y = sim.snapshot(), sim.state()
     numbers = np.array(saved["numbers"])
+    assert y[n : 2 * n].any()
     places = range(len(numbers) - len(y) + 1)
     place = next(k for k in places if np.array_equal(numbers[k : k + len(y)], y))
     numbers[place : place + n], numbers[place + n : place + 2 * n] = shape.q, v
