@@ -34,7 +34,7 @@ ABOUT = {
     "validation": "the results of the thesis, computed again",
     "plots": "figures, pictures and films",
     "systems": "coupled FMUs: master, SSP, containers, model exchange",
-    "sweeps": "parameter sweeps and Monte Carlo with Dask",
+    "sweeps": "studies: runner, designs, optima, sensitivities",
     "analysis": "impact maps, spectra, holding forces, fits: numbers only",
     "references": "finite elements, algorithm of the thesis, beam theory",
     "data": "measured records, uncertainty, modulus, vibration",

@@ -15,7 +15,7 @@ from prbm.fmu.parameter_sets import read_parameter_set
 from prbm.runs import inputs, result
 from prbm.runs.inputs import read_signal
 from prbm.runs.result import read_csv
-from prbm.sweeps import results, sweep, table
+from prbm.sweeps import journal, sweep, table
 from prbm.sweeps.sweep import read_fmu
 from prbm.systems.components import described
 
@@ -94,15 +94,13 @@ def test_no_more_of_an_endless_file_is_read_than_the_limit(monkeypatch, kind, mo
         BOUNDED[kind](Path("/dev/zero"))
 
 
-def test_no_device_or_pipe_replaces_a_file_of_a_sweep(tmp_path, monkeypatch):
-    monkeypatch.setattr(results, "SETTINGS_SIZE_MAX", 1000)
-    stored = results.Results(tmp_path, {}, (), ())
-    (tmp_path / results.SETTINGS).symlink_to("/dev/zero")
-    with pytest.raises(PrbmError, match="larger than 1000 bytes, the limit"):
-        stored.begin()
-    os.mkfifo(tmp_path / "part-000000-1f3a.parquet")
-    with pytest.raises(PrbmError, match="not a file"):
-        stored.read()
+def test_no_device_or_pipe_is_the_journal_of_a_study(tmp_path):
+    written = journal.Journal(tmp_path / "table.csv", {}, (), ())
+    assert written.path is not None
+    os.mkfifo(written.path)
+    with pytest.raises(PrbmError, match="a pipe or a device"), written.opened():
+        pass
+    assert written.path.is_fifo()
 
 
 def test_a_table_in_parquet_is_no_pipe(tmp_path):

@@ -25,7 +25,9 @@ def test_the_code_of_the_page_runs():
 def test_the_command_of_the_page_finds_the_optimum_of_the_page(tmp_path, monkeypatch, capsys):
     """The irregular side of the optimum depends on errors of the integration: 2 % are allowed."""
     monkeypatch.chdir(tmp_path)
-    command, shocks = re.findall(r"```sh\n(.*?)```", PAGE, re.DOTALL)
+    command, shocks, limited = re.findall(r"```sh\n(.*?)```", PAGE, re.DOTALL)
+    assert main(shlex.split(limited.replace("\\\n", " "))[1:]) == 0
+    assert "constraints: fundamental > 5 Hz (5" in capsys.readouterr().out
     assert main(shlex.split(shocks.replace("\\\n", " "))[1:]) == 0
     assert "height [-]  impact_speed [m/s]" in capsys.readouterr().out
     assert main(shlex.split(command.replace("\\\n", " "))[1:]) == 0

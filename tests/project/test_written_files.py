@@ -9,15 +9,14 @@ PACKAGE = Path(prbm.__file__).parent
 WRITERS = {
     "base/atomic.py": "the function itself",
     "cad/importing.py": "a temporary folder, for the reader",
-    "commands/output.py": "completed rows of a study, beside its table",
     "drawing/style.py": "memory",
     "fmu/archive.py": "memory",
     "kernel/compiler.py": "a temporary folder, for the compiler",
     "kernel/header.py": "the sources of the project",
     "kernel/library.py": "a temporary folder, for the loader",
     "plots/animation.py": "a temporary folder, for the film",
-    "sweeps/runs.py": "standard output",
-    "sweeps/worker.py": "a temporary folder, for standard error",
+    "sweeps/children.py": "standard output",
+    "sweeps/journal.py": "completed rows of a study, beside its table",
     "systems/ssp.py": "memory",
     "systems/structure.py": "a temporary folder, for FMUs of packages",
 }

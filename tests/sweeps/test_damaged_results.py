@@ -1,37 +1,103 @@
-"""Damaged results of a sweep are named, never used."""
+"""Damaged or foreign journals of a study are named, never used."""
+
+import os
 
 import pytest
 
-pytest.importorskip("pyarrow")
-
+from prbm.base.atomic import FileError
 from prbm.base.errors import ParameterError
+from prbm.sweeps.journal import OWNER, Journal
 from prbm.sweeps.outputs import Outcome
-from prbm.sweeps.results import Results
+
+SETTINGS = {"step": 1.0}
+ROW, FAILURE = Outcome("ok", values=(2.0,)), Outcome("failed", "no,\n'way'")
+
+
+def journal(folder, settings=SETTINGS) -> Journal:
+    return Journal(folder / "table.csv", settings, ["mass"], ["gap [m]"])
 
 
 @pytest.fixture
-def results(tmp_path):
-    """Return the results of one run."""
-    found = Results(tmp_path / "r", {"step": 1.0}, ["mass"], ["gap"])
-    found.begin()
-    return found
+def folder(tmp_path):
+    """Return a folder with a journal of two rows."""
+    written = journal(tmp_path)
+    with written.opened():
+        written.add((1.0,), ROW)
+        written.add((0.1 + 0.2,), FAILURE)
+    return tmp_path
 
 
-@pytest.mark.parametrize("content", [b"[]", b"null", b"1", b"{", b"\xff\xfe", b"[" * 100_000])
-def test_damaged_settings_are_named(results, content):
-    (results.folder / "_sweep.json").write_bytes(content)
-    with pytest.raises(ParameterError, match=r"_sweep\.json is damaged; delete"):
-        results.begin()
+def known(folder) -> dict[tuple[float, ...], Outcome]:
+    read = journal(folder)
+    with read.opened():
+        return dict(read.known)
 
 
-def test_a_row_with_a_negative_number_is_named(results):
-    results.add([-5], [{"mass": 1.0}], [Outcome("ok", "", 0.1, (2.0,))])
-    with pytest.raises(ParameterError, match=r"negative one.*remove it to repeat its runs"):
-        results.read()
+def test_rows_are_kept_to_the_last_bit(folder):
+    assert known(folder) == {(1.0,): ROW, (0.1 + 0.2,): Outcome("failed", "no, 'way'")}
 
 
-def test_a_draft_of_a_killed_process_is_removed(results):
-    (results.folder / "_sweep.json").rename(results.folder / "._sweep.json.1f3a")
-    with results.lock():
-        results.begin()
-    assert {path.name for path in results.folder.iterdir()} == {"_sweep.json", "_sweep.lock"}
+@pytest.mark.parametrize("cut", [1, 5, 20])
+def test_an_incomplete_line_is_cut_off(folder, cut):
+    path = folder / "table.csv.partial"
+    path.write_bytes(path.read_bytes()[:-cut])
+    assert known(folder) == {(1.0,): ROW}
+    assert known(folder) == {(1.0,): ROW}  # A second owner follows complete lines.
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        ("# {", "# ["),
+        ("mass", "mess"),
+        ("1.0,2.0", "1.0,2.0,3.0"),
+        ("1.0,2.0", "1.0,two"),
+        ("# {", "# " + "[" * 100_000),
+    ],
+)
+def test_a_damaged_journal_is_named(folder, change):
+    path = folder / "table.csv.partial"
+    path.write_text(path.read_text(encoding="utf-8").replace(*change), encoding="utf-8")
+    with pytest.raises(ParameterError, match=r"table\.csv\.partial is damaged; remove it"):
+        known(folder)
+
+
+def test_other_settings_are_named_and_can_be_overwritten(folder):
+    other = journal(folder, {"step": 2.0})
+    with pytest.raises(ParameterError, match=r"another step \(1.0, now 2.0\)"), other.opened():
+        pass
+    assert len(known(folder)) == 2
+    with other.opened(overwrite=True):
+        assert other.known == {}
+
+
+def test_failed_rows_are_forgotten_on_request(folder):
+    read = journal(folder)
+    with read.opened(retry_failed=True):
+        assert read.known == {(1.0,): ROW}
+
+
+def test_a_second_writer_is_refused_with_the_process_of_the_first(tmp_path):
+    first, second = journal(tmp_path), journal(tmp_path)
+    with (
+        first.opened(),
+        pytest.raises(ParameterError, match=rf"another study \(process {os.getpid()} on"),
+        second.opened(),
+    ):
+        pass
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_empty_journal_is_removed(tmp_path):
+    with journal(tmp_path).opened():
+        content = (tmp_path / "table.csv.partial").read_text(encoding="utf-8")
+    assert content.splitlines()[1].startswith(OWNER)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_link_is_no_journal(tmp_path):
+    (tmp_path / "other").write_text("keep", encoding="utf-8")
+    (tmp_path / "table.csv.partial").symlink_to(tmp_path / "other")
+    with pytest.raises(FileError, match="a link"), journal(tmp_path).opened():
+        pass
+    assert (tmp_path / "other").read_text(encoding="utf-8") == "keep"

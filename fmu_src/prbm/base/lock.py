@@ -71,17 +71,56 @@ def locked(path: Path, *, wait: bool = True) -> Iterator[None]:
         os.close(handle)
 
 
+def open_locked(path: Path) -> int:
+    """Return the descriptor of a regular file that is open for reading and writing, and locked.
+
+    The file is created with its folder if necessary.  Closing it releases the lock.  If the file
+    system has no locks, the file is not locked.
+
+    Raises
+    ------
+    LockedError
+        If the lock is held.
+    FileError
+        If the path is a link, a pipe or a device, or the file has another name.
+    OSError
+        If the file cannot be opened.
+    """
+    while True:
+        handle = _open(path)
+        try:
+            _lock(handle, False)
+        except BlockingIOError:
+            os.close(handle)
+            raise LockedError("another process") from None
+        except OSError:  # The file system has no locks.
+            return handle
+        if os.fstat(handle).st_nlink:
+            return handle
+        os.close(handle)  # Its last owner has removed it meanwhile.
+
+
 def _opened(path: Path) -> int | None:
     """Open the file of a lock; return None if it cannot be opened.
 
     Its content is replaced, so that it must not be the content of another file.
     """
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        return _open(path)
+    except FileError:
+        raise
+    except OSError:
+        return None
+
+
+def _open(path: Path) -> int:
+    """Open a regular file that has no other name."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
         handle = os.open(path, FLAGS, 0o666)
     except OSError as error:
         if error.errno != errno.ELOOP and not path.is_symlink():
-            return None
+            raise
         raise _foreign(path) from None
     found = os.fstat(handle)
     if stat.S_ISREG(found.st_mode) and found.st_nlink <= 1:  # 0: removed meanwhile.

@@ -174,8 +174,8 @@ def sweep_arguments(parser: ArgumentParser) -> None:
         help="CSV or Parquet file with one column per variable and one row per run, in SI units",
     )  # fmt: skip
     add(
-        "--out", default="results.parquet", metavar="DIR",
-        help="folder of the results (default: %(default)s)",
+        "--out", default="results.parquet", metavar="FILE",
+        help="Parquet file of the results (default: %(default)s)",
     )  # fmt: skip
     add(
         "--output", "--of", action="append", metavar="OUTPUT",
@@ -209,24 +209,50 @@ def study_arguments(parser: ArgumentParser) -> None:
     """Add the arguments of ``prbm study``."""
     add = parser.add_argument
     add(
-        "--vary", action="append", required=True, metavar="NAME=LOW:HIGH:COUNT",
-        help="parameter or input and its samples; a unit of HIGH holds for both; once or twice",
+        "--vary", action="append", metavar="NAME=RANGE",
+        help="parameter or input: LOW:HIGH:COUNT for samples, whose combinations are simulated; "
+        "LOW:HIGH or 'VALUE +- 2 %%' for a range or a tolerance from which --runs are drawn; "
+        "a unit of HIGH holds for both; repeatable",
     )  # fmt: skip
+    add("--table", type=Path, metavar="FILE.csv", help="list of simulations, in place of --vary")
+    add("--runs", type=int, metavar="N", help="number of simulations that are drawn")
+    add(
+        "--method", choices=("sobol", "latin", "random", "sensitivity"), default="sobol",
+        help="how they are drawn; sensitivity: indices of Sobol from N (p + 2) simulations "
+        "(default: %(default)s)",
+    )  # fmt: skip
+    add("--seed", type=int, default=0, metavar="K", help="seed of --runs (default: 0)")
     add(
         "--of", nargs="+", metavar="OUTPUT",
-        help="outputs: settling, impacts, impact_speed, peak_speed, peak_force, peak_stress, "
-        "energy_lost; a variable, for its final value; max(x), min(x), mean(x), first(x > 0), "
-        "since(x > 0), also of abs(x)",
+        help="outputs: settling, settling_estimate, impacts, last_impact, impact_speed, impulse, "
+        "peak_speed, peak_force, peak_stress, energy_lost; fundamental, mode(2), rest(shuttle.x), "
+        "which need no simulation; a variable, for its final value; max(x), min(x), mean(x), "
+        "first(x > 0), since(x > 0), also of abs(x)",
     )  # fmt: skip
     optimum = parser.add_mutually_exclusive_group()
     optimum.add_argument("--minimise", metavar="OUTPUT", help="output whose minimum is searched")
     optimum.add_argument("--maximise", metavar="OUTPUT", help="output whose maximum is searched")
+    add(
+        "--subject-to", nargs="+", default=[], metavar="CONSTRAINT",
+        help="conditions on outputs, e.g. 'fundamental > 40 Hz'; the share of drawn simulations "
+        "that satisfy them is their yield",
+    )  # fmt: skip
+    add(
+        "--tolerance-of", action="append", default=[], metavar="NAME=TOLERANCE",
+        help="tolerance for the yield around the optimum, e.g. 'stop.position=0.1 mm'; repeatable",
+    )  # fmt: skip
     add("--step", metavar="T", help="time between samples of a motion [s] (default: 1/4000 of it)")
     add(
         "--tolerance", metavar="X",
         help="relative tolerance of the integration (default: solver.tolerance)",
     )  # fmt: skip
     add("--workers", type=int, metavar="N", help="number of processes (default: one per core)")
+    add(
+        "--scheduler", metavar="ADDRESS",
+        help="Dask scheduler that runs the simulations, e.g. tcp://host:8786",
+    )  # fmt: skip
+    add("--timeout", metavar="T", help="longest duration of a simulation [s] (default: no limit)")
+    add("--overwrite", action="store_true", help="forget the rows of an interrupted study")
 
 
 def stop_time_argument(parser: ArgumentParser) -> None:

@@ -446,10 +446,12 @@ def _sweep(commands: Commands) -> None:
 def _study(commands: Commands) -> None:
     parser = add_command(
         commands, "study", "study:run_study",
-        "simulate over one or two parameters, and find the optimum of an output",
+        "simulate over parameters: optimum under constraints, yield, sensitivities",
         examples(
             'prbm study PRBDM2R --vary "stop.position=-4:2 mm:25" --stop-time 0.5 \\\n'
             '      --of settling "max(abs(shuttle.vx))" --minimise settling --out results',
+            'prbm study PRBDM2R --vary "stop.position=0 mm +- 0.3 mm" --runs 256 \\\n'
+            '      --of settling --subject-to "settling < 0.3 s" --stop-time 1',
         ),
     )  # fmt: skip
     mechanism_argument(parser)

@@ -1,19 +1,15 @@
 """Output files of a command: tables and figures, written together at the end."""
 
-import csv
-import io
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 from ..base.atomic import FileError, check_file, check_no_folder, check_writable, write_all
+from ..base.csv_text import csv_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-PARTIAL = ".partial"  # End of the name of a file with the first rows of a table.
 
 
 @dataclass
@@ -88,99 +84,6 @@ class Output:
             ) from None
         for path in self.files:
             print(path)
-
-
-class RowFile:
-    """The rows of a table that is written at the end, kept in a file beside it meanwhile.
-
-    The table itself is replaced at once, when it is complete.  If the computation ends early, the
-    rows so far remain in ``NAME.partial``.
-
-    Parameters
-    ----------
-    folder : Path or None
-        Output folder, which is created; None: no file is written.
-    name : str
-        Name of the table.
-
-    Raises
-    ------
-    FileError
-        If the table or the file of its rows cannot be written at its path.
-    """
-
-    def __init__(self, folder: Path | None, name: str) -> None:
-        self.path = None if folder is None else folder / f"{name}{PARTIAL}"
-        self.count = 0
-        self.file: IO[str] | None = None
-        if folder is not None and self.path is not None:
-            check_file(folder / name)
-            check_file(self.path)
-
-    def add(self, heads: Sequence[str], row: Sequence[object]) -> None:
-        """Write a row, after the heads if it is the first one."""
-        if self.path is None:
-            return
-        text = csv_text(heads, [row])
-        try:
-            if self.file is None:
-                self.path.parent.mkdir(parents=True, exist_ok=True)
-                self.path.unlink(missing_ok=True)
-                self.file = self.path.open("x", encoding="utf-8", newline="")
-            else:
-                text = text.partition("\n")[2]
-            self.file.write(text)
-            self.file.flush()
-        except OSError as error:
-            raise FileError(
-                f"cannot write {self.path}: {error.strerror}; choose another folder with --out"
-            ) from None
-        self.count += 1
-
-    def close(self) -> None:
-        """Close the file."""
-        if self.file is not None:
-            with suppress(OSError):  # Reported by the last flush.
-                self.file.close()
-            self.file = None
-
-    def remove(self) -> None:
-        """Remove the file, when the table has been written."""
-        self.close()
-        if self.path is not None:
-            self.path.unlink(missing_ok=True)
-
-    @property
-    def kept(self) -> str:
-        """Phrase about the rows that have been written; empty if there are none."""
-        return f"{self.path} has the {self.count} completed rows" if self.count else ""
-
-
-def csv_text(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """Return a table as CSV.
-
-    Examples
-    --------
-    >>> print(csv_text(["mode", "frequency [Hz]"], [[1, 4.5]]), end="")
-    mode,frequency [Hz]
-    1,4.5
-    """
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(head)
-    writer.writerows([_cell(x) for x in row] for row in rows)
-    return out.getvalue()
-
-
-def _cell(x: object) -> str:
-    """Return a cell: numbers with all digits, Booleans as 1 and 0, as FMPy writes them."""
-    if isinstance(x, str):
-        return x
-    if x is None:
-        return ""
-    if type(x).__name__ in ("bool", "bool_"):
-        return "1" if x else "0"
-    return repr(x.item()) if hasattr(x, "item") else repr(x)
 
 
 def aligned(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

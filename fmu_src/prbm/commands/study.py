@@ -1,13 +1,13 @@
-"""``prbm study``: simulations over one or two parameters, and the optimum of an output."""
+"""``prbm study``: simulations over parameters, their optimum, yield and sensitivities."""
 
 import argparse
 import re
-from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..base.errors import ParameterError
 from ..base.names import unknown
 from ..base.progress import reporter
 from ..base.unit_text import prefixed_unit
@@ -21,17 +21,22 @@ from ..files.settings import (
     settings,
     units_of,
 )
+from ..fmu.parameter_sets import parameter_set
+from ..fmu.start import interface
 from ..mechanics.arrays import Real
 from ..mechanism.description import Mechanism
 from ..runs.inputs import placeholders
-from ..sweeps.study import FLAT_RTOL, Optimum, Study, study
+from ..sweeps.design import Yield, tolerance_parts
+from ..sweeps.optimum import FLAT_RTOL, Optimum
+from ..sweeps.study import Study, study
 from .duration import given_inputs
-from .output import Output, RowFile, aligned
+from .output import Output, aligned
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 EXAMPLE = '--vary "stop.position=-4:2 mm:25"'
+FILES = ("study.csv", "study.png", "best.ssv")  # Ends of the names of the written files.
 NUMBER = re.compile(r"[+-]?[\d.]+([eE][+-]?\d+)?")
 ROWS_PRINTED_MAX = 45  # Longer tables are only written.
 DIGITS = 5  # Significant digits of printed numbers.
@@ -43,73 +48,76 @@ def run_study(options: argparse.Namespace) -> None:
     values = settings(mechanism, options.set)
     output = Output(options.out)
     inputs = given_inputs(options)
-    varied = _varied(
-        {**units_of(mechanism), **dict.fromkeys(placeholders(inputs), "")}, options.vary
-    )
-    tolerance = optional_quantity(options.tolerance, "", "--tolerance")
-    table, figure = (f"{mechanism.name}-study.{suffix}" for suffix in ("csv", "png"))
-    output.check(figure)
-    written, rows = RowFile(options.out, table), list[Sequence[object]]()
-
-    def keep(heads: Sequence[str], row: Sequence[object]) -> None:
-        written.add(heads, row)
-        rows.append(row)
-        if len(rows) == 1:
-            rows.insert(0, heads)
-
-    found = _reporting(written, lambda: study(
-        mechanism, varied, options.of or [], minimise=options.minimise, maximise=options.maximise,
+    names = {**units_of(mechanism), **dict.fromkeys(placeholders(inputs), "")}
+    table, figure, best = (f"{mechanism.name}-{end}" for end in FILES)
+    output.check(table, figure, best)
+    found = study(
+        mechanism, _vary(options, names), options.of or [], runs=options.runs,
+        method=options.method, seed=options.seed,
+        minimise=options.minimise, maximise=options.maximise, subject_to=options.subject_to,
+        tolerances=pairs(options.tolerance_of, "--tolerance-of", "stop.position=0.1mm"),
         values=values, inputs=inputs,
         stop_time=optional_quantity(options.stop_time, "s", "--stop-time"),
-        step=optional_quantity(options.step, "s", "--step"), tolerance=tolerance,
-        workers=options.workers, engine=options.engine, progress=reporter(),
-        rows=keep,
-    ))  # fmt: skip
+        step=optional_quantity(options.step, "s", "--step"),
+        tolerance=optional_quantity(options.tolerance, "", "--tolerance"),
+        workers=options.workers, executor=options.scheduler,
+        timeout=optional_quantity(options.timeout, "s", "--timeout"), engine=options.engine,
+        table=None if options.out is None else options.out / table,
+        overwrite=options.overwrite, progress=reporter(),
+    )  # fmt: skip
     columns = dict(zip(found.varied, found.points.T, strict=True)) | dict(found.outputs)
     _print_table(columns, found.units)
     failed = [message for message in found.messages if message]
     print(f"{len(found.points)} simulations, {len(failed)} failed")
     for message in dict.fromkeys(failed[:3]):
         print(f"failed: {message}")
+    _print_sensitivities(found)
     if found.optimum is not None:
         verb = "least" if options.maximise is None else "largest"
+        if len(found.varied) > 1:
+            _print_best(found.optimum, found.units)
         for line in _optimum_lines(found.optimum, found.units, verb):
             print(line)
-    output.table(table, [str(head) for head in rows[0]], rows[1:])
+        output.text(best, _best_set(mechanism, found.optimum, values))
+    if found.share is not None:
+        print(_yield_line(found.share, options.subject_to))
     output.figure(figure, lambda: _figure(mechanism, found))
+    if options.out is not None:
+        print(options.out / table)
     output.write()
-    written.remove()
 
 
-def _reporting(written: RowFile, run: Callable[[], Study]) -> Study:
-    """Return a study; an error or Ctrl-C says which rows have been written."""
-    try:
-        return run()
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"interrupted; {written.kept}" if written.kept else "") from None
-    except ParameterError as error:
-        raise ParameterError(f"{error}; {written.kept}" if written.kept else str(error)) from None
-    finally:
-        written.close()
+def _vary(options: argparse.Namespace, units: Mapping[str, str]) -> dict[str, Any] | Path:
+    """Return the parameters: samples, ranges, tolerances, or the path of a list."""
+    if (options.table is None) == (options.vary is None):
+        raise UserMistake("give the parameters with --vary, or a list of them with --table")
+    if options.table is not None:
+        return Path(options.table)
+    return _varied(units, options.vary, options.runs is not None)
 
 
-def _varied(units: Mapping[str, str], texts: Sequence[str]) -> dict[str, Real]:
+def _varied(units: Mapping[str, str], texts: Sequence[str], drawn: bool) -> dict[str, Any]:
     """Return the samples of the parameters given by --vary, from the units of all parameters."""
-    found = {}
+    found: dict[str, Any] = {}
     for name, text in pairs(texts, "--vary", EXAMPLE).items():
         option = f"--vary {name}="
         if name not in units:
             raise UserMistake(f"--vary {name}: {unknown(name, units)}")
+        if drawn and tolerance_parts(text):
+            found[name] = text
+            continue
         parts = [part.strip() for part in text.split(":")]
-        if len(parts) != 3 or not re.fullmatch(r"\d{1,6}", parts[2]) or int(parts[2]) < 2:
+        if drawn and len(parts) == 2:
+            parts.append("2")
+        elif len(parts) != 3 or not re.fullmatch(r"\d{1,6}", parts[2]) or int(parts[2]) < 2:
             raise UserMistake(
                 f"{option}{text}: write LOW:HIGH:COUNT with a count of at least 2, for instance "
-                f"{EXAMPLE}"
+                f"{EXAMPLE}; or LOW:HIGH or VALUE +- TOLERANCE with --runs"
             )
         low, high = _ends(parts[0], parts[1], units[name], option)
         if not low < high:
             raise UserMistake(f"{option}{text}: the lower end must be below the upper one")
-        found[name] = np.linspace(low, high, int(parts[2]))
+        found[name] = (low, high) if drawn else np.linspace(low, high, int(parts[2]))
     return found
 
 
@@ -156,6 +164,16 @@ def _optimum_lines(optimum: Optimum, units: Mapping[str, str], verb: str) -> lis
         f"{verb} {optimum.output}: {_text(optimum.value, units[optimum.output])} at {place}, with "
         f"{len(optimum.values)} more simulations"
     ]
+    if optimum.constraints:
+        reached = [
+            f"{text} ({_text(x, units[name])}{', active' * (text in optimum.active)})"
+            for (text, x), name in zip(
+                optimum.constraints.items(), optimum.constrained, strict=True
+            )
+        ]
+        lines.append(f"constraints: {'; '.join(reached)}")
+    if "impacts" in optimum.others:
+        lines.append(f"impacts: {optimum.others['impacts']:g}")
     for name, (low, high) in optimum.flat.items():
         ends = "" if all(optimum.bounded[name]) else "; it reaches the end of the samples"
         lines.append(
@@ -173,10 +191,50 @@ def _optimum_lines(optimum: Optimum, units: Mapping[str, str], verb: str) -> lis
     return lines
 
 
+def _print_best(optimum: Optimum, units: Mapping[str, str]) -> None:
+    """Print the best points of all simulations, the best one first."""
+    print(f"best {len(optimum.best)} points:")
+    columns = dict(zip(optimum.point, optimum.best.T, strict=True))
+    _print_table({**columns, optimum.output: optimum.best_values}, units)
+
+
+def _print_sensitivities(found: Study) -> None:
+    """Print first-order and total indices of each output with their confidence intervals."""
+    for output, indices in found.sensitivities.items():
+        rows = []
+        for k, name in enumerate(indices.names):
+            (a, b), (c, d) = indices.first_interval[k], indices.total_interval[k]
+            rows.append([name, f"{indices.first[k]:.3f}", f"{a:.3f} to {b:.3f}",
+                         f"{indices.total[k]:.3f}", f"{c:.3f} to {d:.3f}"])  # fmt: skip
+        print(f"shares of the variance of {output}:")
+        print(aligned(["parameter", "alone", "95 %", "in total", "95 %"], rows))
+
+
+def _yield_line(share: Yield, constraints: Sequence[str]) -> str:
+    return (
+        f"yield: {100 * share.share:.4g} % of {share.runs} simulations satisfy "
+        f"{' and '.join(constraints)}; 95 % confidence: {100 * share.low:.4g} to "
+        f"{100 * share.high:.4g} %"
+    )
+
+
+def _best_set(mechanism: Mechanism, optimum: Optimum, values: Mapping[str, float]) -> str:
+    """Return the parameters of the optimum as a parameter set for other commands and tools."""
+    known = {p.name for p in mechanism.parameters}
+    changes = {**values, **{n: x for n, x in optimum.point.items() if n in known}}
+    return parameter_set(
+        mechanism, interface(mechanism, changes), mechanism.name, changes
+    ).decode()  # fmt: skip
+
+
 def _figure(mechanism: Mechanism, found: Study) -> "Figure":
-    from ..plots.study import curves, maps  # imported here: it takes a second
+    from ..plots.study import curves, maps, scatter  # imported here: it takes a second
 
     best = found.optimum
+    if not found.whole_grid or len(found.varied) > 2:
+        columns = dict(zip(found.varied, found.points.T, strict=True))
+        point = None if best is None else (best.point, best.others)
+        return scatter(mechanism.title, columns, found.outputs, found.units, found.good, point)
     if len(found.varied) == 2:
         marked = None if best is None else (best.output, [*best.point.values()], best.value)
         return maps(mechanism.title, found.varied, found.outputs, found.units, marked)

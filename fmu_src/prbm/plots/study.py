@@ -1,4 +1,4 @@
-"""Figures of parameter studies: outputs over one parameter, maps over two."""
+"""Figures of studies: outputs over one parameter, maps over two, scatter over more."""
 
 from collections.abc import Mapping, Sequence
 
@@ -16,6 +16,7 @@ from .scene import plain
 PANEL_HEIGHT, WIDTH = 2.2, 7.0  # Of an output over one parameter [inch].
 MAP = (4.6, 3.6)  # Width and height of a map [inch].
 MAP_COLUMNS = 2
+SCATTER = (2.6, 2.2)  # Width and height of a panel [inch].
 
 
 class Scaled:
@@ -127,4 +128,58 @@ def maps(
     for axes in every[len(outputs) :]:
         axes.set_visible(False)
     figure.suptitle(title, fontsize=11)
+    return figure
+
+
+@own_style()
+def scatter(
+    title: str,
+    parameters: Mapping[str, Real],
+    outputs: Mapping[str, Real],
+    units: Mapping[str, str],
+    good: Sequence[bool] | Real,
+    best: tuple[Mapping[str, float], Mapping[str, float]] | None,
+) -> Figure:
+    """Draw each output over each parameter as dots: filled if all constraints hold, else open.
+
+    Parameters
+    ----------
+    title : str
+        Title of the figure.
+    parameters, outputs : mapping
+        Values (n,) by name; NaN for failed simulations.
+    units : mapping
+        SI units of both.
+    good : (n,)
+        Whether each simulation satisfies all constraints.
+    best : (mapping, mapping) or None
+        Parameters and outputs of the optimum.
+    """
+    rows, columns = len(outputs), len(parameters)
+    size = (1.0 + SCATTER[0] * columns, 0.9 + SCATTER[1] * rows)
+    figure = Figure(size, dpi=120, layout="constrained")
+    table = figure.subplots(rows, columns, squeeze=False, sharex="col", sharey="row")
+    held = np.broadcast_to(np.asarray(good, bool), len(next(iter(outputs.values()))))
+    for i, (output, values) in enumerate(outputs.items()):
+        y = Scaled(output, units[output], values)
+        for j, (name, samples) in enumerate(parameters.items()):
+            x, axes = Scaled(name, units[name], samples), table[i, j]
+            if not held.all():
+                axes.plot(x.x[~held], y.x[~held], "o", markerfacecolor="none", color=PAST,
+                          markersize=3.5, label="violated")  # fmt: skip
+            axes.plot(x.x[held], y.x[held], "o", color=BODY, markersize=3.0, label="simulations")
+            if best is not None:
+                axes.plot(x.factor * best[0][name], y.factor * best[1][output], "v", color=IMPACT,
+                          markersize=7.0, label="optimum")  # fmt: skip
+            plain(axes)
+            if j == 0:
+                axes.set_ylabel(y.label.replace(" [", "\n["))
+            if i == rows - 1:
+                axes.set_xlabel(x.label)
+    if best is not None or not held.all():
+        handles, labels = table[0, 0].get_legend_handles_labels()
+        figure.legend(
+            handles, labels, loc="outside upper right", ncols=3, frameon=False, fontsize=9
+        )
+    figure.suptitle(title, fontsize=11, x=0.01, ha="left")
     return figure

@@ -43,6 +43,9 @@ class Quantity:
         Latched output whose value after a recorded impact the number is not below; or empty.
     remedy : str
         How a mechanism gets the needed variables if it lacks them; or empty.
+    history : bool
+        Whether it is computed from all communication points, and not only from the last one and
+        the recorded impacts.
     """
 
     unit: str
@@ -51,6 +54,7 @@ class Quantity:
     compute: Callable[[Table], float]
     latched: str = ""
     remedy: str = ""
+    history: bool = False
 
     def value(self, columns: Table, impacts: Sequence[Impact] = ()) -> float:
         """Return the number from the columns and from the recorded impacts, if there are any."""
@@ -175,6 +179,34 @@ def settling_estimate(columns: Table, since: float) -> float:
     return float(t[at[1]] + np.log(after / (SETTLED_ENERGY_RTOL * energy.max())) / rate)
 
 
+def settling_or_estimate(columns: Table) -> float:
+    """Return the settling time, or its estimate if the motion has not settled [s].
+
+    The estimate (:func:`settling_estimate`) begins at the last impact that the latched outputs
+    name; it is NaN or infinite if the motion gives none.
+    """
+    found = settling(columns)
+    since = last_impact(columns)
+    return (
+        settling_estimate(columns, 0.0 if np.isnan(since) else since) if np.isnan(found) else found
+    )
+
+
+def last_impact(columns: Table) -> float:
+    """Return the time of the last impact at all stops [s]; NaN without impacts."""
+    hits = [
+        float(columns[name][-1])
+        for name in _named(columns, ".impact_time")
+        if columns[name.replace(".impact_time", ".impact_count")][-1] > 0
+    ]
+    return max(hits, default=nan)
+
+
+def largest_impulse(columns: Table) -> float:
+    """Return the largest impulse of an impact [N s], 0 without impacts."""
+    return _largest(columns, ".impulse")
+
+
 def impacts(columns: Table) -> float:
     """Return the number of impacts at all stops."""
     return float(sum(columns[name][-1] for name in _named(columns, ".impact_count")))
@@ -232,7 +264,20 @@ def _largest(columns: Table, suffix: str) -> float:
 
 
 QUANTITIES: dict[str, Quantity] = {
-    "settling": Quantity("s", "settling time", (KINETIC, FREQUENCY), settling),
+    "settling": Quantity("s", "settling time", (KINETIC, FREQUENCY), settling, history=True),
+    "settling_estimate": Quantity(
+        "s",
+        "settling time, estimated if it is not reached",
+        (KINETIC, FREQUENCY, ".impact_time", ".impact_count"),
+        settling_or_estimate,
+        history=True,
+    ),
+    "last_impact": Quantity(
+        "s", "time of the last impact", (".impact_time", ".impact_count"), last_impact
+    ),
+    "impulse": Quantity(
+        "N s", "largest impulse of an impact", (".impulse",), largest_impulse, "impulse"
+    ),
     "impacts": Quantity("", "number of impacts", (".impact_count",), impacts),
     "impact_speed": Quantity(
         "m/s",
@@ -256,6 +301,8 @@ QUANTITIES: dict[str, Quantity] = {
         peak_stress,
         remedy="it needs a flexure type with stress = true",
     ),
-    "peak_speed": Quantity("m/s", "largest speed of a body", (".vx", ".vy", ".omega"), peak_speed),
+    "peak_speed": Quantity(
+        "m/s", "largest speed of a body", (".vx", ".vy", ".omega"), peak_speed, history=True
+    ),
     "energy_lost": Quantity("J", "dissipated energy", ("energy.dissipated",), energy_lost),
 }

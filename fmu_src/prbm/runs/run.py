@@ -2,7 +2,7 @@
 
 import logging
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from ..base.names import unknown
 from ..base.progress import Progress
 from ..hybrid.configuration import replaced_tolerance
 from ..hybrid.records import Impact
+from ..mechanics.arrays import Real
 from ..mechanism.description import Mechanism
 from ..mechanism.parameters import by_name
 from .driving import Driver
@@ -128,13 +129,9 @@ def simulate(
     times = communication_points(duration, spacing)
     if tolerance is not None:
         tolerance = in_unit("tolerance", tolerance, "")
-    motion = simulation(mechanism, values, tolerance=tolerance, engine=engine)
-    _warn(motion, motion.values["solver.tolerance"] if tolerance is None else tolerance)
-    _check_effort(motion, spacing)
-    _check_walls(motion, driver, source)
+    motion = _begun(mechanism, values, driver, source, times[-1], spacing, tolerance, engine)
     impacts: list[Impact] = []
     motion.record = impacts
-    driver.sample(motion.frequency, motion.tolerance, times[-1])
     start = {**motion.values, **motion.given}
     columns: Columns = np.empty(0)
     observe = observer or _ignore
@@ -153,6 +150,84 @@ def simulate(
         if progress is not None:
             progress(k / (len(times) - 1))
     return Result(mechanism, start, columns, tuple(impacts), motion.engine)
+
+
+def sampled(
+    mechanism: Mechanism,
+    values: Mapping[str, float],
+    names: Sequence[str],
+    *,
+    stop_time: float,
+    step: float,
+    tolerance: float | None = None,
+    engine: str | None = None,
+    at_impacts: bool = False,
+) -> tuple[dict[str, Real], tuple[Impact, ...]]:
+    """Return outputs of a simulation without inputs over time, the same numbers as `simulate`.
+
+    It computes the outputs ``names`` only, and so takes hardly longer than the engine alone.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The mechanism.
+    values : mapping
+        Parameters and inputs that differ from their defaults, in SI.
+    names : sequence of str
+        Outputs and inputs.
+    stop_time, step, tolerance, engine
+        As for :func:`simulate`, in SI.
+    at_impacts : bool
+        Sample directly before and at each impact, too.  The motion is then computed twice if it
+        has impacts; it does not depend on the times of the samples.
+
+    Returns
+    -------
+    columns : dict of (m,)
+        ``time`` and the outputs.
+    impacts : tuple of Impact
+        All impacts.
+
+    Raises
+    ------
+    ParameterError, EquilibriumError, SimulationError
+        As :func:`simulate`.
+    """
+    times = communication_points(stop_time, step)
+    motion = _begun(mechanism, values, Driver({}), None, times[-1], step, tolerance, engine)
+    constant = {name: x for name, x in {**motion.values, **motion.given}.items() if name in names}
+    wanted = [name for name in names if name not in constant and name != "time"]
+    impacts: list[Impact] = []
+    motion.record = impacts
+    table = motion.sample(times, wanted)
+    if at_impacts and impacts:
+        beside = {t for hit in impacts for t in (math.nextafter(hit.time, 0.0), hit.time)}
+        times = sorted({*times, *(t for t in beside if 0.0 < t < times[-1])})
+        table = simulation(mechanism, values, tolerance=tolerance, engine=engine).sample(
+            times, wanted
+        )
+    columns = dict(zip(wanted, np.array(table, float).T, strict=True))
+    columns |= {name: np.full(len(times), x) for name, x in constant.items()}
+    return {"time": np.array(times), **columns}, tuple(impacts)
+
+
+def _begun(
+    mechanism: Mechanism,
+    values: Mapping[str, float],
+    driver: Driver,
+    source: Source | None,
+    end: float,
+    spacing: float,
+    tolerance: float | None,
+    engine: str | None,
+) -> Engine:
+    """Return a motion at its start, after warnings and checks of its effort and of its walls."""
+    motion = simulation(mechanism, values, tolerance=tolerance, engine=engine)
+    _warn(motion, motion.values["solver.tolerance"] if tolerance is None else tolerance)
+    _check_effort(motion, spacing)
+    _check_walls(motion, driver, source)
+    driver.sample(motion.frequency, motion.tolerance, end)
+    return motion
 
 
 def _check_walls(motion: Engine, driver: Driver, source: Source | None) -> None:

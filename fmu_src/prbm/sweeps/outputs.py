@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.errors import ParameterError
 from ..hybrid.records import Impact
 from ..runs.quantities import QUANTITIES
 
@@ -21,6 +22,11 @@ OK, ENDED, FAILED, CRASHED, TIMEOUT = "ok", "ended", "failed", "crashed", "timeo
 GOOD = OK, ENDED
 
 QUANTITY = "quantity"  # Reduction of a named quantity.
+MODE, REST = "mode", "rest"  # Reductions of outputs without a simulation.
+FUNDAMENTAL = "fundamental"  # Name of the first frequency at rest.
+SMOOTH = ("x", "y", "angle", "vx", "vy", "omega", "gap", "gap_rate")
+"""Ends of names of outputs that are smooth between impacts, so that a parabola finds extremes."""
+CLOSE = 1e-3  # Points with less than this share of the usual distance belong to an impact.
 PULSES = {
     ".force": "peak_force", ".stress": "peak_stress", ".stress_start": "peak_stress",
     ".stress_end": "peak_stress",
@@ -66,6 +72,45 @@ class Output:
     bound: float = 0.0
     absolute: bool = False
 
+    @property
+    def static(self) -> bool:
+        """Whether the output is that of a rest position, without a simulation."""
+        return self.reduction in (MODE, REST)
+
+    @property
+    def latched(self) -> bool:
+        """Whether impacts set the variable, so that its extremes are those of the impacts."""
+        return self.variable.rpartition(".")[2] in OF_IMPACTS
+
+    @property
+    def history(self) -> bool:
+        """Whether all communication points are needed, not only the last one and the impacts."""
+        if self.reduction == QUANTITY:
+            return QUANTITIES[self.variable].history
+        extreme = self.reduction in ("max", "min")
+        return self.reduction in ("mean", "first", "since") or (extreme and not self.latched)
+
+    @property
+    def at_impacts(self) -> bool:
+        """Whether values directly before and after each impact are needed."""
+        return self.history and self.reduction not in ("first", "since")
+
+    def at_rest(self, shape: Any) -> float:
+        """Return the value of a static output for a static shape.
+
+        Raises
+        ------
+        ParameterError
+            If the mechanism has fewer modes.
+        """
+        if self.reduction == REST:
+            body, _, what = self.variable.rpartition(".")
+            return float(getattr(shape.positions[body], what))
+        found, k = shape.modes.frequency, int(self.variable)
+        if k > len(found):
+            raise ParameterError(f"{self.column}: the mechanism has {len(found)} modes only")
+        return float(found[k - 1])
+
     def variables(self, names: Iterable[str]) -> list[str]:
         """Return the variables among names that are needed."""
         if self.reduction == QUANTITY:
@@ -103,6 +148,7 @@ RELATIONS: dict[str, Callable[[Real, float], NDArray[np.bool_]]] = {
     ">": np.greater, ">=": np.greater_equal, "<": np.less, "<=": np.less_equal,
 }  # fmt: skip
 _REDUCTION = re.compile(r"(final|max|min|mean|first|since)\((.*)\)", re.DOTALL)
+_STATIC = re.compile(r"(mode)\(\s*([1-9]\d{0,3})\s*\)|(rest)\((.*)\)")
 _ABSOLUTE = re.compile(r"abs\((.*)\)", re.DOTALL)
 _CONDITION = re.compile(r"(.*)(<=|>=|<|>)([^<>=]+)", re.DOTALL)
 
@@ -127,6 +173,11 @@ def parse_output(text: str, known: Container[str], column: str | None = None) ->
     True
     """
     name = text if column is None else column
+    static = None if text in known else _STATIC.fullmatch(text.strip())
+    if text.strip() == FUNDAMENTAL and text not in known:
+        return Output(name, "1", MODE)
+    if static is not None:
+        return Output(name, (static[2] or static[4]).strip(), static[1] or static[3])
     if text not in known and text.strip() in QUANTITIES:
         return Output(name, text.strip(), QUANTITY)
     call = None if text in known else _REDUCTION.fullmatch(text.strip())
@@ -153,7 +204,9 @@ def _absolute(output: Output, known: Container[str]) -> Output:
 
 
 def evaluate(
-    output: Output, columns: Mapping[str, NDArray[Any]], impacts: Sequence[Impact] = ()
+    output: Output,
+    columns: Mapping[str, NDArray[Any]],
+    impacts: Sequence[Impact] | None = None,
 ) -> float:
     """Return the value of an output.
 
@@ -165,7 +218,8 @@ def evaluate(
         ``time`` and the variables of the output; only the last value is needed for ``final``.
     impacts : sequence of Impact
         All impacts, if the engine has recorded them; named quantities and extremes then see each
-        of them, also of several between two communication points.
+        of them, also of several between two communication points.  Extremes of positions and
+        velocities are then those of parabolas through the points.
 
     Examples
     --------
@@ -174,11 +228,43 @@ def evaluate(
     3.0
     """
     if output.reduction == QUANTITY:
-        return QUANTITIES[output.variable].value(columns, impacts)
+        return QUANTITIES[output.variable].value(columns, impacts or ())
     x = np.asarray(columns[output.variable], np.float64)
     if output.reduction in ("max", "min"):
-        x = np.append(x, _at_impacts(output.variable, impacts))
+        between = np.empty(0)
+        if impacts is not None:
+            between = _between(output, columns["time"], x, [impact.time for impact in impacts])
+        x = np.concatenate((x, _at_impacts(output.variable, impacts or ()), between))
     return reduce(output, columns["time"], np.abs(x) if output.absolute else x)
+
+
+def _between(output: Output, t: Real, x: Real, hits: Sequence[float]) -> Real:
+    """Return the extremes between samples of a smooth output, (k,).
+
+    An extreme is that of the parabola through a sample and its neighbours, if there is no impact
+    after the first and until the last of the three times.
+
+    Examples
+    --------
+    >>> t = np.array([0.0, 1.0, 3.0, 4.0])
+    >>> found = _between(Output("y", "b.y", "max"), t, 7.0 - (t - 1.5) ** 2, [])
+    >>> found.tolist(), _between(Output("y", "b.y", "max"), t, t * (3.0 - t), [1.2]).tolist()
+    ([7.0], [])
+    """
+    if output.variable.rpartition(".")[2] not in SMOOTH or len(t) < 3:
+        return np.empty(0)
+    h, slope = np.diff(t), np.diff(x) / np.diff(t)
+    before, after = slope[:-1], slope[1:]
+    count = np.searchsorted(np.sort(hits), t, side="right")  # Impacts until each time.
+    k = np.flatnonzero(
+        (before * after < 0.0)
+        & (count[2:] == count[:-2])
+        & (np.minimum(h[:-1], h[1:]) > CLOSE * np.median(h))
+    )
+    curve = (after[k] - before[k]) / (h[k] + h[k + 1])
+    # x = x_k + s (t - t_k) + curve (t - t_k)^2 with s the slope of the parabola at t_k.
+    s = before[k] + curve * h[k]
+    return np.asarray(x[k + 1] - s**2 / (4.0 * curve))
 
 
 def _at_impacts(variable: str, impacts: Sequence[Impact]) -> list[float]:

@@ -1,31 +1,31 @@
-"""Parameter studies of a mechanism: grids of simulations without an FMU, and their optimum.
+"""Studies of a mechanism: many simulations without an FMU, and their optimum.
 
     prbm study PRBDM2R --vary "stop.position=-8:8 mm:17" --of settling --minimise settling
 
-The simulations run in processes on all cores of this machine.  A simulation that fails is a row
-with its message.  The best sample is refined by further simulations.
+The simulations run in processes on all cores of this machine, or in another executor
+(:mod:`.runner`).  A simulation that fails is a row with its message.
 """
 
-import itertools
+import hashlib
 import math
-from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Future
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, field
-from time import perf_counter
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize, minimize_scalar
 
-from ..base.errors import ParameterError, PrbmError
+from ..base.atomic import check_file, write
+from ..base.csv_text import csv_text
+from ..base.errors import ParameterError
 from ..base.names import proposal
-from ..base.processes import executor, process_count
 from ..base.progress import Progress
+from ..base.version import __version__
 from ..hybrid.configuration import checked_tolerance
 from ..hybrid.given import start_values
 from ..hybrid.simulation import Simulation
+from ..interface.tables import tables
 from ..interface.variables import variables
 from ..mechanics.arrays import Real
 from ..mechanics.stress import with_stress
@@ -34,112 +34,36 @@ from ..runs.engine import PYTHON, check_engine, kernel_available
 from ..runs.experiment import experiment
 from ..runs.inputs import Source, filled, placeholders, signals
 from ..runs.quantities import QUANTITIES
-from ..runs.result import names
-from ..runs.run import communication_points, in_si, in_unit, simulate
+from ..runs.run import communication_points, in_si, in_unit
 from ..runs.signals import Signal
-from .outputs import FAILED, OK, QUANTITY, Outcome, Output, SpecificationError, evaluate
+from .design import (
+    SENSITIVITY,
+    Sensitivity,
+    Yield,
+    drawn,
+    grid,
+    read_rows,
+    sensitivity,
+    tolerance_parts,
+    toleranced,
+    yield_of,
+)
+from .journal import Journal
+from .mechanism import MechanismJob
+from .optimum import REFINEMENTS_EXPECTED, Constraint, Optimum, Samples, Search
+from .outputs import MODE, QUANTITY, REST, Outcome, Output, SpecificationError
 from .outputs import parse_output as parse
+from .runner import Runner, pool
 
 STEPS = 4000  # Communication steps of a simulation, which resolve the vibration after impacts.
 RUNS_MAX = 100_000  # More simulations are a mistake in the number of samples.
-NEIGHBOURS = 5  # Samples of a range whose worst output is compared with that of other ranges.
-FLAT_RTOL = 0.05  # An optimum is flat where the output is within this share of it.
-REFINED_RTOL = 1e-3  # Tolerance of the refined parameters, relative to the distance of samples.
-ROUNDS_MAX = 4  # Repetitions of the refinement.
-REFINEMENTS_MAX = 40  # Simulations that refine an optimum.
-REFINEMENTS_EXPECTED = 30  # Usual number of simulations of a refinement, for the progress.
 LAST_FRACTION = 0.99  # Reported progress while a refinement takes more simulations than usual.
-EDGE_RTOL = 0.02  # Tolerance of the ends of the flat range, relative to the distance of samples.
 NAMES_LISTED_MAX = 12  # Messages about unknown outputs do not list more names.
 TIMES = ("first", "since")  # Reductions whose value is a time.
-Rows = Callable[[Sequence[str], Sequence[object]], object]
-Samples = Sequence[float | str] | Real
-
-
-@dataclass(frozen=True)
-class Setup:
-    """A study before its simulations.
-
-    Parameters
-    ----------
-    mechanism : Mechanism
-        The mechanism.
-    outputs : tuple of Output
-        The outputs.
-    values : mapping
-        Parameters and inputs of all simulations.
-    inputs : mapping
-        Inputs over time of all simulations.
-    options : mapping
-        Further arguments of :func:`prbm.runs.run.simulate`: stop_time, step, tolerance, engine.
-    """
-
-    mechanism: Mechanism
-    outputs: tuple[Output, ...]
-    values: Mapping[str, float]
-    inputs: Mapping[str, Source]
-    options: Mapping[str, Any]
-
-    def run(self, values: Mapping[str, float]) -> Outcome:
-        """Simulate once; errors of the simulation are returned as outcomes."""
-        begin = perf_counter()
-        within = placeholders(self.inputs)
-        others = {name: x for name, x in values.items() if name not in within}
-        try:
-            result = simulate(
-                self.mechanism, {**self.values, **others}, inputs=filled(self.inputs, values),
-                **self.options,
-            )  # fmt: skip
-        except PrbmError as error:
-            return Outcome(FAILED, str(error), perf_counter() - begin)
-        columns = _by_name(result.columns)
-        found = tuple(evaluate(output, columns, result.impacts) for output in self.outputs)
-        return Outcome(OK, "", perf_counter() - begin, found)
-
-
-def _by_name(columns: Any) -> dict[str, Any]:
-    return {name: columns[name] for name in names(columns)}
-
-
-@dataclass(frozen=True, repr=False)
-class Optimum:
-    """The refined optimum of an output.
-
-    Parameters
-    ----------
-    output : str
-        The output.
-    point : mapping
-        Values of the varied parameters.
-    value : float
-        The output there.
-    flat : mapping
-        For each varied parameter the range in which the output is within 5 % of the optimum.  With
-        two parameters it is the range of the connected samples.
-    bounded : mapping
-        For each varied parameter whether this range ends inside the samples, at both ends.
-    points : (m, p)
-        Parameters of all simulations of the refinement.
-    values : (m,)
-        The output there; NaN for a failed simulation.
-    robust : (float, float, float) or None
-        First and last of the five neighbouring samples of one parameter whose worst output is best,
-        and this output.  None with two parameters, with fewer samples, or if all ranges have failed
-        simulations.
-    """
-
-    output: str
-    point: Mapping[str, float]
-    value: float
-    flat: Mapping[str, tuple[float, float]]
-    bounded: Mapping[str, tuple[bool, bool]]
-    points: Real
-    values: Real
-    robust: tuple[float, float, float] | None = None
-
-    def __repr__(self) -> str:
-        place = ", ".join(f"{name} = {x:.6g}" for name, x in self.point.items())
-        return f"<Optimum of {self.output}: {self.value:.6g} at {place}>"
+YIELD_RUNS = 256  # Simulations around an optimum that give its yield.
+YIELD_SEED = 1
+PLACES = {"x": "m", "y": "m", "angle": "rad"}  # Outputs of a rest position, and their units.
+Vary = Mapping[str, Any] | str | Path
 
 
 @dataclass(frozen=True, repr=False)
@@ -149,8 +73,8 @@ class Study:
     Parameters
     ----------
     varied : mapping
-        Samples (k,) of each varied parameter by name; the grid has all combinations, the last
-        parameter varies fastest.
+        Samples (k,) of each varied parameter by name.  A grid has all combinations, and the last
+        parameter varies fastest; otherwise the samples are those of the points.
     points : (n, p)
         Parameters of each simulation.
     outputs : mapping
@@ -161,6 +85,15 @@ class Study:
         The error of each simulation; empty if it succeeded.
     optimum : Optimum or None
         The optimum, if one was requested.
+    whole_grid : bool
+        Whether the points are a grid.
+    good : (n,)
+        Whether each simulation has succeeded and satisfies all constraints.
+    share : Yield or None
+        The share of simulations that satisfy the constraints, if there are any and the points are
+        drawn; with an optimum and tolerances, that of simulations around the optimum.
+    sensitivities : mapping
+        Sobol's indices of each output, if they were requested and exist.
     """
 
     varied: Mapping[str, Real]
@@ -169,6 +102,10 @@ class Study:
     units: Mapping[str, str]
     messages: tuple[str, ...] = ()
     optimum: Optimum | None = field(default=None)
+    whole_grid: bool = True
+    good: Any = True
+    share: Yield | None = None
+    sensitivities: Mapping[str, Sensitivity] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         failed = sum(map(bool, self.messages))
@@ -178,55 +115,95 @@ class Study:
             f"{failed} failed{best}>"
         )
 
+    def table(self) -> tuple[list[str], list[list[object]]]:
+        """Return heads and rows: parameters and outputs with their units, and the error."""
+        heads = [f"{n} [{self.units[n] or '-'}]" for n in (*self.varied, *self.outputs)]
+        values = np.column_stack([self.points, *self.outputs.values()])
+        rows: list[list[object]] = [
+            [*row, message] for row, message in zip(values.tolist(), self.messages, strict=True)
+        ]
+        return [*heads, "error"], rows
+
 
 def study(
     mechanism: Mechanism,
-    vary: Mapping[str, Samples],
-    outputs: Sequence[str],
+    vary: Vary,
+    outputs: Sequence[str] = (),
     *,
+    runs: int | None = None,
+    method: str = "sobol",
+    seed: int = 0,
     minimise: str | None = None,
     maximise: str | None = None,
+    subject_to: Sequence[str] = (),
+    tolerances: Mapping[str, str] | None = None,
     values: Mapping[str, float | str] | None = None,
     inputs: Mapping[str, Source] | None = None,
     stop_time: float | str | None = None,
     step: float | str | None = None,
     tolerance: float | None = None,
     workers: int | None = None,
+    executor: Executor | str | None = None,
+    timeout: float | None = None,
     engine: str | None = None,
+    table: str | Path | None = None,
+    overwrite: bool = False,
     progress: Progress | None = None,
-    rows: Rows | None = None,
 ) -> Study:
-    """Simulate a mechanism on a grid of parameters, and find the optimum of an output.
+    """Simulate a mechanism for many parameters, and find the optimum of an output.
 
-    The optimum is searched around the best sample, for one parameter by Brent's bounded method
-    between the neighbours of the sample, for two by the simplex of Nelder and Mead.
-
-    In a script, call it under ``if __name__ == "__main__":``, because the processes import the
-    script; ``workers=1`` starts no processes.
+    The optimum is searched from the best samples, for one parameter by Brent's bounded method
+    between the neighbours of the sample, for more by the simplex of Nelder and Mead, under
+    constraints after COBYQA.
 
     Parameters
     ----------
     mechanism : Mechanism
         The mechanism.
     vary : mapping
-        Increasing samples of one or two parameters or inputs by name, numbers in SI or texts with
-        a unit, ``"-4 mm"``; or of numbers that are written as ``{name}`` in the texts of inputs.
+        Increasing samples of parameters or inputs by name, numbers in SI or texts with a unit,
+        ``"-4 mm"``, whose combinations are simulated; or of numbers that are written as ``{name}``
+        in the texts of inputs.  With ``runs``, for each name (low, high), a distribution of
+        ``scipy.stats``, or a tolerance such as ``"0.1 mm +- 2 %"`` or ``"+- 2 %"`` of the value of
+        the mechanism: a normal distribution with three standard deviations in the half-width, or a
+        uniform one, ``"+- 2 % uniform"``.  Or the path of a CSV file with a row for each simulation
+        and a column for each name, in SI or with a unit in the head, ``stop.position [mm]``.
     outputs : sequence of str
-        Outputs as of :func:`prbm.sweeps.sweep.sweep`: ``settling``, ``max(abs(shuttle.vx))``.  If
-        one of them is a stress, all flexures have stress outputs.
+        Outputs as of :func:`prbm.sweeps.sweep.sweep`: ``settling``, ``max(abs(shuttle.vx))``; or,
+        without a simulation, ``fundamental``, ``mode(2)`` and ``rest(shuttle.x)``.  If one of them
+        is a stress, all flexures have stress outputs.
+    runs : int or None
+        Number of points that are drawn; None: ``vary`` is a grid.
+    method, seed : str, int
+        How they are drawn: ``sobol``, ``latin`` or ``random``; or ``sensitivity`` for the indices
+        of Sobol from runs (p + 2) simulations of p parameters.
     minimise, maximise : str or None
         The output whose optimum is searched, at most one of them.
+    subject_to : sequence of str
+        Constraints on outputs, ``"fundamental > 40 Hz"``.
+    tolerances : mapping or None
+        Tolerances of parameters, ``{"flexure.thickness": "2 %"}``, that give the yield around the
+        optimum.
     values, inputs, stop_time, tolerance, engine
         As for :func:`prbm.simulate`.
     step : float, str or None
         Communication step, the resolution of the outputs in time [s]; None: 1/4000 of the duration.
     workers : int or None
-        Number of processes; None: one per core.
+        Number of processes; None: one per core.  With one, the simulations run in this process,
+        unless they have a timeout.
+    executor : Executor, str or None
+        A ``concurrent.futures`` executor, such as that of Dask's ``Client.get_executor()``, or the
+        address of a Dask scheduler; None: this machine.
+    timeout : float or None
+        Longest duration of a simulation [s]; None: no limit.
+    table : str, Path or None
+        Path of a table of the simulations (CSV), which is written at the end.  Completed rows are
+        in ``TABLE.partial`` beside it until then, and a study with the same settings continues from
+        there.
+    overwrite : bool
+        Forget the rows of an earlier study.
     progress : callable or None
         Called with the completed fraction, from 0 to 1.
-    rows : callable or None
-        Called with the heads of the table, and with the row of each simulation of the grid as soon
-        as it and those before it are complete: parameters, outputs, the error.
 
     Raises
     ------
@@ -235,45 +212,171 @@ def study(
     UserMistake
         If a text is not a quantity of the right dimension.
     """
-    within = placeholders(inputs or {})
-    samples = _checked(mechanism, vary, within)
+    plan = _plan(
+        mechanism, vary, outputs, runs, (method, seed), _goal(minimise, maximise), subject_to,
+        values, inputs, (stop_time, step, tolerance, engine),
+    )  # fmt: skip
+    spread = _around(plan, tolerances or {})
+    if table is not None:
+        check_file(Path(table))
+    if timeout is not None and not timeout > 0.0:
+        raise ParameterError(f"timeout = {timeout:g} s must be positive")
+    with pool(workers, len(plan.points), serial=timeout is None, executor=executor) as where:
+        if where.executor is not None:
+            _check_sources(plan.job.inputs)
+        journal = Journal(
+            None if table is None else Path(table), plan.settings, plan.names, plan.texts
+        )
+        with journal.opened(overwrite):
+            runner = Runner(plan.job, plan.names, journal, where, timeout=timeout)
+            try:
+                found = _run(plan, runner, spread, progress or (lambda fraction: None))
+            except KeyboardInterrupt:
+                raise KeyboardInterrupt(
+                    f"interrupted; {journal.kept}" * bool(journal.kept)
+                ) from None
+            finally:
+                runner.close()
+            if table is not None:
+                write(table, csv_text(*found.table()).encode())
+            journal.remove()
+    return found
+
+
+# --- plan -----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A checked study.
+
+    Parameters
+    ----------
+    job : MechanismJob
+        The simulation.
+    varied : mapping
+        Samples or distributions of the parameters.
+    points : (n, p)
+        The points.
+    goal : (str, float) or None
+        Output to be optimised, and 1 to minimise it or -1 to maximise it.
+    constraints : tuple of Constraint
+        Conditions on outputs.
+    design : (bool, str, int)
+        Whether the points are a grid, the method and the seed.
+    units : mapping
+        Units of the parameters and outputs.
+    """
+
+    job: MechanismJob
+    varied: Mapping[str, Any]
+    points: Real
+    goal: tuple[str, float] | None
+    constraints: tuple[Constraint, ...]
+    design: tuple[bool, str, int]
+    units: Mapping[str, str]
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the varied parameters."""
+        return [*self.varied]
+
+    @property
+    def texts(self) -> list[str]:
+        """Texts of the outputs."""
+        return [output.column for output in self.job.outputs]
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """All that the outputs depend on, except for the varied parameters, for the journal."""
+        job = self.job
+        own = range(0)
+        described = tables(job.mechanism, (), "", own) + repr(job.mechanism.values()).encode()
+        return {
+            "version": __version__,
+            "mechanism": hashlib.sha256(described).hexdigest(),
+            "parameters": self.names,
+            "outputs": self.texts,
+            "values": dict(job.values),
+            "inputs": {name: _described(source) for name, source in job.inputs.items()},
+            "stop time [s]": job.stop_time,
+            "step [s]": job.step,
+            "tolerance": job.tolerance,
+            "engine": job.engine,
+        }
+
+
+def _described(source: Source) -> str:
+    """Return a text that identifies an input over time."""
+    return str(source) if isinstance(source, str | float | int) else repr(source)
+
+
+def _goal(minimise: str | None, maximise: str | None) -> tuple[str, float] | None:
     if minimise is not None and maximise is not None:
         raise ParameterError("minimise and maximise are both given; omit one of them")
-    wanted = minimise if maximise is None else maximise
-    texts = list(dict.fromkeys([*outputs, *([] if wanted is None else [wanted])]))
-    if any("stress" in text for text in texts):
+    if minimise is not None:
+        return minimise, 1.0
+    return None if maximise is None else (maximise, -1.0)
+
+
+def _plan(
+    mechanism: Mechanism,
+    vary: Vary,
+    outputs: Sequence[str],
+    runs: int | None,
+    drawing: tuple[str, int],
+    goal: tuple[str, float] | None,
+    subject_to: Sequence[str],
+    values: Mapping[str, float | str] | None,
+    inputs: Mapping[str, Source] | None,
+    options: tuple[Any, Any, Any, Any],
+) -> Plan:
+    """Return the checked study."""
+    if any("stress" in text for text in (*outputs, *([goal[0]] if goal else []), *subject_to)):
         mechanism = with_stress(mechanism)
-    units = _units(mechanism)
+    known = _units(mechanism)
+    within = placeholders(inputs or {})
+    listed = None
+    if not isinstance(vary, Mapping):
+        vary = {
+            name: x * (in_unit(name, f"1 {unit}", known.get(name, "")) if unit.strip("-") else 1.0)
+            for name, (x, unit) in read_rows(Path(vary)).items()
+        }
+        listed = np.column_stack([*vary.values()])
+        if runs is not None:
+            raise ParameterError("runs are drawn from ranges, not from a file; omit one of them")
+    _check_names(mechanism, vary, within)
     given = dict(in_si(mechanism, values))
-    setup = Setup(
-        mechanism, _outputs(texts, units), given, dict(inputs or {}),
-        _options(mechanism, given, stop_time, step, tolerance, engine),
-    )  # fmt: skip
-    first = {name: float(x[0]) for name, x in samples.items()}
-    signals(mechanism, filled(setup.inputs, first), {**given, **first})  # Report mistakes.
-    for name in given.keys() & samples.keys():
+    if listed is not None:
+        varied: dict[str, Any] = dict(vary)
+        count = len(listed)
+    elif runs is None:
+        varied = {n: _samples(n, x, known) for n, x in vary.items()}
+        count = math.prod(map(len, varied.values()))
+    else:
+        base = {**mechanism.values(), **given}
+        varied = {n: _distribution(n, x, known, base) for n, x in vary.items()}
+        count = runs * (len(varied) + 2 if drawing[0] == SENSITIVITY else 1)
+    if count > RUNS_MAX:
+        raise ParameterError(f"the study has {count} simulations; reduce them to {RUNS_MAX}")
+    if listed is not None:
+        points = listed
+    else:
+        points = grid(varied) if runs is None else drawn(varied, runs, drawing[1], drawing[0])
+    constraints = tuple(_constraint(text, known) for text in subject_to)
+    wanted = [*outputs, *([goal[0]] if goal else []), *(c.output for c in constraints)]
+    kept = _outputs(list(dict.fromkeys(wanted)), known)
+    for name in given.keys() & varied.keys():
         raise ParameterError(f"{name} is varied and has a fixed value; remove one of them")
-    points = np.array(list(itertools.product(*samples.values())))
-    with _pool(setup, workers, len(points)) as run:
-        report = _report(progress, len(points), 0 if wanted is None else REFINEMENTS_EXPECTED)
-        shown = {**{n: units.get(n, "") for n in samples}, **_output_units(setup.outputs, units)}
-        heads = [*(f"{name} [{shown[name] or '-'}]" for name in (*samples, *texts)), "error"]
-        outcomes = []
-        for point, outcome in zip(points, _each(run, [*samples], points), strict=True):
-            outcomes.append(outcome)
-            if rows is not None:
-                rows(heads, [*point.tolist(), *_values(outcome, len(texts)), outcome.message])
-            report(len(outcomes))
-        table = np.array([_values(outcome, len(texts)) for outcome in outcomes])
-        outputs_found = dict(zip(texts, table.T, strict=True))
-        messages = tuple(outcome.message for outcome in outcomes)
-        found = Study(samples, points, outputs_found, shown, messages)
-        if wanted is None:
-            return found
-        sign = 1.0 if maximise is None else -1.0
-        optimum = _Search(run, found, wanted, texts.index(wanted), sign, report).optimum()
-    report(math.inf)
-    return Study(found.varied, points, found.outputs, found.units, found.messages, optimum)
+    sources = dict(inputs or {})
+    first = dict(zip(varied, points[0].tolist(), strict=True))
+    signals(mechanism, filled(sources, first), {**given, **first})  # Report mistakes.
+    job = MechanismJob(mechanism, kept, given, sources, *_options(mechanism, given, *options),
+                       tuple(known))  # fmt: skip
+    shown = {**{n: known.get(n, "") for n in varied}, **_output_units(kept, known)}
+    return Plan(
+        job, varied, points, goal, constraints, (runs is None and listed is None, *drawing), shown
+    )
 
 
 def _options(
@@ -283,8 +386,8 @@ def _options(
     step: float | str | None,
     tolerance: float | None,
     engine: str | None,
-) -> dict[str, Any]:
-    """Return the further arguments of all simulations.
+) -> tuple[float, float, float | None, str | None]:
+    """Return duration, step, tolerance and engine of all simulations.
 
     Raises
     ------
@@ -303,44 +406,98 @@ def _options(
     communication_points(end, spacing)
     if tolerance is not None:
         tolerance = checked_tolerance(in_unit("tolerance", tolerance, ""))
-    return {"stop_time": end, "step": spacing, "tolerance": tolerance, "engine": engine}
+    return end, spacing, tolerance, engine
 
 
-# --- checks ---------------------------------------------------------------------------------------
-
-
-def _checked(
-    mechanism: Mechanism, vary: Mapping[str, Samples], within: set[str]
-) -> dict[str, Real]:
-    """Return the samples of each parameter or placeholder as arrays."""
-    if len(vary) not in (1, 2):
-        raise ParameterError(f"{len(vary)} parameters are varied; vary one or two")
-    known = _units(mechanism)
-    inputs = Simulation(mechanism).given
-    settable = {**mechanism.values(), **inputs}
-    samples = {}
-    for name, sequence in vary.items():
+def _check_names(mechanism: Mechanism, vary: Mapping[str, Any], within: set[str]) -> None:
+    """Reject unknown names, and placeholders without values."""
+    if not vary:
+        raise ParameterError("0 parameters are varied; vary at least one")
+    settable = {**mechanism.values(), **Simulation(mechanism).given}
+    for name in vary:
         if name not in settable and name not in within:
             raise ParameterError(f"unknown variable {name!r}; {proposal(name, settable)}")
         if name in settable and name in within:
             raise ParameterError(
                 f"{{{name}}} in an input is also a parameter; choose another name in braces"
             )
-        given = np.array(sequence, object).ravel()
-        x = np.array([in_unit(name, sample, known.get(name, "")) for sample in given])
-        if len(x) < 2 or not (np.isfinite(x).all() and (np.diff(x) > 0.0).all()):
-            raise ParameterError(
-                f"{name}: at least two samples are needed, finite and increasing"
-                + (f", in {known[name]}" if known.get(name) else "")
-            )
-        samples[name] = x
     for name in sorted(within):
-        if name not in samples:
+        if name not in vary:
             raise ParameterError(f"{{{name}}} in an input has no value; vary {name}")
-    count = math.prod(map(len, samples.values()))
-    if count > RUNS_MAX:
-        raise ParameterError(f"the study has {count} simulations; reduce them to {RUNS_MAX}")
-    return samples
+
+
+def _samples(name: str, sequence: Any, known: Mapping[str, str]) -> Real:
+    """Return increasing samples of a parameter, (k,)."""
+    given = np.array(sequence, object).ravel()
+    x = np.array([in_unit(name, sample, known.get(name, "")) for sample in given])
+    if len(x) < 2 or not (np.isfinite(x).all() and (np.diff(x) > 0.0).all()):
+        raise ParameterError(
+            f"{name}: at least two samples are needed, finite and increasing"
+            + (f", in {known[name]}" if known.get(name) else "")
+        )
+    return x
+
+
+def _distribution(
+    name: str, given: Any, known: Mapping[str, str], base: Mapping[str, float]
+) -> Any:
+    """Return the distribution of a parameter, from a pair, a tolerance or a distribution."""
+    unit = known.get(name, "")
+    if isinstance(given, str):
+        return _toleranced(name, given, unit, base.get(name))
+    if hasattr(given, "ppf"):
+        return given
+    ends = _samples(name, given, known)
+    if len(ends) != 2:
+        raise ParameterError(f"{name}: with runs, give a range (low, high) or a distribution")
+    return float(ends[0]), float(ends[1])
+
+
+def _toleranced(name: str, text: str, unit: str, nominal: float | None) -> Any:
+    """Return the distribution of a text such as ``0.1 mm +- 2 %``."""
+    parts = tolerance_parts(text)
+    if parts is None:
+        raise ParameterError(f'{name} = {text}: write a tolerance, for instance "0.1 mm +- 2 %"')
+    middle, half, uniform = parts
+    if middle:
+        nominal = in_unit(name, middle, unit)
+    if nominal is None:
+        raise ParameterError(f"{name} = {text}: has no nominal value; write it before +-")
+    if half.endswith("%"):
+        width = abs(nominal) * in_unit(name, half, "")
+    else:
+        width = in_unit(name, half, unit)
+    try:
+        return toleranced(nominal, width, uniform)
+    except ParameterError as error:
+        raise ParameterError(f"{name}: {error}") from None
+
+
+def _around(plan: Plan, tolerances: Mapping[str, str]) -> dict[str, tuple[str, bool]]:
+    """Return the half-widths of tolerances around an optimum, as texts."""
+    found = {}
+    for name, text in tolerances.items():
+        if name not in plan.names:
+            raise ParameterError(f"the tolerance of {name}: {proposal(name, plan.varied)}")
+        parts = tolerance_parts(text if "+-" in text else f"+- {text}")
+        assert parts is not None
+        _toleranced(name, f"+- {parts[1]}", plan.units[name], 1.0)  # Report mistakes.
+        found[name] = f"+- {parts[1]}{' uniform' if parts[2] else ''}", parts[2]
+    if found and not (plan.goal and plan.constraints):
+        raise ParameterError(
+            "tolerances give the yield around an optimum; give an output to optimise and "
+            "constraints, or vary the parameters within their tolerances"
+        )
+    return found
+
+
+def _check_sources(inputs: Mapping[str, Source]) -> None:
+    for name, source in inputs.items():
+        if callable(source) and not isinstance(source, Signal):
+            raise ParameterError(
+                f"{name}: a function cannot be sent to other processes; give a text or arrays, or "
+                "workers=1"
+            )
 
 
 def _units(mechanism: Mechanism) -> dict[str, str]:
@@ -353,27 +510,36 @@ def _outputs(texts: Sequence[str], known: Mapping[str, str]) -> tuple[Output, ..
     """Return checked outputs."""
     if not texts:
         raise ParameterError("no output is selected; name one, for instance settling")
-    kept = []
-    for text in texts:
-        try:
-            output = parse(text, known)
-            output.check_extreme(known)
-        except SpecificationError as error:
-            raise ParameterError(f"output {error}") from None
-        lacking = output.lacking(known)
-        if lacking:
-            remedy = QUANTITIES[output.variable].remedy
+    return tuple(_output(text, known) for text in texts)
+
+
+def _output(text: str, known: Mapping[str, str]) -> Output:
+    try:
+        output = parse(text, known)
+        output.check_extreme(known)
+    except SpecificationError as error:
+        raise ParameterError(f"output {error}") from None
+    if output.reduction == REST:
+        if output.variable.rpartition(".")[2] not in PLACES or output.variable not in known:
             raise ParameterError(
-                f"output {text}: the mechanism has no {lacking}, from which it is computed"
-                + (f"; {remedy}" if remedy else "")
+                f"output {text}: write rest(BODY.x), rest(BODY.y) or rest(BODY.angle)"
             )
-        if output.reduction != QUANTITY and output.variable not in known:
-            hint = proposal(output.variable, dict.fromkeys([*known, *QUANTITIES]))
-            if hint.startswith("known") and len(known) > NAMES_LISTED_MAX:
-                hint = f"named quantities are {', '.join(QUANTITIES)}"
-            raise ParameterError(f"output {text}: unknown variable {output.variable!r}; {hint}")
-        kept.append(output)
-    return tuple(kept)
+        return output
+    if output.reduction == MODE:
+        return output
+    lacking = output.lacking(known)
+    if lacking:
+        remedy = QUANTITIES[output.variable].remedy
+        raise ParameterError(
+            f"output {text}: the mechanism has no {lacking}, from which it is computed"
+            + (f"; {remedy}" if remedy else "")
+        )
+    if output.reduction != QUANTITY and output.variable not in known:
+        hint = proposal(output.variable, dict.fromkeys([*known, *QUANTITIES]))
+        if hint.startswith("known") and len(known) > NAMES_LISTED_MAX:
+            hint = f"named quantities are {', '.join(QUANTITIES)}"
+        raise ParameterError(f"output {text}: unknown variable {output.variable!r}; {hint}")
+    return output
 
 
 def _output_units(outputs: Sequence[Output], known: Mapping[str, str]) -> dict[str, str]:
@@ -382,254 +548,118 @@ def _output_units(outputs: Sequence[Output], known: Mapping[str, str]) -> dict[s
     for output in outputs:
         if output.reduction == QUANTITY:
             found[output.column] = QUANTITIES[output.variable].unit
+        elif output.reduction == MODE:
+            found[output.column] = "Hz"
+        elif output.reduction == REST:
+            found[output.column] = PLACES[output.variable.rpartition(".")[2]]
         else:
             found[output.column] = "s" if output.reduction in TIMES else known[output.variable]
     return found
 
 
+def _constraint(text: str, known: Mapping[str, str]) -> Constraint:
+    """Return the constraint of a text such as ``fundamental > 40 Hz``."""
+    depth, at = 0, -1
+    for k, sign in enumerate(text):
+        depth += (sign == "(") - (sign == ")")
+        if depth == 0 and sign in "<>":
+            at = k
+    if at < 0:
+        raise ParameterError(f'constraint {text}: write it as in "fundamental > 40 Hz"')
+    relation = text[at : at + 2] if text[at + 1 : at + 2] == "=" else text[at]
+    output, bound = text[:at].strip(), text[at + len(relation) :].strip()
+    unit = _output_units([_output(output, known)], known)[output]
+    return Constraint(text.strip(), output, relation, in_unit(f"constraint {output}", bound, unit))
+
+
 # --- simulations ----------------------------------------------------------------------------------
 
-Run = Callable[[Mapping[str, float]], "Future[Outcome]"]
-_setup: Setup | None = None  # The study of a worker process.
+
+def _run(
+    plan: Plan, runner: Runner, spread: Mapping[str, tuple[str, bool]], progress: Progress
+) -> Study:
+    """Simulate, search the optimum and its yield."""
+    points, count = plan.points, len(plan.points)
+    extra = REFINEMENTS_EXPECTED * len(plan.names) if plan.goal else 0
+    extra += YIELD_RUNS if spread else 0
+
+    def report(done: float) -> None:
+        progress(min(done / (count + extra), LAST_FRACTION) if extra else done / count)
+
+    outcomes = runner.outcomes(_tuples(points), lambda share: report(share * count))
+    table = _table(outcomes, len(plan.texts))
+    messages = tuple(outcome.message for outcome in outcomes)
+    whole, method, seed = plan.design
+    columns = dict(zip(plan.names, points.T, strict=True))
+    found: dict[str, Any] = {
+        "varied": dict(plan.varied) if whole else columns, "points": points,
+        "outputs": dict(zip(plan.texts, table.T, strict=True)), "units": plan.units,
+        "messages": messages, "whole_grid": whole,
+        "good": _good(plan, table) & np.array([not message for message in messages]),
+    }  # fmt: skip
+    if method == SENSITIVITY and not whole:
+        indices = {x: sensitivity(plan.names, y, seed) for x, y in found["outputs"].items()}
+        found["sensitivities"] = {x: y for x, y in indices.items() if y is not None}
+    if plan.goal is None:
+        if plan.constraints and not whole:
+            found["share"] = yield_of(found["good"])
+        progress(1.0)
+        return Study(**found)
+
+    def evaluate(x: Real) -> Real:
+        return _table(runner.outcomes(_tuples(x)), len(plan.texts))
+
+    output, sign = plan.goal
+    bounds = np.column_stack([points.min(axis=0), points.max(axis=0)])
+    for k, given in enumerate(plan.varied.values()):
+        if isinstance(given, tuple):  # A range from which the points were drawn.
+            bounds[k] = given
+    spaces = (
+        [len(np.unique(x)) - 1 for x in points.T]
+        if whole
+        else [count ** (1 / len(bounds))] * len(bounds)
+    )
+    sizes = np.ptp(points, axis=0) / np.maximum(spaces, 1)
+    samples = Samples(plan.names, points, plan.texts, table, bounds, sizes)
+    try:
+        best = Search(evaluate, samples, output, sign, plan.constraints).optimum()
+    except ParameterError as error:
+        reasons = sorted({message for message in messages if message})
+        why = reasons[0] if reasons else "simulate longer, or choose another output"
+        raise ParameterError(
+            f"{error}; {why}" + f"; {runner.journal.kept}" * bool(runner.journal.kept)
+        ) from None
+    if spread:
+        found["share"] = _yield_at(plan, best, spread, evaluate)
+    progress(1.0)
+    return Study(**found, optimum=best)
 
 
-def _prepare(setup: Setup) -> None:
-    """Keep the study in a worker process."""
-    global _setup
-    _setup = setup
+def _yield_at(
+    plan: Plan, best: Optimum, spread: Mapping[str, tuple[str, bool]], evaluate: Any
+) -> Yield:
+    """Return the share of good simulations with the tolerances around an optimum."""
+    laws = {
+        n: _toleranced(n, text, plan.units[n], best.point[n]) for n, (text, _) in spread.items()
+    }
+    moved = drawn(laws, YIELD_RUNS, YIELD_SEED, "random")
+    points = np.tile([best.point[name] for name in plan.names], (YIELD_RUNS, 1))
+    points[:, [plan.names.index(name) for name in laws]] = moved
+    return yield_of(_good(plan, evaluate(points)))
 
 
-def _run(values: Mapping[str, float]) -> Outcome:
-    """Simulate in a worker process."""
-    assert _setup is not None
-    return _setup.run(values)
+def _good(plan: Plan, table: Real) -> Any:
+    """Return which rows of outputs satisfy all constraints."""
+    index = {text: k for k, text in enumerate(plan.texts)}
+    held = [c.holds(table[:, index[c.output]]) for c in plan.constraints]
+    return np.all([np.full(len(table), True), *held], axis=0)
 
 
-@contextmanager
-def _pool(setup: Setup, workers: int | None, count: int) -> Iterator[Run]:
-    """Yield a function that submits a simulation.  An error ends the simulations that still run."""
-    if workers is not None and workers < 1:
-        raise ParameterError(f"workers = {workers} must be 1 or more")
-    processes = process_count(count, workers)
-    for name, source in setup.inputs.items():
-        if processes > 1 and callable(source) and not isinstance(source, Signal):
-            raise ParameterError(
-                f"{name}: a function cannot be sent to other processes; give a text or arrays, or "
-                "workers=1"
-            )
-    run = setup.run if processes == 1 else _run
-    with executor(processes, _prepare, setup) as pool:
-        yield lambda values: pool.submit(run, values)
+def _tuples(points: Real) -> list[tuple[float, ...]]:
+    return [tuple(point) for point in points.tolist()]
 
 
-def _report(progress: Progress | None, samples: int, refinements: int) -> Progress:
-    """Return a callback for the number of completed simulations."""
-    total, limit = samples + refinements, LAST_FRACTION if refinements else 1.0
-
-    def report(completed: float) -> None:
-        if progress is not None:
-            progress(1.0 if completed == math.inf else min(completed / total, limit))
-
-    return report
-
-
-def _each(run: Run, parameters: Sequence[str], points: Real) -> Iterator[Outcome]:
-    """Yield the outcomes of all points in order."""
-    pending: deque[Future[Outcome]] = deque()
-    for point in points:
-        pending.append(run(dict(zip(parameters, map(float, point), strict=True))))
-        while pending and pending[0].done():
-            yield pending.popleft().result()
-    while pending:
-        yield pending.popleft().result()
-
-
-def _values(outcome: Outcome, count: int) -> tuple[float, ...]:
-    """Return the outputs of a simulation; NaN for a failed one."""
-    return outcome.values or (math.nan,) * count
-
-
-# --- optimum --------------------------------------------------------------------------------------
-
-
-class _Search:
-    """The search of an optimum around the best sample.
-
-    Parameters
-    ----------
-    run : callable
-        Submits a simulation.
-    found : Study
-        The samples.
-    output, index : str, int
-        The output, and its position among the outputs.
-    sign : float
-        1 to minimise, -1 to maximise.
-    report : callable
-        Called with the number of completed simulations.
-    """
-
-    def __init__(
-        self,
-        run: Run,
-        found: Study,
-        output: str,
-        index: int,
-        sign: float,
-        report: Progress = lambda completed: None,
-    ) -> None:
-        self.run, self.found, self.output, self.index, self.sign = run, found, output, index, sign
-        self.report = report
-        self.samples = list(found.varied.values())
-        self.grid = sign * found.outputs[output].reshape([len(x) for x in self.samples])
-        if not np.isfinite(self.grid).any():
-            reasons = sorted({message for message in found.messages if message})
-            why = f": {reasons[0]}" if reasons else "; simulate longer, or choose another output"
-            raise ParameterError(f"no simulation has a value of {output}{why}")
-        self.points: list[Real] = []
-        self.values: list[float] = []
-
-    def value(self, x: Real) -> float:
-        """Return the output with its sign at a point (p,); infinite if it has no value."""
-        point = np.atleast_1d(np.asarray(x, float))
-        outcome = self.run(dict(zip(self.found.varied, map(float, point), strict=True))).result()
-        value = self.sign * outcome.values[self.index] if outcome.values else math.nan
-        self.points.append(point)
-        self.values.append(value)
-        self.report(len(self.found.points) + len(self.values))
-        return value if math.isfinite(value) else math.inf
-
-    def optimum(self) -> Optimum:
-        """Refine the best sample and determine the range around it."""
-        best = np.unravel_index(np.nanargmin(self.grid), self.grid.shape)
-        names = list(self.found.varied)
-        if len(names) == 1:
-            ends = {names[0]: self._refined_range()}
-        else:
-            self._simplex(best)
-            ends = self._region(best, self._limit())
-        points, values = self._every()
-        k = int(np.nanargmin(values))
-        return Optimum(
-            self.output,
-            dict(zip(names, map(float, points[k]), strict=True)),
-            float(self.sign * values[k]),
-            {name: (low, high) for name, ((low, _), (high, _)) in ends.items()},
-            {name: (low, high) for name, ((_, low), (_, high)) in ends.items()},
-            np.array(self.points).reshape(-1, len(names)),
-            self.sign * np.array(self.values),
-            self._robust() if len(names) == 1 else None,
-        )
-
-    def _robust(self) -> tuple[float, float, float] | None:
-        """Return the neighbouring samples whose worst output is best, and this output."""
-        x = self.samples[0]
-        if len(x) < NEIGHBOURS:
-            return None
-        windows = np.lib.stride_tricks.sliding_window_view(self.grid, NEIGHBOURS)
-        worst = windows.max(axis=1)  # NaN if a simulation has failed.
-        if not np.isfinite(worst).any():
-            return None
-        k = int(np.nanargmin(worst))
-        return float(x[k]), float(x[k + NEIGHBOURS - 1]), float(self.sign * worst[k])
-
-    def _every(self) -> tuple[Real, Real]:
-        """Return all points so far, (n, p), and the values there with their sign, (n,)."""
-        return (
-            np.array([*self.found.points, *self.points]),
-            np.array([*self.grid.ravel(), *self.values]),
-        )
-
-    def _limit(self) -> float:
-        """Return the value up to which the output is within 5 % of its optimum."""
-        best = float(np.nanmin(self._every()[1]))
-        return best + FLAT_RTOL * abs(best)
-
-    def _refined_range(self) -> tuple[tuple[float, bool], tuple[float, bool]]:
-        """Refine the best sample of one parameter, and return the range around the optimum.
-
-        The search for the ends of the range may meet a better point if the output jumps.  The
-        refinement is then repeated there.
-        """
-        for _ in range(ROUNDS_MAX):
-            self._along()
-            limit, (points, values) = self._limit(), self._every()
-            ends = self._range(points[:, 0], values, int(np.nanargmin(values)), limit)
-            if self._limit() == limit:
-                break
-        return ends
-
-    def _along(self) -> None:
-        """Refine the best point of one parameter between its neighbours."""
-        points, values = self._every()
-        x, k = np.unique(points), points[np.nanargmin(values), 0]
-        low, high = max(x[x < k], default=x[0]), min(x[x > k], default=x[-1])
-        bounded: Any = minimize_scalar  # Its type hints exclude arrays and options.
-        bounded(
-            self.value, bounds=(low, high), method="bounded",
-            options={"xatol": float(REFINED_RTOL * (high - low)), "maxiter": REFINEMENTS_MAX},
-        )  # fmt: skip
-
-    def _simplex(self, best: tuple[Any, ...]) -> None:
-        """Refine the best of the samples of two parameters, in units of their distances."""
-        start = np.array([x[k] for x, k in zip(self.samples, best, strict=True)])
-        sizes = np.array([np.ptp(x) / (len(x) - 1) for x in self.samples])
-        bounds = [(x[0] / h, x[-1] / h) for x, h in zip(self.samples, sizes, strict=True)]
-        inward = np.array([-0.5 if k == len(x) - 1 else 0.5
-                           for x, k in zip(self.samples, best, strict=True)])  # fmt: skip
-        corners = start / sizes + np.vstack([np.zeros(2), np.diag(inward)])
-        options: Any = {
-            "initial_simplex": corners, "maxfev": REFINEMENTS_MAX, "xatol": REFINED_RTOL,
-            "fatol": 0.0,
-        }  # fmt: skip
-        simplex: Any = minimize  # Its type hints exclude this function.
-        simplex(
-            lambda z: self.value(z * sizes), corners[0], method="Nelder-Mead",
-            bounds=bounds, options=options,
-        )  # fmt: skip
-
-    def _range(
-        self, x: Real, values: Real, k: int, limit: float
-    ) -> tuple[tuple[float, bool], tuple[float, bool]]:
-        """Return the ends of the range around point k in which values are below a limit.
-
-        Each end is bisected between the last point inside and the first one outside; it is false
-        with the last sample if no point is outside.
-        """
-        order = np.argsort(x, kind="stable")
-        x, outside = x[order], ~(values[order] <= limit)
-        k = int(np.flatnonzero(order == k)[0])
-        above, below = np.flatnonzero(outside[k:]), np.flatnonzero(outside[: k + 1])
-        last = k + int(above[0]) - 1 if len(above) else len(x) - 1
-        first = int(below[-1]) + 1 if len(below) else 0
-        return (
-            self._edge(x[first], x[first - 1] if len(below) else None, limit),
-            self._edge(x[last], x[last + 1] if len(above) else None, limit),
-        )
-
-    def _edge(self, inside: float, outside: float | None, limit: float) -> tuple[float, bool]:
-        """Return the end of a range, and whether it lies inside the samples."""
-        if outside is None:
-            return float(inside), False
-        size = float(np.ptp(self.samples[0])) / (len(self.samples[0]) - 1)
-        while abs(outside - inside) > EDGE_RTOL * size:
-            middle = 0.5 * (inside + outside)
-            if self.value(np.array([middle])) <= limit:
-                inside = middle
-            else:
-                outside = middle
-        return float(inside), True
-
-    def _region(
-        self, best: tuple[Any, ...], limit: float
-    ) -> dict[str, tuple[tuple[float, bool], tuple[float, bool]]]:
-        """Return the ranges of the samples below a limit that are connected to the best one."""
-        from scipy.ndimage import label  # imported here: two parameters only
-
-        regions, _ = label(self.grid <= max(limit, self.grid[best]))
-        within = np.nonzero(regions == regions[best])
-        ends = {}
-        for name, x, rows in zip(self.found.varied, self.samples, within, strict=True):
-            low, high = int(rows.min()), int(rows.max())
-            ends[name] = (float(x[low]), low > 0), (float(x[high]), high < len(x) - 1)
-        return ends
+def _table(outcomes: Sequence[Outcome], count: int) -> Real:
+    """Return the outputs of simulations, (n, k); NaN for failed ones."""
+    nothing = (math.nan,) * count
+    return np.array([outcome.values or nothing for outcome in outcomes])

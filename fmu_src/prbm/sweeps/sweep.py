@@ -1,67 +1,54 @@
-"""Parameter sweeps and Monte Carlo: from a table of parameters to a table of results.
+"""Studies of an FMU: from a table of parameters to a table of results.
 
     prbm sweep PRBDM2R.fmu table.csv --output "max(shuttle.x)" --stop-time 1
 
 A row of the table is a run of the FMU, and a column is the start value of a variable.  The runs are
-distributed over the cores of this machine, or over the workers of a ``distributed`` scheduler at a
-given address.  Completed runs are on disk: an interrupted sweep continues from there.  A failed run
-is a row with its message.
+distributed over the cores of this machine, or over an executor or a Dask cluster (:mod:`.runner`).
 """
 
 import hashlib
 import importlib.util
 import io
-import logging
+import json
 import math
 import os
-import time
-import uuid
-from collections import deque
 from collections.abc import Collection, Container, Iterator, Mapping, Sequence
-from concurrent.futures import CancelledError
-from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import astuple, dataclass
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from dataclasses import astuple, dataclass, replace
 from pathlib import Path
-from statistics import median
 from typing import TYPE_CHECKING, Any
 
 import fmpy  # type: ignore[import-untyped]
 
 from ..base import reading
 from ..base.archives import UNPACKED_SIZE_MAX, check_unpacked_size
-from ..base.errors import ParameterError, PrbmError
+from ..base.atomic import check_file, write
+from ..base.errors import ParameterError
 from ..base.names import proposal
 from ..base.progress import Progress
 from ..runs.inputs import filled, placeholders, read_signal
 from ..runs.run import ROWS_MAX
-from .outputs import CRASHED, GOOD, Outcome, Output, SpecificationError, parse_output
-from .runs import Job
+from .fmu import Job, PackedFmu
+from .journal import Journal, Point, compare
+from .outputs import GOOD, Outcome, Output, SpecificationError, parse_output
+from .runner import Runner, StudyError, pool
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from .results import Results
-
-EXTRA = ("distributed", "pandas", "pyarrow")
+EXTRA = ("pandas", "pyarrow")
 REMEDY = 'install the packages for sweeps with: python -m pip install "prbm-impact[sweep]"'
 
-BATCH_MIN, BATCH_MAX = 1.0, 30.0  # Limits of the duration of a batch [s].
-BATCH_SHARE = 0.02  # Duration of a batch, as a share of the time so far.
-BATCHES_PER_THREAD = 2  # Batches submitted per thread, so that no thread waits for work.
 RESET_RUNS_MIN = 20  # Runs per process from which on a check of the FMU's reset pays off.
 STEPS = 1000  # Communication steps for an FMU without a proposed step.
-CONNECTION_TIMEOUT = 10.0  # Longest wait for a scheduler and its workers [s].
 FILES = (".csv", ".feather", ".h5", ".json", ".mat", ".ods", ".tsv", ".txt", ".xls", ".xlsx")
-"""Suffixes rejected for the results, which are a folder and not a file."""
-RECENT_RUNS = 50  # Runs whose median duration determines the size of the next batch.
-
-MISSING_MODULE = "No module named"  # Python's message for a package that is not installed.
-
+"""Suffixes rejected for the results, which are a Parquet file."""
+ROW, STATUS, MESSAGE = OWN = ("row", "status", "message")
+"""Columns of every table; no parameter or output may have these names."""
+SETTINGS = b"prbm.settings"  # Key of the settings in the metadata of the Parquet file.
+SweepError = StudyError
 Outputs = Sequence[str] | Mapping[str, str]
-
-
-class SweepError(PrbmError, RuntimeError):
-    """The sweep cannot run, for a reason that does not depend on its table."""
 
 
 def sweep(
@@ -75,7 +62,7 @@ def sweep(
     stop_time: float | None = None,
     step: float | None = None,
     tolerance: float | None = None,
-    scheduler: str | None = None,
+    scheduler: str | Executor | None = None,
     workers: int | None = None,
     retries: int = 1,
     timeout: float | None = None,
@@ -93,8 +80,9 @@ def sweep(
         One column per variable, with its name, and one row per run; or a CSV or Parquet file of
         such a table.  The units are those of the FMU: SI for the FMUs of this project.
     out : str or Path
-        Folder of the results, a Parquet dataset.  If it has runs of the same sweep, only the
-        missing runs are computed; rows may have been added to the table since then.
+        Parquet file of the results.  If it has runs of the same sweep, only the missing runs are
+        computed; rows may have been added to the table since then.  The rows are in
+        ``OUT.partial`` (CSV) until the table is complete, and remain there after an interruption.
     outputs : sequence of str, or mapping of str to str
         Recorded outputs of a run:
 
@@ -116,17 +104,18 @@ def sweep(
     stop_time, step, tolerance : float
         End of the runs [s], communication step [s], relative tolerance; None: those of the FMU's
         default experiment, or else 1 s, a thousandth of the run, no tolerance.
-    scheduler : str or None
-        Address of a ``distributed`` scheduler, as ``tcp://host:8786``, whose workers need this
-        package; None: this machine.
+    scheduler : str, Executor or None
+        Address of a Dask scheduler, as ``tcp://host:8786``, whose workers need this package; or a
+        ``concurrent.futures`` executor, such as that of ``Client.get_executor()``.  None: this
+        machine.
     workers : int or None
-        Number of parallel runs on this machine; None: one per core.
+        Number of parallel runs; None: one per core of this machine, or those of the executor.
     retries : int
         Number of repetitions of a run whose process crashed.
     timeout : float or None
         Longest duration of a run [s]; None: no limit.
     overwrite : bool
-        Delete earlier results in ``out`` (default: False).
+        Replace earlier results in ``out`` (default: False).
     retry_failed : bool
         Repeat failed runs (default: False).
     progress : callable or None
@@ -137,49 +126,63 @@ def sweep(
     DataFrame
         In the order of the table: ``row`` (from 0), its parameters, the outputs (float64; NaN
         for a failed run), ``status`` (``ok``; ``ended``: by the FMU, before ``stop_time``;
-        ``failed``, ``crashed``, ``timeout``), ``message`` and the duration in ``seconds``.
+        ``failed``, ``crashed``, ``timeout``) and ``message``.  Runs that are repeated or continued
+        give the same bytes.
 
     Raises
     ------
     ParameterError
         If the table, an output, a setting or ``out`` is invalid, ``out`` has the results of another
         sweep, or another sweep is writing to it.
-    SweepError
+    StudyError
         If the FMU cannot be read or loaded, the scheduler does not respond, or a package is not
         installed.
     KeyboardInterrupt
         After Ctrl-C, with the number of completed runs, which are kept.
     """
-    _check_packages()
-    _check_name(Path(out))
+    _check_packages("distributed" if isinstance(scheduler, str) else "pandas")
+    out = Path(out)
+    _check_name(out)
     plan = _make_plan(fmu, table, outputs, values, inputs or {}, stop_time, step, tolerance)
-    _check_counts(workers, retries, timeout)
-    results = _results(plan, Path(out))
-    report = progress or (lambda fraction: None)
-    with ExitStack() as stack:
-        stack.enter_context(results.lock())
-        # Earlier results are deleted only after the scheduler has responded.
-        client = stack.enter_context(_client(scheduler, workers)) if overwrite else None
-        results.begin(overwrite)
-        done = results.read()
-        _same_rows(plan, done, results.folder)
-        seen = set(done["row"][done["status"].isin(GOOD)] if retry_failed else done["row"])
-        rest = [row for row in range(len(plan.rows)) if row not in seen]
-        report(1.0 - len(rest) / len(plan.rows))
-        if rest:
-            client = client or stack.enter_context(_client(scheduler, workers))
-            if retry_failed:
-                results.forget_failures()
-            _Sweep(client, plan, results, report).run(rest, retries, timeout)
-        results.sort()
-    return results.read()
+    _check_counts(retries, timeout)
+    journal = Journal(out, plan.settings, plan.parameters, plan.outputs)
+    journal.known |= _earlier(plan, out, overwrite)
+    with journal.opened(overwrite, retry_failed):
+        rest = [point for point in plan.points if point not in journal.known]
+        with pool(workers, len(rest), executor=scheduler) as where:
+            # The check of a reset doubles the duration of a run, which may exceed a timeout.
+            reuse = timeout is None and len(rest) >= RESET_RUNS_MIN * where.threads()
+            fmu_job = PackedFmu(plan.fmu, replace(plan.job, reuse=reuse))
+            runner = Runner(fmu_job, plan.parameters, journal, where, retries, timeout)
+            with _stopping(runner, len(plan.points)):
+                outcomes = runner.outcomes(plan.points, progress)
+        found = _frame(plan, outcomes)
+        if rest or not out.exists() or len(plan.points) != _count(out):
+            write(out, _parquet(found, plan.settings))
+        journal.remove()
+    return found
+
+
+@contextmanager
+def _stopping(runner: Runner, total: int) -> Iterator[None]:
+    """End the processes of a runner at the end of a block; report the rows after Ctrl-C."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        journal = runner.journal
+        raise KeyboardInterrupt(
+            f"the sweep was stopped: {len(journal.known)} of {total} runs are stored in "
+            f"{journal.path}; repeat the call to compute the others"
+        ) from None
+    finally:
+        runner.close()
 
 
 def samples(
     distributions: Mapping[str, Any], n: int, seed: int = 0, method: str = "random"
 ) -> "pd.DataFrame":
     """Draw a table of parameters at random: see :func:`prbm.sweeps.table.samples`."""
-    _check_packages()
+    _check_packages("pandas")
     from . import table as sweep_table
 
     return sweep_table.samples(distributions, n, seed, method)
@@ -192,28 +195,33 @@ def samples(
 class Plan:
     """A checked sweep.
 
-    ``digest`` is the SHA-256 of the FMU's bytes; ``rows`` are the values of each run.
+    ``settings`` are all that the results depend on except for the table; ``points`` are the values
+    of each run.
     """
 
-    name: str
     fmu: bytes
-    digest: str
     job: Job
+    settings: Mapping[str, Any]
     parameters: tuple[str, ...]
-    rows: list[dict[str, float]]
+    points: list[Point]
+
+    @property
+    def outputs(self) -> list[str]:
+        """Columns of the outputs."""
+        return [output.column for output in self.job.outputs]
 
 
-def _check_packages() -> None:
-    """Check that the packages of the extra ``sweep`` are installed.
+def _check_packages(*names: str) -> None:
+    """Check that packages of the extra ``sweep`` are installed.
 
     Raises
     ------
-    SweepError
+    StudyError
         If one is not installed.
     """
-    for name in EXTRA:
+    for name in {*EXTRA, *names}:
         if importlib.util.find_spec(name) is None:
-            raise SweepError(f"sweeps need the package {name}; {REMEDY}")
+            raise StudyError(f"sweeps need the package {name}; {REMEDY}")
 
 
 def _make_plan(
@@ -242,13 +250,23 @@ def _make_plan(
     kept = _outputs(outputs, variables)
     _unambiguous([*frame.columns], [output.column for output in kept])
     times = _times(description, stop_time, step, tolerance)
-    rows = frame.to_dict("records")
-    driven = _inputs(inputs, within, description, rows[0], {*frame, *fixed})  # type: ignore[arg-type]
+    first: dict[str, float] = frame.iloc[0].to_dict()  # type: ignore[assignment]
+    driven = _inputs(inputs, within, description, first, {*frame, *fixed})
     job = Job(**times, values=fixed, outputs=kept, inputs=driven)
-    return Plan(
-        description.modelName, data, hashlib.sha256(data).hexdigest(), job,
-        tuple(frame.columns), rows,  # type: ignore[arg-type]
-    )  # fmt: skip
+    settings = {
+        "FMU": hashlib.sha256(data).hexdigest(),
+        "model": description.modelName,
+        "parameters": [*frame.columns],
+        "outputs": {o.column: list(astuple(o)[1:]) for o in kept},
+        "values": fixed,
+        "inputs": {name: text for name, (text, _) in driven.items()},
+        "start time [s]": job.start,
+        "stop time [s]": job.stop,
+        "step [s]": job.step,
+        "tolerance": job.tolerance,
+    }
+    points = [tuple(row) for row in frame.to_numpy(float).tolist()]
+    return Plan(data, job, json.loads(json.dumps(settings)), tuple(frame.columns), points)
 
 
 def _inputs(
@@ -330,8 +348,6 @@ def _outputs(outputs: Outputs | None, variables: Mapping[str, Any]) -> tuple[Out
 
 
 def _unambiguous(parameters: Sequence[str], outputs: Sequence[str]) -> None:
-    from .results import OWN
-
     names = [*parameters, *outputs, *OWN]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
@@ -381,233 +397,96 @@ def _times(
 def _check_name(out: Path) -> None:
     if out.suffix.lower() in FILES:
         raise ParameterError(
-            f"out = {out}: the results are a folder of Parquet files, not a {out.suffix} file; "
-            f"choose a name such as {out.with_suffix('.parquet')}; "
-            "pandas.read_parquet(name).to_csv(...) makes one file of them"
+            f"out = {out}: the results are a Parquet file, not a {out.suffix} file; choose a name "
+            f"such as {out.with_suffix('.parquet')}; pandas.read_parquet(name).to_csv(...) makes a "
+            "CSV file of it"
         )
+    check_file(out)
 
 
-def _check_counts(workers: int | None, retries: int, timeout: float | None) -> None:
-    if workers is not None and workers < 1:
-        raise ParameterError(f"workers = {workers} must be 1 or more")
+def _check_counts(retries: int, timeout: float | None) -> None:
     if retries < 0:
         raise ParameterError(f"retries = {retries} must be 0 or more")
     if timeout is not None and not timeout > 0.0:
         raise ParameterError(f"timeout = {timeout:g} s must be positive")
 
 
-def _results(plan: Plan, folder: Path) -> "Results":
-    from .results import Results
-
-    job = plan.job
-    settings = {
-        "FMU": plan.digest,
-        "model": plan.name,
-        "parameters": plan.parameters,
-        "outputs": {o.column: list(astuple(o)[1:]) for o in job.outputs},
-        "values": job.values,
-        **(
-            {"inputs": {name: text for name, (text, _) in job.inputs.items()}} if job.inputs else {}
-        ),
-        "start time [s]": job.start,
-        "stop time [s]": job.stop,
-        "step [s]": job.step,
-        "tolerance": job.tolerance,
-    }
-    return Results(folder, settings, plan.parameters, [output.column for output in job.outputs])
+# --- results --------------------------------------------------------------------------------------
 
 
-def _same_rows(plan: Plan, done: "pd.DataFrame", folder: Path) -> None:
-    """Reject results whose rows differ from the rows of the table."""
-    for k, *values in done[["row", *plan.parameters]].itertuples(index=False):
-        now = [*plan.rows[k].values()] if k < len(plan.rows) else None
-        if now != values:
-            raise ParameterError(
-                f"{folder} contains a sweep over another table: row {k} "
-                f"{'is missing now' if now is None else 'has changed'}; give another name for the "
-                "results, or overwrite them (--overwrite)"
-            )
+def _frame(plan: Plan, outcomes: Sequence[Outcome]) -> "pd.DataFrame":
+    """Return the table of results."""
+    import pandas as pd
+
+    nothing = (math.nan,) * len(plan.outputs)
+    rows = [
+        (k, *point, *(outcome.values or nothing), outcome.status, outcome.message)
+        for k, (point, outcome) in enumerate(zip(plan.points, outcomes, strict=True))
+    ]
+    return pd.DataFrame(rows, columns=[ROW, *plan.parameters, *plan.outputs, STATUS, MESSAGE])
 
 
-# --- execution -----------------------------------------------------------------------------------
+def _parquet(found: "pd.DataFrame", settings: Mapping[str, Any]) -> bytes:
+    """Return the content of a Parquet file of results and their settings."""
+    import pyarrow as pa  # type: ignore[import-untyped]
+    import pyarrow.parquet as pq  # type: ignore[import-untyped]
+
+    table = pa.Table.from_pandas(found, preserve_index=False)
+    notes = {**table.schema.metadata, SETTINGS: json.dumps(settings).encode()}
+    content = io.BytesIO()
+    pq.write_table(table.replace_schema_metadata(notes), content)
+    return content.getvalue()
 
 
-@contextmanager
-def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
-    """Yield a client of the scheduler at an address, or of a new scheduler in this process.
+def _count(out: Path) -> int:
+    """Return the number of rows of a Parquet file."""
+    import pyarrow.parquet as pq
 
-    In this process one worker with threads suffices: the FMU runs in separate processes.
+    return int(pq.read_metadata(out).num_rows)
+
+
+def _earlier(plan: Plan, out: Path, overwrite: bool) -> dict[Point, Outcome]:
+    """Return the rows of a complete table of the same sweep, if there is one.
+
+    Raises
+    ------
+    ParameterError
+        If the file has no sweep; or, unless it is to be overwritten, another one or other rows.
     """
-    from dask.system import CPU_COUNT
-    from distributed import Client, LocalCluster
+    if not out.exists():
+        return {}
+    import pyarrow.parquet as pq
 
-    if scheduler is None:
-        with (
-            LocalCluster(  # type: ignore[no-untyped-call]
-                n_workers=1,
-                threads_per_worker=workers or CPU_COUNT,
-                processes=False,
-                dashboard_address="127.0.0.1:0",  # None would use a port of all interfaces.
-                worker_dashboard_address="127.0.0.1:0",
-                memory_limit=0,
-                silence_logs=logging.CRITICAL,
-            ) as cluster,
-            Client(cluster, set_as_default=False) as client,  # type: ignore[no-untyped-call]
-        ):
-            yield client
-        return
     try:
-        client = Client(  # type: ignore[no-untyped-call]
-            scheduler, timeout=CONNECTION_TIMEOUT, set_as_default=False
-        )
-    except (TimeoutError, OSError, ValueError) as error:
-        reason = (str(error).splitlines() or [type(error).__name__])[0]
-        raise SweepError(
-            f"no scheduler responds at {scheduler} ({reason}); start one with: dask scheduler"
+        table = pq.read_table(out)
+        settings = json.loads((table.schema.metadata or {})[SETTINGS])
+    except KeyError:
+        raise ParameterError(
+            f"{out} exists but contains no sweep; give another name for the results"
         ) from None
-    with client:
-        try:
-            client.wait_for_workers(1, timeout=CONNECTION_TIMEOUT)
-        except (TimeoutError, OSError):
-            raise SweepError(
-                f"the scheduler at {scheduler} has no workers; start one with: "
-                f"dask worker {scheduler}"
-            ) from None
-        yield client
-
-
-class _Sweep:
-    """Sends batches of rows to the workers and writes their results."""
-
-    def __init__(self, client: Any, plan: Plan, results: "Results", progress: Progress) -> None:
-        self.client, self.plan, self.results, self.progress = client, plan, results, progress
-        self.plugin = f"prbm-sweep-{uuid.uuid4().hex}"
-        self.begin = time.monotonic()
-        self.recent: deque[float] = deque(maxlen=RECENT_RUNS)
-        self.done = 0
-
-    def run(self, rows: Sequence[int], retries: int, timeout: float | None) -> None:
-        """Run the rows, and write each batch on completion."""
-        self.done = len(self.plan.rows) - len(rows)
-        try:
-            self._install(rows, retries, timeout)
-            self._gather(deque(rows), retries)
-        except KeyboardInterrupt:
-            kept = len(self.results.read())
-            raise KeyboardInterrupt(
-                f"the sweep was stopped: {kept} of {len(self.plan.rows)} runs are stored in "
-                f"{self.results.folder}; repeat the call to compute the others"
-            ) from None
-        finally:
-            # Fails if the scheduler has ended, or a worker does not have the plugin.
-            with suppress(OSError, KeyError):
-                self.client.unregister_worker_plugin(self.plugin)
-
-    def _install(self, rows: Sequence[int], retries: int, timeout: float | None) -> None:
-        """Send the FMU to the workers."""
-        from dataclasses import replace
-
-        from .worker import FmuPlugin
-
-        # The check of a reset doubles the duration of a run, which may exceed a timeout.
-        reuse = timeout is None and len(rows) >= RESET_RUNS_MIN * self._threads()
-        job = replace(self.plan.job, reuse=reuse)
-        try:
-            self.client.register_plugin(
-                FmuPlugin(self.plan.fmu, job, retries, timeout), name=self.plugin
+    except (OSError, ValueError, RecursionError) as error:  # Errors of pyarrow are subclasses.
+        if overwrite:
+            return {}
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
+        raise ParameterError(
+            f"{out} cannot be read ({reason}); give another name for the results, or overwrite "
+            "them (--overwrite)"
+        ) from None
+    if overwrite:
+        return {}
+    compare(f"{out} contains a sweep", settings, plan.settings)
+    found = {}
+    for k, row in enumerate(table.to_pylist()):
+        point = tuple(row[name] for name in plan.parameters)
+        if k >= len(plan.points) or point != plan.points[k]:
+            raise ParameterError(
+                f"{out} contains a sweep over another table: row {k} "
+                f"{'is missing now' if k >= len(plan.points) else 'has changed'}; give another "
+                "name for the results, or overwrite them (--overwrite)"
             )
-        except Exception as error:  # distributed wraps the errors of workers.
-            if MISSING_MODULE not in str(error):
-                raise
-            raise SweepError(
-                "a worker cannot import prbm; install it there: "
-                'python -m pip install "prbm-impact[sweep]"'
-            ) from None
-
-    def _threads(self) -> int:
-        threads: dict[str, int] = self.client.nthreads()
-        return max(1, sum(threads.values()))
-
-    def _gather(self, rest: deque[int], retries: int) -> None:
-        from distributed import as_completed
-
-        running: dict[Any, list[int]] = {}
-        crashes: dict[int, int] = {}  # Crashes of workers that ran a row, after the first one.
-        suspects: deque[int] = deque()
-        completed = as_completed(loop=self.client.loop)  # type: ignore[no-untyped-call]
-        self._submit(rest, running, completed)
-        for future in completed:
-            rows = running.pop(future)
-            outcomes = self._outcomes(future)
-            if outcomes is None:
-                outcomes = self._after_crash(rows, crashes, suspects, retries)
-            if outcomes:
-                self._keep(rows, outcomes)
-            self._submit(rest, running, completed)
-            if suspects and not running:
-                self._send([suspects.popleft()], running, completed)
-
-    def _after_crash(
-        self, rows: list[int], crashes: dict[int, int], suspects: deque[int], retries: int
-    ) -> list[Outcome]:
-        """Return the outcome of a row whose workers crashed too often; otherwise repeat the rows.
-
-        A crashed worker loses all of its rows, not only the row that caused the crash.  At the end
-        these rows are repeated one by one, with no other batch submitted, to find the cause.
-        """
-        for row in rows:
-            crashes[row] = crashes.get(row, -1) + 1
-        if crashes[rows[0]] > retries:
-            return [Outcome(CRASHED, "every worker that ran this row crashed")]
-        suspects.extend(rows)
-        return []
-
-    def _keep(self, rows: list[int], outcomes: list[Outcome]) -> None:
-        self.results.add(rows, [self.plan.rows[row] for row in rows], outcomes)
-        self.recent.extend(o.seconds for o in outcomes if o.seconds > 0.0)
-        self.done += len(rows)
-        self.progress(self.done / len(self.plan.rows))
-
-    def _submit(self, rest: deque[int], running: dict[Any, list[int]], completed: Any) -> None:
-        """Submit batches until there are :data:`BATCHES_PER_THREAD` per thread."""
-        threads = self._threads()
-        while rest and len(running) < BATCHES_PER_THREAD * threads:
-            size = self._size(len(rest), threads)
-            self._send([rest.popleft() for _ in range(size)], running, completed)
-
-    def _size(self, rest: int, threads: int) -> int:
-        """Return the number of rows of the next batch, small at the start and at the end."""
-        if not self.recent:
-            return 1
-        seconds = min(max(BATCH_SHARE * (time.monotonic() - self.begin), BATCH_MIN), BATCH_MAX)
-        fair = math.ceil(rest / (BATCHES_PER_THREAD * threads))
-        return max(1, min(int(seconds / median(self.recent)), fair))
-
-    def _send(self, rows: list[int], running: dict[Any, list[int]], completed: Any) -> None:
-        from .worker import run_batch
-
-        values = [self.plan.rows[row] for row in rows]
-        future = self.client.submit(run_batch, self.plugin, values, pure=False)
-        running[future] = rows
-        completed.add(future)
-
-    def _outcomes(self, future: Any) -> list[Outcome] | None:
-        """Return the outcomes of a batch; None if its workers crashed."""
-        from distributed import KilledWorker
-
-        from .worker import Unusable
-
-        try:
-            return future.result()  # type: ignore[no-any-return]
-        except KilledWorker:
-            return None
-        except Unusable as error:
-            raise SweepError(f"{self.plan.name}: {error}") from None
-        except CancelledError:
-            raise SweepError(
-                f"the scheduler has ended: {len(self.results.read())} of {len(self.plan.rows)} "
-                f"runs are stored in {self.results.folder}; repeat the call to compute the others"
-            ) from None
+        values = tuple(row[name] for name in plan.outputs) if row[STATUS] in GOOD else ()
+        found[point] = Outcome(row[STATUS], row[MESSAGE], values=values)
+    return found
 
 
 def summary(results: "pd.DataFrame", out: str | os.PathLike[str]) -> str:

@@ -13,21 +13,17 @@ from fmpy.simulation import (  # type: ignore[import-untyped]
     settable_in_instantiated,
 )
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from ..base import reading
 from ..base.errors import ParameterError
 from ..base.names import proposal
 from ..runs.quantities import QUANTITIES
+from .design import drawn
 from .outputs import Output
 
 Table = pd.DataFrame | str | Path
-METHODS = ("random", "latin", "sobol")
 SEPARATORS = {";": "semicolons", "\t": "tabs"}  # separators of CSV dialects that are rejected
 WORDS = {"true": 1.0, "false": 0.0}
-PROBABILITY_MIN = (
-    2.0**-53
-)  # Smallest distance of probabilities from 0 and 1, where quantiles may be infinite.
 FILE_SIZE_MAX = 1 << 30  # bytes of a table in CSV; a million rows of 50 columns have 900 MB.
 NAMES_LISTED_MAX = 10  # Messages with more settable variables refer to "fmpy info" instead.
 HINT_LENGTH_MAX = 200  # characters
@@ -71,48 +67,7 @@ def samples(
     >>> sorted((table["stop.restitution"] * 20).astype(int).tolist())
     [8, 9, 10, 11]
     """
-    if not distributions or n < 1:
-        raise ParameterError(
-            f"n = {n} rows of {len(distributions)} parameters: draw at least one of each"
-        )
-    unit = np.clip(
-        _unit(n, len(distributions), seed, method), PROBABILITY_MIN, 1.0 - PROBABILITY_MIN
-    )
-    columns = {
-        name: _quantiles(name, distribution, unit[:, k])
-        for k, (name, distribution) in enumerate(distributions.items())
-    }
-    return pd.DataFrame(columns)
-
-
-def _unit(n: int, d: int, seed: int, method: str) -> NDArray[np.float64]:
-    """Return probabilities, shape (n, d)."""
-    if method == "random":
-        return np.random.default_rng(seed).random((n, d))
-    if method == "latin":
-        return qmc.LatinHypercube(d, seed=seed).random(n)
-    if method == "sobol":
-        if n & (n - 1):
-            near = 2 ** round(math.log2(n))
-            raise ParameterError(f"n = {n}: Sobol's sequence needs a power of two, such as {near}")
-        return qmc.Sobol(d, seed=seed).random(n)
-    raise ParameterError(f"unknown method {method!r}; methods are {', '.join(METHODS)}")
-
-
-def _quantiles(name: str, distribution: Any, u: NDArray[np.float64]) -> NDArray[np.float64]:
-    if isinstance(distribution, tuple):
-        low, high = distribution
-        x = np.asarray(low + (high - low) * u, dtype=float)
-    elif hasattr(distribution, "ppf"):
-        x = np.asarray(distribution.ppf(u), dtype=float)
-    else:
-        raise ParameterError(
-            f"{name}: {distribution!r} must be a distribution of scipy.stats, such as "
-            "norm(0.0, 1e-3), or a pair (low, high)"
-        )
-    if x.shape != u.shape or not np.isfinite(x).all():
-        raise ParameterError(f"{name}: the quantiles of the distribution must be finite numbers")
-    return x
+    return pd.DataFrame(drawn(distributions, n, seed, method), columns=[*distributions])
 
 
 def read_table(table: Table) -> pd.DataFrame:

@@ -1,18 +1,14 @@
-"""Runs of an FMU for a sweep, in a separate process that may crash; :mod:`.worker` starts it.
+"""Runs of an FMU for a study, in a process of their own, which may crash (:mod:`.children`).
 
 The module imports only FMPy and NumPy, and so starts quickly.  The FMU is instantiated once and
 reset between runs if its reset works.  To check this, the second run is computed twice: after a
 reset and with a new instance.  Unless both agree to the last bit, every run gets a new instance.
 """
 
-import os
-import pickle
-import queue
-import signal
-import sys
-import threading
+import io
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from ctypes import (
     c_bool,
     c_double,
@@ -32,7 +28,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from math import isclose
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any
 
 import fmpy  # type: ignore[import-untyped]
 import numpy as np
@@ -60,7 +56,6 @@ C_TYPES_3: dict[str, Any] = {
     "Int8": c_int8, "Int16": c_int16, "Int32": c_int32, "Int64": c_int64,
     "UInt8": c_uint8, "UInt16": c_uint16, "UInt32": c_uint32, "UInt64": c_uint64,
 }  # fmt: skip
-IDLE_MAX = 600.0  # Time without a run after which the process ends [s]: its parent was killed.
 MESSAGES_MAX = 5  # Most messages of the FMU in the message of a failed run.
 LOGGED_MAX = 100  # More messages in a run switch logging off for the next runs.
 
@@ -70,7 +65,7 @@ LOGGED_MAX = 100  # More messages in a run switch logging off for the next runs.
 
 @dataclass(frozen=True)
 class Job:
-    """Settings common to all runs of a sweep.
+    """Settings common to all runs of a study.
 
     Parameters
     ----------
@@ -96,6 +91,51 @@ class Job:
     outputs: tuple[Output, ...]
     inputs: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     reuse: bool = True
+
+
+@dataclass(frozen=True)
+class PackedFmu:
+    """An FMU that can be sent to other machines, a :class:`~prbm.sweeps.children.Job`.
+
+    Parameters
+    ----------
+    content : bytes
+        The FMU.
+    job : Job
+        Settings of the runs.
+    """
+
+    content: bytes
+    job: Job
+
+    @contextmanager
+    def placed(self) -> "Iterator[UnpackedFmu]":
+        """Unpack the FMU."""
+        from ..fmu.unpack import unpacked  # imported here: the processes do not need it
+
+        with unpacked(io.BytesIO(self.content)) as folder:
+            yield UnpackedFmu(folder, self.job)
+
+
+@dataclass(frozen=True)
+class UnpackedFmu:
+    """An FMU in a folder, a :class:`~prbm.sweeps.children.Task`."""
+
+    folder: Path
+    job: Job
+
+    def opened(self) -> Callable[[Mapping[str, float]], Outcome]:
+        """Load the FMU; return the function that runs it.
+
+        Raises
+        ------
+        RuntimeError
+            If it cannot be loaded or instantiated.
+        """
+        try:
+            return Runner(self.folder, self.job).run
+        except Exception as error:  # FMPy raises plain exceptions.
+            raise RuntimeError(f"the FMU cannot be loaded: {error}") from None
 
 
 def communication_points(start: float, stop: float, step: float) -> list[float]:
@@ -410,56 +450,3 @@ class _Recorder:
 def _bits(outcome: Outcome) -> tuple[str, bytes]:
     """Return status and bytes of the values, to compare two outcomes to the last bit."""
     return outcome.status, np.array(outcome.values).tobytes()
-
-
-# --- the process --------------------------------------------------------------------------------
-
-
-def main() -> None:
-    """Run the batches read from standard input until it closes; write one outcome per run."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    replies = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # Output of the FMU must not mix with the replies.
-    batches: queue.Queue[Any] = queue.Queue()
-    threading.Thread(target=_read, args=(sys.stdin.buffer, batches), daemon=True).start()
-    folder, job = batches.get()
-    try:
-        runner = Runner(folder, job)
-    except Exception as error:
-        _reply(replies, f"the FMU cannot be loaded: {error}")
-        return
-    _reply(replies, "")
-    for values in _queued(batches):
-        outcome = runner.run(values)
-        _reply(replies, outcome)
-        if outcome.spent:
-            break
-    replies.flush()
-    os._exit(0)  # An FMU may hang after an error when its library is unloaded.
-
-
-def _queued(batches: "queue.Queue[Any]") -> Iterator[Mapping[str, float]]:
-    """Yield start values of runs until none arrive for :data:`IDLE_MAX`."""
-    while True:
-        try:
-            yield from batches.get(timeout=IDLE_MAX)
-        except queue.Empty:
-            return
-
-
-def _read(stream: BinaryIO, batches: "queue.Queue[Any]") -> None:
-    """Queue the batches; end this process at once when its parent ends, even during a run."""
-    try:
-        while True:
-            batches.put(pickle.load(stream))
-    except (EOFError, OSError, pickle.UnpicklingError):
-        os._exit(0)
-
-
-def _reply(stream: BinaryIO, reply: object) -> None:
-    pickle.dump(reply, stream)
-    stream.flush()
-
-
-if __name__ == "__main__":
-    main()

@@ -1,0 +1,336 @@
+"""Processes that run the simulations of a study, one for each thread of an executor.
+
+A simulation may crash or hang, so it runs in a process of its own.  A crash costs only its run, its
+signal can be reported, and the executor survives.  The threads of ``concurrent.futures`` and the
+workers of Dask call the same function, :func:`run_batch`.
+"""
+
+import contextlib
+import math
+import os
+import pickle
+import queue
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack
+from typing import Any, BinaryIO, Protocol
+
+from ..base.threads import THREAD_LIMITS
+from .outputs import CRASHED, TIMEOUT, Outcome
+
+IDLE_MAX = 600.0  # Time without a run after which a process ends [s]: its parent was killed.
+EXIT_TIMEOUT = 5.0  # Longest wait for the exit of a process before it is killed [s].
+STOPPED = "the study was stopped"
+COMMAND = "from prbm.sweeps.children import main; main()"
+Row = Mapping[str, float]
+
+
+class Unusable(Exception):
+    """The simulation cannot run here with any parameters; the message gives the reason."""
+
+
+class Task(Protocol):
+    """A simulation that a process can run for different parameters; it can be pickled."""
+
+    def opened(self) -> Callable[[Row], Outcome]:
+        """Return the function that runs once; an exception if there is none."""
+
+
+class Job(Protocol):
+    """A simulation that can be sent to other machines."""
+
+    def placed(self) -> AbstractContextManager[Task]:
+        """Return a context in which the simulation is ready on this machine."""
+
+
+# --- the process --------------------------------------------------------------------------------
+
+
+def main() -> None:
+    """Run the batches read from standard input until it closes; write one outcome per run."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    replies = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # Output of an FMU must not mix with the replies.
+    batches: queue.Queue[Any] = queue.Queue()
+    threading.Thread(target=_read, args=(sys.stdin.buffer, batches), daemon=True).start()
+    try:
+        run = batches.get().opened()
+    except Exception as error:
+        _reply(replies, f"{error}" or type(error).__name__)
+        return
+    _reply(replies, "")
+    for values in _queued(batches):
+        outcome = run(values)
+        _reply(replies, outcome)
+        if outcome.spent:
+            break
+    replies.flush()
+    os._exit(0)  # An FMU may hang after an error when its library is unloaded.
+
+
+def _queued(batches: "queue.Queue[Any]") -> Iterator[Row]:
+    """Yield start values of runs until none arrive for :data:`IDLE_MAX`."""
+    while True:
+        try:
+            yield from batches.get(timeout=IDLE_MAX)
+        except queue.Empty:
+            return
+
+
+def _read(stream: BinaryIO, batches: "queue.Queue[Any]") -> None:
+    """Queue the batches; end this process at once when its parent ends, even during a run."""
+    try:
+        while True:
+            batches.put(pickle.load(stream))
+    except (EOFError, OSError, pickle.UnpicklingError):
+        os._exit(0)
+
+
+def _reply(stream: BinaryIO, reply: object) -> None:
+    pickle.dump(reply, stream)
+    stream.flush()
+
+
+class Child:
+    """A process that runs a simulation.
+
+    Raises
+    ------
+    Unusable
+        If the simulation cannot be opened.
+    """
+
+    def __init__(self, task: Task) -> None:
+        paths = os.pathsep.join(path for path in sys.path if path)
+        limits = {name: "1" for name in THREAD_LIMITS if name not in os.environ}
+        self.stderr = tempfile.TemporaryFile()  # noqa: SIM115  # Closed by close().
+        self.process = subprocess.Popen(
+            [sys.executable, "-P", "-c", COMMAND],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self.stderr,
+            env={**os.environ, **limits, "PYTHONPATH": paths},
+            start_new_session=True,  # Ctrl-C must reach only the process of the study.
+        )
+        self.late = False
+        self.send(task)
+        error = self.receive(None)
+        if error != "":
+            end = self.close()
+            raise Unusable(error or f"the process of the simulation ended at its start: {end}")
+
+    def send(self, message: object) -> None:
+        """Send a message to the process."""
+        assert self.process.stdin is not None
+        with contextlib.suppress(OSError):  # receive() reports that the process has ended.
+            pickle.dump(message, self.process.stdin)
+            self.process.stdin.flush()
+
+    def receive(self, timeout: float | None) -> Any:
+        """Return a reply; None if the process ended or was killed after ``timeout`` [s]."""
+        timer = threading.Timer(timeout, self._time_out) if timeout is not None else None
+        if timer:
+            timer.start()
+        try:
+            return pickle.load(self.process.stdout)  # type: ignore[arg-type]
+        except (EOFError, OSError, ValueError, pickle.UnpicklingError):
+            return None
+        finally:
+            if timer:
+                timer.cancel()
+
+    def _time_out(self) -> None:
+        self.late = True
+        self.process.kill()
+
+    def close(self) -> str:
+        """End the process; return its exit status and the last line of its standard error."""
+        with contextlib.suppress(OSError):
+            self.process.stdin.close()  # type: ignore[union-attr]
+        try:
+            code = self.process.wait(EXIT_TIMEOUT)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            code = self.process.wait()
+        self.process.stdout.close()  # type: ignore[union-attr]
+        self.stderr.seek(0)
+        lines = self.stderr.read().decode(errors="replace").strip().splitlines()
+        self.stderr.close()
+        return ending(code) + (f" ({lines[-1].strip()})" if lines else "")
+
+
+def ending(code: int) -> str:
+    """Return the text of an exit code.
+
+    Examples
+    --------
+    >>> ending(-11), ending(3)
+    ('killed by SIGSEGV', 'exit code 3')
+    """
+    if code >= 0:
+        return f"exit code {code}"
+    try:
+        return f"killed by {signal.Signals(-code).name}"
+    except ValueError:
+        return f"killed by signal {-code}"
+
+
+# --- the processes of this machine --------------------------------------------------------------
+
+
+class Processes:
+    """The processes that run a job on this machine, at most one per thread.
+
+    Parameters
+    ----------
+    job : Job
+        The simulation.
+    retries : int
+        Number of repetitions of a run whose process crashed.
+    timeout : float or None
+        Longest duration of a run [s]; None: no limit.
+
+    Raises
+    ------
+    Exception
+        If the simulation cannot be made ready here.
+    """
+
+    def __init__(self, job: Job, retries: int, timeout: float | None) -> None:
+        self.retries, self.timeout = retries, timeout
+        self.idle, self.all = list[Child](), set[Child]()
+        self.lock, self.stack, self.closed = threading.Lock(), ExitStack(), False
+        self.task = self.stack.enter_context(job.placed())
+
+    def run(self, rows: Sequence[Row]) -> list[Outcome]:
+        """Simulate once for each row.
+
+        Raises
+        ------
+        Unusable
+            If the simulation cannot be opened, or the study was stopped.
+        """
+        outcomes: list[Outcome] = []
+        attempts = 0
+        while len(outcomes) < len(rows):
+            child = self._child()
+            child.send(rows[len(outcomes) :])
+            spent = False
+            while not spent and len(outcomes) < len(rows):
+                outcome = child.receive(self.timeout)
+                if outcome is None:
+                    break
+                outcomes.append(outcome)
+                attempts, spent = 0, outcome.spent
+            if len(outcomes) == len(rows) and not spent:
+                self._keep(child)
+                break
+            late, end = child.late, self._drop(child)
+            if self.closed:
+                raise Unusable(STOPPED)
+            if spent:
+                continue
+            attempts += 1
+            if late:
+                limit = self.timeout or math.inf
+                outcomes.append(Outcome(TIMEOUT, f"not finished after {limit:g} s", limit))
+                attempts = 0
+            elif attempts > self.retries:
+                times = f", in each of {attempts} attempts" if attempts > 1 else ""
+                message = f"the process of the simulation crashed: {end}{times}"
+                outcomes.append(Outcome(CRASHED, message))
+                attempts = 0
+        return outcomes
+
+    def _child(self) -> Child:
+        """Return an idle process, or a new one."""
+        with self.lock:
+            if self.closed:
+                raise Unusable(STOPPED)
+            child = self.idle.pop() if self.idle else None
+        if child is not None and child.process.poll() is None:
+            child.stderr.truncate(0)
+            return child
+        if child is not None:  # It ended itself after IDLE_MAX without work.
+            self._drop(child)
+        child = Child(self.task)
+        with self.lock:
+            self.all.add(child)
+        if self.closed:
+            self._drop(child)
+            raise Unusable(STOPPED)
+        return child
+
+    def _keep(self, child: Child) -> None:
+        """Keep a process for further runs, unless the study was stopped."""
+        with self.lock:
+            if not self.closed:
+                self.idle.append(child)
+                return
+        self._drop(child)
+
+    def _drop(self, child: Child) -> str:
+        """End a process; return the text of :meth:`Child.close`."""
+        with self.lock:
+            self.all.discard(child)
+        return child.close()
+
+    def close(self) -> None:
+        """Kill all processes, even during a run, and remove the job from this machine."""
+        with self.lock:
+            self.closed, children = True, list(self.all)
+            idle, self.idle = self.idle, []
+        for child in children:
+            child.process.kill()
+        for child in idle:  # The other processes are closed by the threads that wait for them.
+            child.close()
+        self.stack.close()
+
+
+_processes: dict[str, Processes] = {}  # By the name of the study.
+_lock = threading.Lock()
+
+
+def run_batch(study: str, rows: Sequence[Row], given: tuple[Any, ...] | None) -> Any:
+    """Simulate once for each row, in a thread of an executor.
+
+    Parameters
+    ----------
+    study : str
+        Name of the study, unique among all machines.
+    rows : sequence of mapping
+        Parameters of each run.
+    given : tuple or None
+        Arguments of :class:`Processes`, which a machine needs only once.
+
+    Returns
+    -------
+    list of Outcome or None
+        None if this machine needs the arguments.
+
+    Raises
+    ------
+    Unusable
+        If the simulation cannot run here, or the study was stopped.
+    """
+    with _lock:
+        if study not in _processes:
+            if given is None:
+                return None
+            try:
+                _processes[study] = Processes(*given)
+            except Exception as error:  # FMPy raises plain exceptions.
+                raise Unusable(f"a worker cannot unpack the FMU ({error})") from None
+    return _processes[study].run(rows)
+
+
+def release(study: str) -> None:
+    """End the processes of a study on this machine."""
+    with _lock:
+        found = _processes.pop(study, None)
+    if found is not None:
+        found.close()

@@ -1,0 +1,292 @@
+"""Designs of studies: which parameters the simulations have, and what many of them say together.
+
+A grid, a list of rows, or points drawn from distributions: pseudo-random, a Latin hypercube or the
+sequence of Sobol.  Drawn points give the share of good runs with its confidence interval; those of
+Saltelli's design give first-order and total sensitivity indices.
+"""
+
+import csv
+import io
+import itertools
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.stats import binomtest, norm, qmc, sobol_indices
+
+from ..base import reading
+from ..base.errors import ParameterError
+from ..mechanics.arrays import Real
+
+METHODS = ("random", "latin", "sobol")
+SENSITIVITY = "sensitivity"  # Method of Saltelli's design.
+PROBABILITY_MIN = (
+    2.0**-53
+)  # Smallest distance of probabilities from 0 and 1, where quantiles may be infinite.
+SIGMAS = 3.0  # Standard deviations in the half-width of a tolerance.
+CONFIDENCE = 0.95
+RESAMPLES = 999  # Of the bootstrap that gives the confidence intervals of indices.
+FILE_SIZE_MAX = 1 << 28  # bytes of a list of parameters.
+HEAD = re.compile(r"([^\[\]]*)(?:\[([^\[\]]*)\])?")  # A name and a unit in brackets.
+TOLERANCE = re.compile(r"(.*?)(?:\+-|\+/-|±)(.*?)(uniform)?", re.DOTALL)
+
+
+def grid(samples: Mapping[str, Real]) -> Real:
+    """Return all combinations of samples, (n, p); the last parameter varies fastest.
+
+    Examples
+    --------
+    >>> grid({"a": np.array([0.0, 1.0]), "b": np.array([2.0, 3.0])}).tolist()
+    [[0.0, 2.0], [0.0, 3.0], [1.0, 2.0], [1.0, 3.0]]
+    """
+    return np.array(list(itertools.product(*samples.values())))
+
+
+def read_rows(path: Path) -> dict[str, tuple[Real, str]]:
+    """Return the columns of a CSV file of parameters by name, with the unit of each.
+
+    A unit may follow the name in the head, ``stop.position [mm]``; it is empty otherwise.
+
+    Raises
+    ------
+    ParameterError
+        If the file cannot be read, has no row, or a cell is no finite number.
+    """
+    try:
+        text = reading.text(path, FILE_SIZE_MAX, ParameterError).read()
+        rows = [row for row in csv.reader(io.StringIO(text)) if row]
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise ParameterError(f"{path} cannot be read as a table: {error}") from None
+    heads = [HEAD.fullmatch(cell.strip()) for cell in rows[0]] if rows else []
+    names = [head[1].strip() if head else "" for head in heads]
+    if len(rows) < 2 or not all(names) or len({*names}) < len(heads):
+        raise ParameterError(
+            f"{path}: write a column for each parameter, headed by its name, and a row for each "
+            "simulation"
+        )
+    table = []
+    for k, row in enumerate(rows[1:]):
+        try:
+            table.append([float(cell) for cell in row])
+            if len(row) != len(heads) or not np.isfinite(table[-1]).all():
+                raise ValueError
+        except ValueError:
+            raise ParameterError(
+                f"{path}: row {k} must have {len(heads)} finite numbers, separated by commas"
+            ) from None
+    units = [(head[2] or "").strip() if head else "" for head in heads]
+    return dict(zip(names, zip(np.array(table).T, units, strict=True), strict=True))
+
+
+def drawn(distributions: Mapping[str, Any], n: int, seed: int, method: str) -> Real:
+    """Draw points.
+
+    A column is x = F^-1(u) with the distribution F and a sequence u in (0, 1): pseudo-random, a
+    Latin hypercube or the scrambled sequence of Sobol.  The columns are independent of each other.
+
+    Parameters
+    ----------
+    distributions : mapping
+        For each parameter a frozen distribution of ``scipy.stats`` (any object with ``ppf``), or
+        (low, high) for a uniform distribution; in SI units.
+    n : int
+        Number of points; a power of two with ``sobol`` and ``sensitivity``, whose sequence is
+        balanced only then.
+    seed : int
+        The same seed gives the same points.
+    method : str
+        ``random``, ``latin``, ``sobol``, or ``sensitivity`` for n (p + 2) points: the rows of A, of
+        B, and for each parameter those of A with the column of B.
+
+    Returns
+    -------
+    (m, p)
+
+    Raises
+    ------
+    ParameterError
+        If n or the number of parameters is zero, or a distribution or a method is invalid.
+    """
+    d = len(distributions)
+    if not distributions or n < 1:
+        raise ParameterError(f"n = {n} rows of {d} parameters: draw at least one of each")
+    unit = _saltelli(n, d, seed) if method == SENSITIVITY else _unit(n, d, seed, method)
+    unit = np.clip(unit, PROBABILITY_MIN, 1.0 - PROBABILITY_MIN)
+    columns = [
+        _quantiles(name, distribution, unit[:, k])
+        for k, (name, distribution) in enumerate(distributions.items())
+    ]
+    return np.column_stack(columns)
+
+
+def _unit(n: int, d: int, seed: int, method: str) -> Real:
+    """Return probabilities, shape (n, d)."""
+    if method == "random":
+        return np.random.default_rng(seed).random((n, d))
+    if method == "latin":
+        return np.asarray(qmc.LatinHypercube(d, seed=seed).random(n))
+    if method == "sobol":
+        _check_power(n)
+        return np.asarray(qmc.Sobol(d, seed=seed).random(n))
+    every = ", ".join((*METHODS, SENSITIVITY))
+    raise ParameterError(f"unknown method {method!r}; methods are {every}")
+
+
+def _saltelli(n: int, d: int, seed: int) -> Real:
+    """Return the probabilities of Saltelli's design, (n (d + 2), d)."""
+    _check_power(n)
+    both = np.asarray(qmc.Sobol(2 * d, seed=seed).random(n))
+    a, b = both[:, :d], both[:, d:]
+    mixed = [np.where(np.arange(d) == k, b, a) for k in range(d)]
+    return np.vstack([a, b, *mixed])
+
+
+def _check_power(n: int) -> None:
+    if n & (n - 1):
+        near = 2 ** round(math.log2(n))
+        raise ParameterError(f"n = {n}: Sobol's sequence needs a power of two, such as {near}")
+
+
+def _quantiles(name: str, distribution: Any, u: Real) -> Real:
+    if isinstance(distribution, tuple):
+        low, high = distribution
+        x = np.asarray(low + (high - low) * u, dtype=float)
+    elif hasattr(distribution, "ppf"):
+        x = np.asarray(distribution.ppf(u), dtype=float)
+    else:
+        raise ParameterError(
+            f"{name}: {distribution!r} must be a distribution of scipy.stats, such as "
+            "norm(0.0, 1e-3), or a pair (low, high)"
+        )
+    if x.shape != u.shape or not np.isfinite(x).all():
+        raise ParameterError(f"{name}: the quantiles of the distribution must be finite numbers")
+    return x
+
+
+def tolerance_parts(text: str) -> tuple[str, str, bool] | None:
+    """Return nominal value, half-width and whether the distribution is uniform; None otherwise.
+
+    Examples
+    --------
+    >>> tolerance_parts("0.1 mm +- 2 %"), tolerance_parts("+- 5 um uniform"), tolerance_parts("1")
+    (('0.1 mm', '2 %', False), ('', '5 um', True), None)
+    """
+    found = TOLERANCE.fullmatch(text.strip())
+    if found is None:
+        return None
+    return found[1].strip(), found[2].strip(), found[3] is not None
+
+
+def toleranced(nominal: float, half: float, uniform: bool) -> Any:
+    """Return the distribution of a value with a tolerance.
+
+    It is normal, and the half-width of the tolerance is three standard deviations: 0.27 % of the
+    parts are outside.  Or it is uniform between the limits of the tolerance.
+
+    Raises
+    ------
+    ParameterError
+        If the half-width is not positive and finite.
+    """
+    if not (half > 0.0 and math.isfinite(half)):
+        raise ParameterError(f"a tolerance of +- {half:g} must be positive and finite")
+    return (nominal - half, nominal + half) if uniform else norm(nominal, half / SIGMAS)
+
+
+@dataclass(frozen=True)
+class Yield:
+    """The share of good runs among independent ones.
+
+    Parameters
+    ----------
+    good, runs : int
+        Numbers of runs that satisfy all constraints, and of all runs; a failed run is not good.
+    share : float
+        good / runs.
+    low, high : float
+        95 % confidence interval of the probability of a good run, by Wilson.
+
+    Examples
+    --------
+    >>> found = yield_of(np.array([True] * 95 + [False] * 5))
+    >>> found.share, round(found.low, 3), round(found.high, 3)
+    (0.95, 0.888, 0.978)
+    """
+
+    good: int
+    runs: int
+    share: float
+    low: float
+    high: float
+
+
+def yield_of(good: Any) -> Yield:
+    """Return the share of true values and its confidence interval."""
+    count, runs = int(np.sum(good)), len(good)
+    interval = binomtest(count, runs).proportion_ci(CONFIDENCE, method="wilson")
+    return Yield(count, runs, count / runs, float(interval.low), float(interval.high))
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Sobol's indices of an output: shares of its variance.
+
+    Parameters
+    ----------
+    names : tuple of str
+        The parameters.
+    first, total : (p,)
+        Share of the variance by the parameter alone, and with all its interactions.
+    first_interval, total_interval : (p, 2)
+        95 % confidence intervals, by bootstrap.
+    """
+
+    names: tuple[str, ...]
+    first: Real
+    total: Real
+    first_interval: Real
+    total_interval: Real
+
+
+def sensitivity(names: Sequence[str], values: Real, seed: int = 0) -> Sensitivity | None:
+    """Return the indices of an output at the points of Saltelli's design.
+
+    Estimators are those of ``scipy.stats.sobol_indices`` (Saltelli 2010).
+
+    Parameters
+    ----------
+    names : sequence of str
+        The p parameters.
+    values : (n (p + 2),)
+        The output at the points of :func:`drawn` with the method ``sensitivity``.
+    seed : int
+        Seed of the bootstrap.
+
+    Returns
+    -------
+    Sensitivity or None
+        None if a simulation has failed or the output is constant.
+    """
+    p = len(names)
+    n = len(values) // (p + 2)
+    if not np.isfinite(values).all() or np.ptp(values) == 0.0:
+        return None
+    a, b, mixed = values[:n], values[n : 2 * n], values[2 * n :].reshape(p, n)
+    found: Any = sobol_indices(
+        func={"f_A": a[None, :], "f_B": b[None, :], "f_AB": mixed[:, None, :]},
+        n=n, rng=np.random.default_rng(seed),
+    )  # fmt: skip
+    spread: Any = found.bootstrap(confidence_level=CONFIDENCE, n_resamples=RESAMPLES)
+
+    def interval(x: Any) -> Real:
+        low, high = np.ravel(x.confidence_interval.low), np.ravel(x.confidence_interval.high)
+        return np.column_stack([low, high])
+
+    return Sensitivity(
+        tuple(names), np.ravel(found.first_order), np.ravel(found.total_order),
+        interval(spread.first_order), interval(spread.total_order),
+    )  # fmt: skip

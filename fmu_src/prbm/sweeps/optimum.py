@@ -1,0 +1,427 @@
+"""The optimum of an output of a study under constraints: from samples to a local search by SciPy.
+
+Failed simulations and violated constraints have no value.  An output may jump, for example where
+the number of impacts changes; all searches therefore compare values and use no derivatives.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize, minimize_scalar
+
+from ..base.errors import ParameterError
+from ..mechanics.arrays import Real
+from .outputs import RELATIONS
+
+NEIGHBOURS = 5  # Samples of a range whose worst output is compared with that of other ranges.
+FLAT_RTOL = 0.05  # An optimum is flat where the output is within this share of it.
+REFINED_RTOL = 1e-3  # Tolerance of the refined parameters, relative to the distance of samples.
+ROUNDS_MAX = 4  # Repetitions of the refinement.
+REFINEMENTS_MAX = 40  # Simulations that refine an optimum, for each parameter.
+REFINEMENTS_EXPECTED = 30  # Usual number of simulations for each parameter, for the progress.
+EDGE_RTOL = 0.02  # Tolerance of the ends of the flat range, relative to the distance of samples.
+ACTIVE_RTOL = 0.01  # A constraint is active if its output is within this share of its bound.
+BEST = 10  # Points of the table of the best ones.
+RESTART_RADIUS = 0.1  # Of a repeated search around the best point, in distances of samples.
+DISTINCT = 0.1  # Distance of different points in the table of the best ones, likewise.
+MARGIN = 1e-4  # The search aims at this relative distance from bounds, so that constraints hold.
+STARTS = 3  # Best samples from which a search under constraints begins.
+
+Values = Callable[[Real], Real]
+"""Values (m, k) of all outputs at points (m, p); NaN for failed simulations."""
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """A condition on an output.
+
+    Parameters
+    ----------
+    text : str
+        The condition as it was given.
+    output : str
+        The output.
+    relation : str
+        ``>``, ``>=``, ``<`` or ``<=``.
+    bound : float
+        The bound in SI.
+    """
+
+    text: str
+    output: str
+    relation: str
+    bound: float
+
+    def holds(self, values: Real) -> Any:
+        """Return whether values satisfy the condition; NaN does not."""
+        return RELATIONS[self.relation](values, self.bound)
+
+    def excess(self, value: float) -> float:
+        """Return by how much a value satisfies the condition, relative to the bound; >= 0: it does.
+
+        Examples
+        --------
+        >>> Constraint("f > 40 Hz", "f", ">", 40.0).excess(50.0)
+        0.25
+        """
+        sign = 1.0 if self.relation[0] == ">" else -1.0
+        return sign * (value - self.bound) / (abs(self.bound) or 1.0)
+
+    def active(self, value: float) -> bool:
+        """Return whether a value is at the bound."""
+        return abs(self.excess(value)) < ACTIVE_RTOL
+
+
+@dataclass(frozen=True, repr=False)
+class Optimum:
+    """The refined optimum of an output.
+
+    Parameters
+    ----------
+    output : str
+        The output.
+    point : mapping
+        Values of the varied parameters.
+    value : float
+        The output there.
+    flat : mapping
+        For each varied parameter the range, with the others at the optimum, in which the output is
+        within 5 % of the optimum and all constraints hold.
+    bounded : mapping
+        For each varied parameter whether this range ends inside the samples, at both ends.
+    points : (m, p)
+        Parameters of all simulations of the refinement.
+    values : (m,)
+        The output there; NaN for a failed simulation or a violated constraint.
+    robust : (float, float, float) or None
+        First and last of the five neighbouring samples of one parameter whose worst output is best,
+        and this output.  None with more parameters, with fewer samples, or if all ranges have
+        failed simulations.
+    constraints : mapping
+        For each constraint the value of its output at the optimum.
+    active : tuple of str
+        The constraints whose output is within 1 % of the bound.
+    constrained : tuple of str
+        The outputs of the constraints.
+    best : (b, p)
+        The ten best of all points that differ from each other, the best one first.
+    best_values : (b,)
+        The output there.
+    others : mapping
+        Values of all outputs at the optimum.
+    """
+
+    output: str
+    point: Mapping[str, float]
+    value: float
+    flat: Mapping[str, tuple[float, float]]
+    bounded: Mapping[str, tuple[bool, bool]]
+    points: Real
+    values: Real
+    robust: tuple[float, float, float] | None = None
+    constraints: Mapping[str, float] = field(default_factory=dict)
+    active: tuple[str, ...] = ()
+    constrained: tuple[str, ...] = ()
+    best: Real = field(default_factory=lambda: np.empty((0, 0)))
+    best_values: Real = field(default_factory=lambda: np.empty(0))
+    others: Mapping[str, float] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        place = ", ".join(f"{name} = {x:.6g}" for name, x in self.point.items())
+        return f"<Optimum of {self.output}: {self.value:.6g} at {place}>"
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Samples from which a search begins.
+
+    Parameters
+    ----------
+    names : sequence of str
+        The parameters.
+    points : (n, p)
+        The samples.
+    outputs : sequence of str
+        The outputs.
+    values : (n, k)
+        Their values; NaN for failed simulations.
+    bounds : (p, 2)
+        Least and largest value of each parameter.
+    sizes : (p,)
+        Distance of samples along each parameter.
+    """
+
+    names: Sequence[str]
+    points: Real
+    outputs: Sequence[str]
+    values: Real
+    bounds: Real
+    sizes: Real
+
+
+class Search:
+    """The search of an optimum around the best samples.
+
+    Parameters
+    ----------
+    evaluate : callable
+        Simulates at points (m, p) and returns all outputs (m, k).
+    samples : Samples
+        The samples.
+    output : str
+        The output.
+    sign : float
+        1 to minimise, -1 to maximise.
+    constraints : sequence of Constraint
+        Conditions on outputs.
+
+    Raises
+    ------
+    ParameterError
+        If no sample has a value of the output and satisfies the constraints.
+    """
+
+    def __init__(
+        self,
+        evaluate: Values,
+        samples: Samples,
+        output: str,
+        sign: float,
+        constraints: Sequence[Constraint] = (),
+    ) -> None:
+        self.evaluate, self.samples, self.output, self.sign = evaluate, samples, output, sign
+        self.constraints = constraints
+        self.index = {name: k for k, name in enumerate(samples.outputs)}
+        self.points: list[Real] = [*samples.points]
+        self.found: list[Real] = [*samples.values]
+        self.costs: list[float] = [self._cost(row) for row in samples.values]
+        self.count = len(self.costs)
+
+    def _cost(self, values: Real) -> float:
+        """Return the output with its sign; infinite if it has no value or a constraint fails."""
+        value = self.sign * values[self.index[self.output]]
+        allowed = all(c.holds(values[self.index[c.output]]) for c in self.constraints)
+        return float(value) if allowed and math.isfinite(value) else math.inf
+
+    def _row(self, x: Any) -> Real:
+        """Return the outputs at a point (p,), and keep them."""
+        low, high = self.samples.bounds.T
+        point = np.clip(np.atleast_1d(np.asarray(x, float)), low, high)
+        values: Real = self.evaluate(point[None, :])[0]
+        self.points.append(point)
+        self.found.append(values)
+        self.costs.append(self._cost(values))
+        return values
+
+    def value(self, x: Any) -> float:
+        """Return the cost at a point (p,)."""
+        self._row(x)
+        return self.costs[-1]
+
+    def optimum(self) -> Optimum:
+        """Refine the best samples and determine the range around the optimum."""
+        if not np.isfinite(self.costs).any() and self.constraints:
+            self._descend(int(np.argmin([self._violation(row) for row in self.found])))
+        if not np.isfinite(self.costs).any():
+            which = " that satisfies the constraints" if self.constraints else ""
+            raise ParameterError(f"no simulation has a value of {self.output}{which}")
+        names = self.samples.names
+        if len(names) == 1:
+            ends = {names[0]: self._refined_range()}
+        else:
+            if self.constraints:
+                for k in np.argsort(self.costs[: self.count], kind="stable")[:STARTS]:
+                    self._descend(int(k))
+                for _ in range(ROUNDS_MAX):
+                    before = min(self.costs)
+                    self._descend(int(np.argmin(self.costs)), RESTART_RADIUS)
+                    if before - min(self.costs) <= REFINED_RTOL * abs(before):
+                        break
+            self._simplex()
+            ends = {name: self._along(j) for j, name in enumerate(names)}
+        return self._result(ends)
+
+    def _result(self, ends: Mapping[str, tuple[tuple[float, bool], tuple[float, bool]]]) -> Optimum:
+        order = np.argsort(self.costs, kind="stable")
+        k, names = int(order[0]), self.samples.names
+        points, found = np.array(self.points), self.found[k]
+        costs = np.array(self.costs[self.count :])
+        reached = {c.text: float(found[self.index[c.output]]) for c in self.constraints}
+        best = self._distinct(order)
+        return Optimum(
+            self.output,
+            dict(zip(names, points[k].tolist(), strict=True)),
+            float(self.sign * self.costs[k]),
+            {name: (low, high) for name, ((low, _), (high, _)) in ends.items()},
+            {name: (low, high) for name, ((_, low), (_, high)) in ends.items()},
+            points[self.count :],
+            np.where(np.isfinite(costs), self.sign * costs, math.nan),
+            self._robust() if len(names) == 1 else None,
+            reached,
+            tuple(c.text for c in self.constraints if c.active(reached[c.text])),
+            tuple(c.output for c in self.constraints),
+            points[best],
+            self.sign * np.array(self.costs)[best],
+            dict(zip(self.samples.outputs, map(float, found), strict=True)),
+        )
+
+    def _distinct(self, order: Sequence[int] | Any) -> list[int]:
+        """Return the best points that differ by more than :data:`DISTINCT` from better ones."""
+        found: list[int] = []
+        for j in order:
+            gaps = [np.abs(self.points[j] - self.points[i]) / self.samples.sizes for i in found]
+            if math.isfinite(self.costs[j]) and all(gap.max() > DISTINCT for gap in gaps):
+                found.append(int(j))
+            if len(found) == BEST:
+                break
+        return found
+
+    def _robust(self) -> tuple[float, float, float] | None:
+        """Return the neighbouring samples whose worst output is best, and this output."""
+        x = self.samples.points[:, 0]
+        if len(x) < NEIGHBOURS:
+            return None
+        windows = np.lib.stride_tricks.sliding_window_view(self.costs[: self.count], NEIGHBOURS)
+        worst = windows.max(axis=1)  # Infinite if a simulation has failed.
+        k = int(np.argmin(worst))
+        if not math.isfinite(worst[k]):
+            return None
+        return float(x[k]), float(x[k + NEIGHBOURS - 1]), float(self.sign * worst[k])
+
+    def _limit(self) -> float:
+        """Return the cost up to which the output is within 5 % of its optimum."""
+        best = min(self.costs)
+        return best + FLAT_RTOL * abs(best)
+
+    # -- one parameter --
+
+    def _refined_range(self) -> tuple[tuple[float, bool], tuple[float, bool]]:
+        """Refine the best sample of one parameter, and return the range around the optimum.
+
+        The search for the ends of the range may meet a better point if the output jumps.  The
+        refinement is then repeated there.
+        """
+        for _ in range(ROUNDS_MAX):
+            self._between_neighbours()
+            limit, x = self._limit(), np.array(self.points)[:, 0]
+            ends = self._range(x, np.array(self.costs), int(np.argmin(self.costs)), limit)
+            if self._limit() == limit:
+                break
+        return ends
+
+    def _between_neighbours(self) -> None:
+        """Refine the best point of one parameter between its neighbours."""
+        x, k = np.unique(self.points), float(self.points[int(np.argmin(self.costs))][0])
+        low, high = max(x[x < k], default=x[0]), min(x[x > k], default=x[-1])
+        bounded: Any = minimize_scalar  # Its type hints exclude arrays and options.
+        bounded(
+            self.value, bounds=(low, high), method="bounded",
+            options={"xatol": float(REFINED_RTOL * (high - low)), "maxiter": REFINEMENTS_MAX},
+        )  # fmt: skip
+
+    def _range(
+        self, x: Real, costs: Real, k: int, limit: float
+    ) -> tuple[tuple[float, bool], tuple[float, bool]]:
+        """Return the ends of the range around point k in which costs are below a limit.
+
+        Each end is bisected between the last point inside and the first one outside; it is false
+        with the last sample if no point is outside.
+        """
+        order = np.argsort(x, kind="stable")
+        x, outside = x[order], ~(costs[order] <= limit)
+        k = int(np.flatnonzero(order == k)[0])
+        above, below = np.flatnonzero(outside[k:]), np.flatnonzero(outside[: k + 1])
+        last = k + int(above[0]) - 1 if len(above) else len(x) - 1
+        first = int(below[-1]) + 1 if len(below) else 0
+        return (
+            self._edge(x[first], x[first - 1] if len(below) else None, limit),
+            self._edge(x[last], x[last + 1] if len(above) else None, limit),
+        )
+
+    def _edge(
+        self, inside: float, outside: float | None, limit: float, j: int = 0
+    ) -> tuple[float, bool]:
+        """Return the end of a range along parameter j, and whether it lies inside the samples."""
+        if outside is None:
+            return float(inside), False
+        point = self.points[int(np.argmin(self.costs))].copy()
+        while abs(outside - inside) > EDGE_RTOL * self.samples.sizes[j]:
+            middle = point[j] = 0.5 * (inside + outside)
+            if self.value(point) <= limit:
+                inside = middle
+            else:
+                outside = middle
+        return float(inside), True
+
+    # -- several parameters --
+
+    def _simplex(self) -> None:
+        """Refine the best point by the simplex of Nelder and Mead, in units of the distances."""
+        sizes, bounds = self.samples.sizes, self.samples.bounds
+        start = self.points[int(np.argmin(self.costs))]
+        inward = np.where(start + 0.5 * sizes <= bounds[:, 1], 0.5, -0.5)
+        corners = start / sizes + np.vstack([np.zeros(len(sizes)), np.diag(inward)])
+        options: Any = {
+            "initial_simplex": corners, "maxfev": REFINEMENTS_MAX * len(sizes) // 2,
+            "xatol": REFINED_RTOL, "fatol": 0.0,
+        }  # fmt: skip
+        simplex: Any = minimize  # Its type hints exclude this function.
+        simplex(
+            lambda z: min(self.value(z * sizes), 1e300), corners[0], method="Nelder-Mead",
+            bounds=bounds / sizes[:, None], options=options,
+        )  # fmt: skip
+
+    def _violation(self, values: Real) -> float:
+        """Return the sum of the relative violations of the constraints."""
+        excess = [c.excess(values[self.index[c.output]]) for c in self.constraints]
+        return sum(-min(x, 0.0) if math.isfinite(x) else 1e3 for x in excess)
+
+    def _descend(self, k: int, radius: float = 0.5) -> None:
+        """Search under constraints from point k by COBYQA, in units of the distances."""
+        sizes, bounds = self.samples.sizes, self.samples.bounds
+        last: dict[bytes, Real] = {}
+
+        def row(z: Real) -> Real:
+            key = np.asarray(z).tobytes()
+            if key not in last:
+                last[key] = self._row(z * sizes)
+            return last[key]
+
+        scale = max((abs(x) for x in self.costs if math.isfinite(x)), default=1.0) or 1.0
+
+        def cost(z: Real) -> float:
+            value = self.sign * float(row(z)[self.index[self.output]]) / scale
+            return value if math.isfinite(value) else 1e3
+
+        def excess(z: Real) -> list[float]:
+            values = row(z)
+            found = [c.excess(values[self.index[c.output]]) - MARGIN for c in self.constraints]
+            return [x if math.isfinite(x) else -1e3 for x in found]
+
+        search: Any = minimize
+        search(
+            cost, self.points[k] / sizes, method="COBYQA", bounds=bounds / sizes[:, None],
+            constraints={"type": "ineq", "fun": excess},
+            options={"maxfev": REFINEMENTS_MAX * len(sizes), "initial_tr_radius": radius,
+                     "final_tr_radius": 0.1 * REFINED_RTOL},
+        )  # fmt: skip
+
+    def _along(self, j: int) -> tuple[tuple[float, bool], tuple[float, bool]]:
+        """Return the range along parameter j in which the cost is within 5 % of the optimum."""
+        limit = self._limit()
+        best = self.points[int(np.argmin(self.costs))]
+        ends = []
+        for sign, end in ((-1.0, self.samples.bounds[j, 0]), (1.0, self.samples.bounds[j, 1])):
+            inside, point = float(best[j]), best.copy()
+            outside = None
+            while outside is None and sign * (end - inside) > 0.0:
+                point[j] = inside + sign * min(self.samples.sizes[j], sign * (end - inside))
+                if self.value(point) <= limit:
+                    inside = float(point[j])
+                else:
+                    outside = float(point[j])
+            ends.append(self._edge(inside, outside, limit, j))
+        return ends[0], ends[1]

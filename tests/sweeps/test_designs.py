@@ -1,0 +1,217 @@
+"""Designs of studies: lists, tolerances, yield and sensitivities with closed forms; optima."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from prbm.base.errors import ParameterError
+from prbm.files.settings import UserMistake
+from prbm.references.scalar_guide import ScalarGuide
+from prbm.sweeps.design import SENSITIVITY, drawn, sensitivity, yield_of
+from prbm.sweeps.study import study
+
+FREE = {"gravity.x": 0.0, "gravity.y": 0.0, "damping.beta": 0.0}
+SHORT = {"stop_time": 1e-3, "step": 1e-3, "workers": 1}
+
+
+# --- sensitivities --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_indices_of_ishigamis_function_are_within_their_confidence(seed):
+    """F = sin x + a sin^2 y + b z^4 sin x on [-pi, pi]^3 with a = 7, b = 0.1.
+
+    V = a^2/8 + b pi^4/5 + b^2 pi^8/18 + 1/2, V_x = (1 + b pi^4/5)^2 / 2, V_y = a^2/8, V_z = 0,
+    V_xz = 8 b^2 pi^8 / 225 (Sobol and Levitan 1999).
+    """
+    a, b, pi = 7.0, 0.1, math.pi
+    names = ["x", "y", "z"]
+    points = drawn(dict.fromkeys(names, (-pi, pi)), 2048, seed, SENSITIVITY)
+    assert points.shape == (2048 * 5, 3)
+    x, y, z = points.T
+    found = sensitivity(names, np.sin(x) + a * np.sin(y) ** 2 + b * z**4 * np.sin(x))
+    v_x, v_y, v_xz = (1 + b * pi**4 / 5) ** 2 / 2, a**2 / 8, 8 * b**2 * pi**8 / 225
+    v = v_x + v_y + v_xz
+    np.testing.assert_allclose(v, a**2 / 8 + b * pi**4 / 5 + b**2 * pi**8 / 18 + 0.5, rtol=1e-12)
+    first, total = np.array([v_x, v_y, 0.0]) / v, np.array([v_x + v_xz, v_y, v_xz]) / v
+    for exact, got, interval in (
+        (first, found.first, found.first_interval), (total, found.total, found.total_interval),
+    ):  # fmt: skip
+        np.testing.assert_allclose(got, exact, atol=0.03)
+        half = 0.5 * np.ptp(interval, axis=1)
+        assert (np.abs(got - exact) <= 2.0 * half + 1e-12).all()  # 4 standard deviations.
+
+
+def test_indices_of_a_power_law_are_its_exponents(mechanisms):
+    """For small changes f ~ h^1.5 b^0.5 / L^1.5 has shares 1.5^2 : 0.5^2 of the variance."""
+    vary = {"flexure.thickness": "+- 1 %", "flexure.width": "+- 1 %"}
+    found = study(
+        mechanisms["PRBDM"], vary, ["fundamental"], runs=256, method="sensitivity",
+        values={**FREE, "flexure.density": 1.0}, **SHORT,
+    )  # fmt: skip
+    indices = found.sensitivities["fundamental"]
+    np.testing.assert_allclose(indices.first, [0.9, 0.1], atol=0.05)
+    np.testing.assert_allclose(indices.total, [0.9, 0.1], atol=0.05)
+
+
+def test_a_constant_or_failed_output_has_no_indices():
+    assert sensitivity(["a"], np.ones(12)) is None
+    assert sensitivity(["a"], np.r_[math.nan, np.arange(11.0)]) is None
+
+
+# --- yield ----------------------------------------------------------------------------------------
+
+
+def test_the_yield_of_a_linear_case_is_that_of_the_normal_distribution(mechanisms):
+    """The gap of the released shape grows with the position of the wall by the same amount."""
+    guide, half, limit = mechanisms["PRBDM"], 0.3e-3, 0.05e-3
+    vary = {"stop.position": f"0 m +- {half} m"}
+    base = study(
+        guide, {"stop.position": [0.0, 1e-9]}, ["min(stop.gap)"], values=FREE, **SHORT
+    ).outputs["min(stop.gap)"][0]  # fmt: skip
+    exact = stats.norm(0.0, half / 3.0).sf(-limit)
+    for method, runs, spread in (("random", 400, 0.06), ("sobol", 256, 0.01), ("latin", 100, 0.02)):
+        found = study(
+            guide, vary, ["impacts"], runs=runs, method=method, seed=1, values=FREE,
+            subject_to=[f"min(stop.gap) > {1e3 * (base - limit):.12g} mm"], **SHORT,
+        )  # fmt: skip
+        assert found.share.runs == runs
+        assert found.share.share == pytest.approx(exact, abs=spread)
+        assert found.share.low < exact < found.share.high
+
+
+def test_confidence_intervals_contain_the_probability_in_95_of_100_cases():
+    rng, p = np.random.default_rng(5), 0.9
+    found = [yield_of(rng.random(200) < p) for _ in range(1000)]
+    assert sum(x.low < p < x.high for x in found) == pytest.approx(950, abs=25)
+
+
+@pytest.mark.parametrize(
+    ("text", "mean", "spread"),
+    [
+        ("0.1 mm +- 2 %", 1e-4, 2e-6 / 3),
+        ("+- 3 um", 1e-4, 1e-6),
+        ("100 um ± 6 um uniform", 1e-4, 6e-6 / math.sqrt(3)),
+    ],
+)
+def test_tolerances_are_three_standard_deviations(mechanisms, text, mean, spread):
+    found = study(
+        mechanisms["PRBDM"], {"flexure.thickness": text}, ["fundamental"], runs=256, **SHORT
+    )
+    assert found.points.mean() == pytest.approx(mean, rel=1e-4)
+    assert found.points.std() == pytest.approx(spread, rel=0.02)
+
+
+def test_failed_simulations_are_not_good_ones(mechanisms):
+    found = study(
+        mechanisms["PRBDM"], {"stop.position": (-0.03, 0.0)}, ["fundamental", "impacts"], runs=16,
+        subject_to=["fundamental > 1 Hz"], **SHORT,
+    )  # fmt: skip
+    failed = sum(map(bool, found.messages))
+    assert 0 < failed < 16
+    assert found.share.good == 16 - failed
+
+
+# --- lists ----------------------------------------------------------------------------------------
+
+
+def test_a_list_of_simulations_has_units_in_its_heads(mechanisms, tmp_path):
+    path = tmp_path / "rows of a list.csv"
+    path.write_text("stop.position [mm],stop.restitution\n1.5,0.5\n-2,0.25\n", encoding="utf-8")
+    found = study(mechanisms["PRBDM"], path, ["impacts"], **SHORT)
+    assert found.points.tolist() == [[1.5e-3, 0.5], [-2e-3, 0.25]]
+    assert not found.whole_grid
+
+
+def test_the_table_of_a_study_is_a_list_for_the_next_one(mechanisms, tmp_path):
+    first, second = tmp_path / "a.csv", tmp_path / "b.csv"
+    vary = {"stop.position": [0.1 + 0.2e-3, 0.4]}
+    study(mechanisms["PRBDM"], vary, ["impacts"], table=first, **SHORT)
+    lines = first.read_text(encoding="utf-8").splitlines()
+    rows = [line.split(",")[0] for line in lines]
+    (tmp_path / "list.csv").write_text("\n".join(rows), encoding="utf-8")
+    study(mechanisms["PRBDM"], tmp_path / "list.csv", ["impacts"], table=second, **SHORT)
+    assert second.read_bytes() == first.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        ("", "write a column for each parameter"),
+        ("stop.position\n", "write a column for each parameter"),
+        ("stop.position,stop.position\n1,2\n", "write a column"),
+        ("stop.position\n1,2\n", "row 0 must have 1 finite numbers"),
+        ("stop.position\n0\nnan\n", "row 1 must have 1 finite numbers"),
+        ("stop.positon\n0\n", "unknown variable 'stop.positon'; did you mean"),
+        ("stop.position [kg]\n0\n", "another dimension"),
+    ],
+)
+def test_mistakes_in_lists_are_reported(mechanisms, tmp_path, content, sentence):
+    path = tmp_path / "list.csv"
+    path.write_text(content, encoding="utf-8")
+    with pytest.raises((ParameterError, UserMistake), match=sentence):
+        study(mechanisms["PRBDM"], path, ["impacts"], **SHORT)
+
+
+MISTAKES = [
+    ({"runs": 4, "vary": {"stop.position": "1 mm"}}, 'write a tolerance, for instance "0.1 mm'),
+    ({"runs": 4, "vary": {"stop.position": "+- 0 mm"}}, "tolerance of .- 0 must be positive"),
+    ({"runs": 4, "vary": {"stop.position": "+- 2 kg"}}, "another dimension"),
+    ({"runs": 4, "vary": {"stop.position": [0.0, 1.0, 2.0]}}, r"give a range \(low, high\)"),
+    ({"runs": 3}, "Sobol's sequence needs a power of two"),
+    ({"runs": 4, "method": "halton"}, "unknown method 'halton'"),
+    ({"subject_to": ["impacts"]}, 'write it as in "fundamental > 40 Hz"'),
+    ({"subject_to": ["fundamental > 40 mm"]}, "another dimension"),
+    ({"subject_to": ["rest(stop.x) > 1"]}, r"write rest\(BODY.x\)"),
+    ({"tolerances": {"stop.position": "1 mm"}}, "give an output to optimise and constraints"),
+    ({"timeout": 0.0}, "timeout = 0 s must be positive"),
+    ({"minimise": "impacts", "subject_to": ["fundamental > 1 MHz"]}, "satisfies the constraints"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "sentence"), MISTAKES)
+def test_mistakes_in_designs_are_reported(mechanisms, arguments, sentence):
+    given = {"vary": {"stop.position": (0.0, 1e-3)}, "outputs": ["impacts"], **SHORT} | arguments
+    with pytest.raises((ParameterError, UserMistake), match=sentence):
+        study(mechanisms["PRBDM"], **given)
+
+
+# --- optima ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_the_optimum_of_a_guide_with_three_parameters_and_two_constraints(mechanisms):
+    """Least width b with a frequency of at least f and an impact speed of at most v.
+
+    The speed at the straight shape is r omega asin(x / r) with r = gamma L, and omega^2 is
+    proportional to b h^3 / L^3 for light flexures.  The thickest flexures need the least width.
+    With omega = 2 pi f, the shortest length is the root of r asin(x / r) = v / omega.
+    """
+    guide = mechanisms["PRBDM"]
+    values = {**FREE, "flexure.density": 1.0, "release.displacement": -18e-3}
+    f, L, h = 5.0, 41.5e-3, 0.115e-3
+    gamma = guide.values()["flexure.gamma"]
+    v = 2.0 * math.pi * f * gamma * L * math.asin(18e-3 / (gamma * L))
+    scalar = ScalarGuide.of(
+        {**guide.values(), **values, "flexure.length": L, "flexure.thickness": h}
+    )
+    b = guide.values()["flexure.width"] * (f / scalar.frequency) ** 2
+    vary = {
+        "flexure.thickness": (0.09e-3, h), "flexure.width": (3e-3, 12e-3),
+        "flexure.length": (35e-3, 48e-3),
+    }  # fmt: skip
+    found = study(
+        guide, vary, ["impacts"], runs=64, minimise="flexure.width",
+        subject_to=[f"fundamental > {f} Hz", f"impact_speed < {v:.12g} m/s"], values=values,
+        tolerances={"flexure.width": "1 %"}, stop_time=0.1, workers=1,
+    )  # fmt: skip
+    best = found.optimum
+    assert best.value == pytest.approx(b, rel=0.01)
+    assert best.point["flexure.length"] == pytest.approx(L, rel=0.01)
+    assert best.point["flexure.thickness"] == pytest.approx(h, rel=0.01)
+    assert len(best.active) == 2
+    assert 2 <= len(best.best) <= 10
+    assert (np.diff(best.best_values) >= 0.0).all()
+    assert 0.0 < found.share.share < 1.0
