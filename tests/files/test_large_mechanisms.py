@@ -23,7 +23,7 @@ PARTS = {
         'start = "ground.foot"\nend = "arm.root"\n'
     ),
     "joints": 'start = "arm.tip"\nend = "anvil.hook"\n',
-    "stops": 'body = "arm"\npoint = "arm.tip"\n',
+    "stops": 'body = "arm"\npoint = "arm.tip"\nrest_speed = "1 mm/s"\n',
     "frictions": 'body = "arm"\npoint = ["ratio", 0]\n',
     "forces": 'body = "arm"\n',
     "probes": 'point = "arm.tip"\n',
@@ -31,10 +31,15 @@ PARTS = {
 
 
 def text(parts: str, n: int, last: str = "") -> str:
-    """Return a mechanism file with n more parts of a kind."""
+    """Return a mechanism file with n more parts of a kind.
+
+    The rest speeds of its stops are given: their defaults need the fundamental frequency, and its
+    time grows with a higher power.
+    """
     table = f'[[{parts.split()[0]}]]\nname = "PART"\n{PARTS[parts]}'
     tables = (table.replace("PART", f"part_{i}") for i in range(n))
-    return EXAMPLE + "\n".join(tables) + last
+    example = EXAMPLE.replace('on = "anvil"\n', 'on = "anvil"\nrest_speed = "1 mm/s"\n', 1)
+    return example + "\n".join(tables) + last
 
 
 @pytest.mark.slow

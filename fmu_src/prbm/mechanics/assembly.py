@@ -129,7 +129,7 @@ class _Assembler(Collection):
         if body_of(start) not in self.origin:
             start, end = end, start
         z_start, z_end = self.end(joint, start), self.end(joint, end)
-        if abs(z_end - z_start) > JOINT_DISTANCE_RTOL * self.size():
+        if abs(z_end - z_start) > JOINT_DISTANCE_RTOL * self.size:
             raise MechanismError(
                 f"the joint {joint.name} joins {start} and {end}, which are drawn "
                 f"{abs(z_end - z_start):.4g} m apart: draw them at the same place"
@@ -187,7 +187,7 @@ class _Assembler(Collection):
             body_masses=dict(self.body_masses),
             outlines=tuple(self.outline(*line) for line in self.lines),
             anchor=self.anchor(),
-            length=self.size(),
+            length=self.size,
         )
 
     def loop_arrays(self, d: int) -> dict[str, Any]:

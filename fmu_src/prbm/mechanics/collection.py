@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from functools import cached_property
 
 import numpy as np
 
@@ -68,16 +69,18 @@ class Collection:
         """Return the length of a flexure as drawn [m]."""
         return abs(self.end(flexure, flexure.end) - self.end(flexure, flexure.start))
 
+    @cached_property
     def size(self) -> float:
-        """Return the size of the mechanism as drawn [m].
+        """Size of the mechanism as drawn [m].
 
         It is the largest distance between any two ground points or centres of mass, or the length
         of the longest flexure if that is larger.
         """
-        points = [self.at(p) for p in self.mechanism.ground.values()]
-        points += [self.at(body.centre) for body in self.mechanism.bodies]
+        drawn = [self.at(p) for p in self.mechanism.ground.values()]
+        drawn += [self.at(body.centre) for body in self.mechanism.bodies]
+        points = np.array(drawn)
         lengths = [self.length(flexure) for flexure in self.mechanism.flexures]
-        return max(*lengths, *(abs(a - b) for a in points for b in points))
+        return max(*lengths, *(float(np.abs(points - p).max()) for p in points))
 
     def on(self, body: str, drawn: complex) -> Place:
         """Return the place of a drawn point of a body."""
