@@ -68,6 +68,6 @@ PRBM bool count_step(Simulation *sim, double time, Effort *effort, Problem *prob
     int here = effort->steps - effort->before;
     effort->steps++;
     return here < BURST_STEPS_MAX ||
-           here < BURST_STEPS_MAX + FASTEST_STEPS_FACTOR * span / stable_step(sim) ||
+           here - BURST_STEPS_MAX < FASTEST_STEPS_FACTOR * span / stable_step(sim) ||
            reject(sim, effort, here, problem);
 }
