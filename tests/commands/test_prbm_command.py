@@ -1,5 +1,6 @@
 """The command prbm: printed and written results, error messages, files and signals."""
 
+import argparse
 import csv
 import io
 import math
@@ -10,6 +11,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -171,6 +173,23 @@ def test_commands_of_the_page_run_in_an_empty_folder(tmp_path, capsys):
             assert image.format == "PNG"
     assert len([*Path("results").glob("*.png")]) >= 10
     assert not [path for path in Path("results").iterdir() if path.name.startswith(".")]
+
+
+def actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
+    """Yield the arguments of all commands of a parser."""
+    for action in parser._actions:
+        yield action
+        if isinstance(action, argparse._SubParsersAction):
+            for inner in action.choices.values():
+                yield from actions(inner)
+
+
+def test_an_option_with_several_values_may_be_repeated():
+    options = [a for a in actions(cli.parser()) if a.option_strings and a.nargs in ("+", "*")]
+    assert len(options) > 10
+    lost = [a.option_strings[-1] for a in options if not isinstance(a, argparse._ExtendAction)]
+    assert lost == []
+    assert [a.option_strings[-1] for a in options if a.default] == []  # Values would join them.
 
 
 @pytest.mark.parametrize("command", COMMANDS)

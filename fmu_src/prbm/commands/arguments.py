@@ -223,7 +223,7 @@ def study_arguments(parser: ArgumentParser) -> None:
     )  # fmt: skip
     add("--seed", type=int, default=0, metavar="K", help="seed of --runs (default: 0)")
     add(
-        "--of", nargs="+", metavar="OUTPUT",
+        "--of", action="extend", nargs="+", metavar="OUTPUT",
         help="outputs: settling, settling_estimate, impacts, last_impact, impact_speed, impulse, "
         "peak_speed, peak_force, peak_stress, energy_lost; fundamental, mode(2), rest(shuttle.x), "
         "which need no simulation; a variable, for its final value; max(x), min(x), mean(x), "
@@ -233,7 +233,7 @@ def study_arguments(parser: ArgumentParser) -> None:
     optimum.add_argument("--minimise", metavar="OUTPUT", help="output whose minimum is searched")
     optimum.add_argument("--maximise", metavar="OUTPUT", help="output whose maximum is searched")
     add(
-        "--subject-to", nargs="+", default=[], metavar="CONSTRAINT",
+        "--subject-to", action="extend", nargs="+", default=[], metavar="CONSTRAINT",
         help="conditions on outputs, e.g. 'fundamental > 40 Hz'; the share of drawn simulations "
         "that satisfy them is their yield",
     )  # fmt: skip
@@ -293,11 +293,11 @@ def linear_arguments(parser: ArgumentParser) -> None:
     """Add the arguments of linear models."""
     add = parser.add_argument
     text = "inputs, such as force.x or base.acceleration.x (default: all forces and the base)"
-    add("--inputs", nargs="+", metavar="NAME", help=text)
+    add("--inputs", action="extend", nargs="+", metavar="NAME", help=text)
     text = "outputs, such as shuttle.x or base.force.x (default: the motion of the released body)"
-    add("--outputs", nargs="+", metavar="NAME", help=text)
+    add("--outputs", action="extend", nargs="+", metavar="NAME", help=text)
     text = "stops that the mechanism rests on (default: none)"
-    add("--resting", nargs="+", metavar="STOP", help=text)
+    add("--resting", action="extend", nargs="+", metavar="STOP", help=text)
     text = "range of the frequency response [Hz] (default: about the lowest modes)"
     add("--frequencies", metavar="A:B", help=text)
 
@@ -305,7 +305,7 @@ def linear_arguments(parser: ArgumentParser) -> None:
 def load_argument(parser: ArgumentParser) -> None:
     """Add --load."""
     parser.add_argument(
-        "--load", nargs="+", metavar="NAME=X",
+        "--load", action="extend", nargs="+", metavar="NAME=X",
         help="dead loads, forces [N] and moments [N m], such as force.y=-5N (default: none)",
     )  # fmt: skip
 
@@ -321,7 +321,7 @@ def parameters_argument(parser: ArgumentParser) -> None:
 def stress_arguments(parser: ArgumentParser) -> None:
     """Add the arguments of ``prbm stress``."""
     parser.add_argument(
-        "--held", nargs="+", metavar="X",
+        "--held", action="extend", nargs="+", metavar="X",
         help="displacements [m] or angles [rad] at which the body is held (default: in motion)",
     )  # fmt: skip
     stop_time_argument(parser)
@@ -342,7 +342,7 @@ def shock_arguments(parser: ArgumentParser) -> None:
     add("--duration", metavar="T", help="duration of the pulse [s]")
     add("--axis", default="x", choices=("x", "y"), help="direction (default: %(default)s)")
     add(
-        "--peaks", nargs="+", metavar="A",
+        "--peaks", action="extend", nargs="+", metavar="A",
         help="several peaks, for the level at which a flexure yields",
     )  # fmt: skip
     add(
@@ -376,7 +376,7 @@ def record_arguments(parser: ArgumentParser) -> None:
         help="unit of a column without a unit, or with a wrong one; repeatable",
     )  # fmt: skip
     group.add_argument(
-        "--columns", nargs="+", metavar="HEAD",
+        "--columns", action="extend", nargs="+", metavar="HEAD",
         help='names and units of all columns of a file without a head: --columns "t [s]" "x [mm]"',
     )  # fmt: skip
 

@@ -11,6 +11,7 @@ import re
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from ..base.errors import EquilibriumError, PrbmError, SimulationError
 from ..base.progress import CLEAR
@@ -227,7 +228,7 @@ def _equilibrium(commands: Commands) -> None:
     mechanism_argument(parser)
     add = parser.add_argument
     text = "displacements [m] or angles [rad] at which the body is held"
-    add("--held", nargs="+", metavar="X", help=text)
+    add("--held", action="extend", nargs="+", metavar="X", help=text)
     load_argument(parser)
     text = "follow the shapes while a load varies, such as force.y=0:-20N, through limit points"
     add("--vary", metavar="NAME=A:B", help=text)
@@ -389,15 +390,15 @@ def _impact_map(commands: Commands) -> None:
     mechanism_argument(parser)
     add = parser.add_argument
     add(
-        "--wall-positions", nargs="+", metavar="X",
+        "--wall-positions", action="extend", nargs="+", metavar="X",
         help="positions of the wall [m] (default: five, up to 5/9 of the release on both sides)",
     )  # fmt: skip
     add(
-        "--offsets", nargs="+", metavar="D",
+        "--offsets", action="extend", nargs="+", metavar="D",
         help="offsets of the hit point [m] (default: five, up to 1/20 of the size on both sides)",
     )  # fmt: skip
     add(
-        "--method", nargs="+", default=["algebraic"], metavar="METHOD", choices=METHODS,
+        "--method", action="extend", nargs="+", default=[], metavar="METHOD", choices=METHODS,
         help="algebraic: the arriving motion is the fundamental mode alone; simulated: first "
         "impact after the release; fitted: restitution of a 1R model with the same motion (takes "
         "minutes); compliant: the fundamental mode arrives at a compliant stop; elements: finite "
@@ -405,15 +406,16 @@ def _impact_map(commands: Commands) -> None:
         "along a path without turning (default: algebraic)",
     )  # fmt: skip
     add(
-        "--stiffness", nargs="+", metavar="K",
+        "--stiffness", action="extend", nargs="+", metavar="K",
         help="contact stiffnesses of the method compliant [N/m^exponent]; one map each (default: "
         "that of the stop)",
     )  # fmt: skip
     add("--speed", metavar="V", help="closing speed, for an exponent other than 1 [m/s]")
-    add("--heights", nargs="+", dest="wall_positions", help=argparse.SUPPRESS)  # former name
-    add("--way", nargs="+", dest="method", choices=METHODS, help=argparse.SUPPRESS)  # former name
+    former: dict[str, Any] = {"action": "extend", "nargs": "+", "help": argparse.SUPPRESS}
+    add("--heights", dest="wall_positions", **former)
+    add("--way", dest="method", choices=METHODS, **former)
     add(
-        "--model", nargs="+", default=[], metavar="M", choices=tuple(MODELS),
+        "--model", action="extend", nargs="+", default=[], metavar="M", choices=tuple(MODELS),
         help=f"models of the flexures: {', '.join(MODELS)} (default: those of the mechanism)",
     )  # fmt: skip
     add("--axial", action="store_true", help="the flexures of --model stretch")
@@ -578,7 +580,7 @@ def _validate(commands: Commands) -> None:
         help=f"{MECHANISM} (default: reproduce the thesis)",
     )  # fmt: skip
     add(
-        "--only", nargs="+", default=[], metavar="NAME",
+        "--only", action="extend", nargs="+", default=[], metavar="NAME",
         help="results of the thesis to reproduce (default: all)",
     )  # fmt: skip
     add("--list", action="store_true", help="list the names of the results of the thesis and exit")

@@ -50,6 +50,7 @@ METHODS: Mapping[str, Method] = {
 
 def print_maps(options: argparse.Namespace) -> None:
     """Print the impact maps of all selected methods and flexure models."""
+    options.method = options.method or ["algebraic"]
     mechanism = load(options.mechanism)
     values = settings(mechanism, options.set)
     output = Output(options.out)
