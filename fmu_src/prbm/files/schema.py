@@ -329,7 +329,9 @@ class MechanismTable(Table):
         Measured("Time constant of stiffness-proportional damping", "s", 0.0, 1e-2,
                  expression=False),
     ] = 0.0  # fmt: skip
-    ground: dict[PointName, Point] = Field(description="Fixed points, by name [m]")
+    ground: dict[PointName, Point] = Field(
+        default_factory=dict, description="Fixed points, by name [m]"
+    )
     geometry: tuple[ParameterTable, ...] = Field(
         (), description="Parameters for points and other quantities"
     )
@@ -338,7 +340,7 @@ class MechanismTable(Table):
     flexure_types: tuple[FlexureTypeTable, ...] = Field(
         (), description="Sections, materials and models that several flexures share"
     )
-    flexures: tuple[FlexureTable, ...] = Field(description="Flexures")
+    flexures: tuple[FlexureTable, ...] = Field((), description="Flexures")
     joints: tuple[JointTable, ...] = Field((), description="Pins")
     stops: tuple[StopTable, ...] = Field((), description="Walls")
     frictions: tuple[FrictionTable, ...] = Field((), description="Coulomb friction")

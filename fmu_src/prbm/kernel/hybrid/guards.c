@@ -128,7 +128,7 @@ static void bound_directions(const System *system, const double *coordinates, do
 
 /* Bound the changes |dE| of the arms within the step.  The dense output bounds the changes of the
  * coordinates, and hence dtheta of angles and ds of stretches; then
- * |dE| <= |E| exp(|ds|) (|dtheta| + |ds|). */
+ * |dE| <= |E| exp(|ds|) (|dtheta| + |ds|).  For arms that float, |dE| <= |du_x| + |du_y|. */
 static void bound_arms(const Simulation *sim, double *reach) {
     const System *system = system_of(sim);
     double *coordinates = system->mapped ? reach + system->d : reach;
@@ -140,6 +140,10 @@ static void bound_arms(const Simulation *sim, double *reach) {
         int j = system->stretches[k], a = arm_of(system, j);
         double longest = modulus(sim->stepping.reference.e[a]) * exponential(reach[j]);
         reach[a] = longest * (reach[a] + reach[j]);
+    }
+    for (int k = 0; k < system->shift_count; k++) {
+        int j = system->shifts[k];
+        reach[arm_of(system, j)] += reach[j];
     }
 }
 
