@@ -227,6 +227,7 @@ class JointTable(Named):
 
     start: Reference = Field(description="First point, body.point or ground.point")
     end: Reference = Field(description="Second point, body.point or ground.point")
+    stiffness: Annotated[Quantity, measured(parts.Joint, "stiffness")] | None = None
     mirror: LineOrLines = _mirror()
     repeat: RepeatTable | None = _repeat()
 
@@ -581,7 +582,7 @@ def _density(table: BodyTable, materials: Mapping[str, dict[str, Quantity]]) -> 
 
 def _joint(table: JointTable) -> parts.Joint:
     """Return the joint of a table."""
-    return parts.Joint(table.name, table.start, table.end)
+    return parts.Joint(table.name, table.start, table.end, table.stiffness)
 
 
 def _flexure(table: FlexureTable) -> parts.Flexure:

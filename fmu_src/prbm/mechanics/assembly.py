@@ -148,6 +148,9 @@ class _Assembler(Collection):
             self.close(joint.name, place, self.on(far, z_end))
         else:
             self.reach(far, place, z_end, self.turn(far))
+        if joint.stiffness is not None:
+            near, turned = (self.angle(self.index[body]) for body in (body_of(start), far))
+            self.spring(value(joint, "stiffness", self.values), near, turned)
         self.connect(body_of(start), far, known)
         self.lines.append((joint.name, "joint", [place], NO_THICKNESS))
 

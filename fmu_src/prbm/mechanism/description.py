@@ -184,8 +184,9 @@ class Mechanism:
                     yield Parameter(
                         f"{kind.name}.{c.name}", value, "", c.description, c.minimum, c.maximum
                     )
-        for body in self.bodies:
-            yield from _fields(body)
+        jointed: tuple[Part, ...] = (*self.bodies, *self.joints)
+        for part in jointed:
+            yield from _fields(part)
         for axis, g in zip("xy", self.gravity, strict=True):
             yield Parameter(
                 f"gravity.{axis}", g, "m/s2", f"Acceleration of gravity along {axis}",
@@ -257,8 +258,8 @@ class Mechanism:
 
     def _parts(self) -> tuple[Part, ...]:
         """Return the parts whose fields are parameters or expressions."""
-        parts: tuple[Part, ...] = (*self.flexure_types, *self.bodies, *self.frictions)
-        return (*parts, *self.stops, self.release)
+        parts: tuple[Part, ...] = (*self.flexure_types, *self.bodies, *self.joints)
+        return (*parts, *self.frictions, *self.stops, self.release)
 
     @cached_property
     def free_bodies(self) -> tuple[str, ...]:

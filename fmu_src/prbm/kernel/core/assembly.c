@@ -14,6 +14,12 @@
 
 /* --- flexures, joints and free bodies, from the ground outwards ------------------------------- */
 
+/* Return the coordinate that rotates a body; FIXED: the ground. */
+static int rotation_of_body(const System *system, int body) {
+    int j = system->origins[body].j;
+    return j == FIXED ? FIXED : angle_of(system, j);
+}
+
 static bool walk_joint(System *system, const Step *step, Scratch *scratch, Problem *problem) {
     Span span = span_of(system, step);
     double apart = modulus(minus(span.z_end, span.z_start));
@@ -30,6 +36,10 @@ static bool walk_joint(System *system, const Step *step, Scratch *scratch, Probl
         close_loop(system, &spot, &other);
     } else {
         reach(system, span.far, &spot, span.z_end, step->first_direction);
+    }
+    if (step->joint->elastic) {
+        add_spring(system, evaluate(step->joint->stiffness, system->values),
+                   rotation_of_body(system, span.root), rotation_of_body(system, span.far));
     }
     return true;
 }

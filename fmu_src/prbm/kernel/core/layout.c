@@ -110,6 +110,9 @@ PRBM void count_coordinates(Reader *reader, Mechanism *m) {
                           : 0;
         m->beam_size = size > m->beam_size ? size : m->beam_size;
     }
+    for (int i = 0; i < m->joint_count && !reader->wrong; i++) {
+        springs += m->joints[i].elastic;
+    }
     long long parts = (long long)m->flexure_count + m->joint_count;
     long long n = links + strains + b, r = 2 * (parts - b), shifts = 0, floats = 0;
     bool few = n <= COORDINATES_MAX && r < n; /* Otherwise, do not search. */
@@ -279,12 +282,13 @@ static void add_beam(const FlexureType *kind, const Flexure *flexure, Walk *walk
 
 /* Return part i: the flexures come first, then the joints. */
 static Step part(const Mechanism *m, int i) {
-    Step step = {NULL, connection(m, i), NULL, 0, false, false, 0, 0};
+    Step step = {NULL, connection(m, i), NULL, NULL, 0, false, false, 0, 0};
     if (i < m->flexure_count) {
         step.name = m->flexures[i].name;
         step.flexure = &m->flexures[i];
     } else {
-        step.name = m->joints[i - m->flexure_count].name;
+        step.joint = &m->joints[i - m->flexure_count];
+        step.name = step.joint->name;
     }
     return step;
 }
@@ -302,7 +306,7 @@ static bool laid_backwards(const Mechanism *m, const Walk *walk, const Step *ste
 
 /* Visit the first body that has not been reached, which is free. */
 static void walk_free(const Mechanism *m, Walk *walk, Step *step) {
-    Step result = {NULL, NULL, NULL, 1, false, false, walk->added, walk->directed};
+    Step result = {NULL, NULL, NULL, NULL, 1, false, false, walk->added, walk->directed};
     while (walk->held[result.body]) {
         result.body++;
     }

@@ -62,6 +62,8 @@ typedef struct {
 typedef struct {
     const char *name;
     Connection between;
+    bool elastic; /* Whether it has a stiffness. */
+    Expression stiffness;
 } Joint;
 
 typedef struct {
@@ -134,6 +136,7 @@ typedef struct {
     const char *name;
     const Connection *between; /* NULL for a free body. */
     const Flexure *flexure;    /* NULL for a joint and a free body. */
+    const Joint *joint;        /* NULL for a flexure and a free body. */
     int body;                  /* The free body, counted from 1, or 0. */
     bool backwards;         /* The part is added from its end to its start. */
     bool closes;            /* The part closes a loop: both its bodies are already placed. */
