@@ -106,6 +106,38 @@ def test_balls_that_touch_are_struck_one_after_the_other_as_balls_close_together
 
 
 @engines
+@pytest.mark.parametrize("degrees", [0.0, 37.0])
+@pytest.mark.parametrize("gaps", [0.0, 0.1])
+@pytest.mark.parametrize("masses", [(1.0, 1.0, 1.0), (2.0, 0.3, 1.0, 5.0, 0.7)])
+def test_balls_without_restitution_move_on_together(engine, masses, gaps, degrees):
+    """Their velocity is that of the centre of mass; each contact is struck at most once.
+
+    A ball that is struck pushes the one that it touches, so that no contact chatters.
+    """
+    row = row_of_balls(masses, 0.0, gaps, degrees)
+    *_, last = advanced(row, engine, [1.0, 2.0, 20.0])
+    u, common = np.exp(1j * np.radians(degrees)), masses[0] / sum(masses)
+    for k in range(len(masses)):
+        velocity = complex(last[f"ball{k}.vx"], last[f"ball{k}.vy"])
+        assert velocity == pytest.approx(common * u, abs=1e-9)
+    for k in range(len(masses) - 1):
+        assert last[f"hit{k}.gap"] == pytest.approx(0.0, abs=1e-9)
+        assert last[f"hit{k}.impact_count"] <= 1
+        assert last[f"hit{k}.impulse_sum"] == pytest.approx(common * sum(masses[k + 1 :]))
+    lost = 0.5 * masses[0] * (1.0 - common)
+    assert last["energy.dissipated"] == pytest.approx(lost)
+
+
+@engines
+def test_a_ball_that_sticks_to_its_neighbour_passes_the_impact_on(engine):
+    """The first contact has restitution 0.5, the second one none: impacts follow each other."""
+    row = row_of_balls((1.0, 1.0, 1.0), 0.5, 0.0)
+    mixed = replace(row, stops=(row.stops[0], replace(row.stops[1], restitution=0.0)))
+    (out,) = advanced(mixed, engine, [0.1])
+    assert [out[f"ball{k}.vx"] for k in range(3)] == pytest.approx([0.25, 0.375, 0.375], abs=1e-12)
+
+
+@engines
 @pytest.mark.parametrize("angle", [0.1, 1.0, 2.5, 3.1])
 def test_a_pendulum_without_flexures_has_the_period_of_the_elliptic_integral(engine, angle):
     """The period is 4 K(sin^2(a/2))/omega, with omega^2 = m g l/(J + m l^2)."""

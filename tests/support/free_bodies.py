@@ -1,5 +1,7 @@
 """Mechanisms with bodies that nothing connects to the ground."""
 
+import numpy as np
+
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.parts import (
     Body,
@@ -29,19 +31,25 @@ def ball(restitution=0.7, gravity=(0.0, -9.81), **parts):
     } | parts)  # fmt: skip
 
 
-def row_of_balls(masses, restitution=1.0, gaps=0.1):
+def row_of_balls(masses, restitution=1.0, gaps=0.1, degrees=0.0):
     """Return balls in a row, each with a wall for the next one; the first moves at 1 m/s."""
-    bodies = [Body(f"ball{k}", m, 1e-4 * m, (0.2 * k, 0.0)) for k, m in enumerate(masses)]
+    u = np.exp(1j * np.radians(degrees))
+    centres = [0.2 * k * u for k in range(len(masses))]
+    points = [z + 0.05 * u for z in centres]
+    bodies = [
+        Body(f"ball{k}", m, 1e-4 * m, (z.real, z.imag))
+        for k, (m, z) in enumerate(zip(masses, centres, strict=True))
+    ]
     stops = [
         Stop(
-            f"hit{k}", f"ball{k}", (0.2 * k + 0.05, 0.0), 0.0, gaps, restitution=restitution,
+            f"hit{k}", f"ball{k}", (z.real, z.imag), degrees, gaps, restitution=restitution,
             on=f"ball{k + 1}",
         )
-        for k in range(len(masses) - 1)
+        for k, z in enumerate(points[:-1])
     ]  # fmt: skip
     return Mechanism(
         name="Row", title="Balls in a row", ground={}, bodies=tuple(bodies), flexure_types=(),
-        flexures=(), stops=tuple(stops), release=Release("ball0", velocity=1.0),
+        flexures=(), stops=tuple(stops), release=Release("ball0", degrees, velocity=1.0),
     )  # fmt: skip
 
 

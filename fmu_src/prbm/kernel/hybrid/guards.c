@@ -432,8 +432,8 @@ typedef struct {
 static bool detect_closing(Search *search, const double *gaps, const double *rates, int k,
                            Closing *closing) {
     Simulation *sim = search->sim;
-    double length = system_of(sim)->length, depth = closing_depth(&sim->configuration);
-    double sign = sign_of_gap(search->guard);
+    double round_off = CONSTRAINT_RTOL * system_of(sim)->length;
+    double depth = closing_depth(&sim->configuration), sign = sign_of_gap(search->guard);
     ArcGuard guard = arc_guard(search), rate = {search, gap_rate_guard, false, sign, 0.0};
     bool dips = rates[0] < 0.0 && 0.0 < rates[1];
     closing->a = sample_time(sim, k);
@@ -442,10 +442,9 @@ static bool detect_closing(Search *search, const double *gaps, const double *rat
     if (gaps[1] > 0.0 && !dips) {
         return false;
     }
-    if (fabs(rates[0]) <= zero_speed(&sim->configuration) &&
-        gaps[0] <= CONSTRAINT_RTOL * length) {
+    if (fabs(rates[0]) <= zero_speed(&sim->configuration) && gaps[0] <= round_off) {
         closing->pressed = true;
-        return gaps[1] < lesser(gaps[0], -depth);
+        return gaps[1] < lesser(gaps[0] - round_off, -depth);
     }
     if (rates[0] > 0.0) {
         if (rates[1] >= 0.0) {
