@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 from free_bodies import ball, flying, pendulum, row_of_balls
@@ -52,6 +53,34 @@ def test_a_ball_bounces_as_in_closed_form_and_rests(engine):
     assert last["energy.dissipated"] == pytest.approx(G)
     limit = first * (1 + eps) / (1 - eps)
     assert 0.0 < limit - last["floor.impact_time"] < 4 * 1e-3 / (G * (1 - eps)) + 1e-3
+
+
+def reference_ball(times, eps=0.7, least=0.1):
+    """Return height and velocity of the BouncingBall of the Reference FMUs in closed form.
+
+    Its impacts are ``h = 0, v = -eps v``; a rebound below ``least`` [m/s] ends the motion.
+    """
+    start, h, v, moving = 0.0, 1.0, 0.0, True
+    for t in times:
+        while moving and t >= (hit := start + (v + math.sqrt(v * v + 2.0 * G * h)) / G):
+            start, h, v = hit, 0.0, eps * (G * (hit - start) - v)
+            moving = v >= least
+        s = t - start
+        yield (h + v * s - G * s * s / 2, v - G * s) if moving else (0.0, 0.0)
+
+
+@engines
+def test_the_ball_of_the_reference_fmus_has_the_same_heights_and_velocities(engine):
+    """The least rebound of 0.1 m/s is a closing speed of 0.1/0.7 m/s."""
+    (floor,) = ball().stops
+    like = ball(stops=(replace(floor, rest_speed=0.1 / 0.7),))
+    times = np.linspace(0.0, 3.0, 301)
+    rested = 0
+    for (h, v), out in zip(reference_ball(times), advanced(like, engine, times), strict=True):
+        assert 1.0 + out["ball.y"] == pytest.approx(h, abs=1e-9)
+        assert out["ball.vy"] == pytest.approx(v, abs=1e-9)
+        rested += out["floor.contact"]
+    assert rested > 50
 
 
 @engines
@@ -150,6 +179,50 @@ def test_a_pendulum_without_flexures_has_the_period_of_the_elliptic_integral(eng
     assert half["bob.angle"] == pytest.approx(-angle, abs=1e-6)
     assert full["bob.angle"] == pytest.approx(angle, abs=1e-6)
     assert full["mode.frequency"] == pytest.approx(omega / (2 * math.pi))
+
+
+def double_pendulum(swing, times, m=(0.5, 0.3), J=(2e-3, 7e-4), l=0.3, c=(0.2, 0.15)):
+    """Return the angles of two bodies on pins, (2, k), by Lagrange's equations [rad].
+
+    The first body has its mass at the distance c[0] from its pin, and the second pin at l.
+    """
+    couple = m[1] * l * c[1]
+    M = np.diag([J[0] + m[0] * c[0] ** 2 + m[1] * l**2, J[1] + m[1] * c[1] ** 2])
+    weight = G * np.array([m[0] * c[0] + m[1] * l, m[1] * c[1]])
+
+    def rate(_, y):
+        (a, b), v = y[:2], y[2:]
+        M[0, 1] = M[1, 0] = couple * math.cos(a - b)
+        turned = couple * math.sin(a - b) * np.array([-(v[1] ** 2), v[0] ** 2])
+        return [*v, *np.linalg.solve(M, turned - weight * np.sin(y[:2]))]
+
+    start = [*swing, 0.0, 0.0]
+    found = solve_ivp(rate, (0.0, times[-1]), start, "DOP853", times, rtol=1e-12, atol=1e-13)
+    return found.y[:2]
+
+
+@engines
+def test_a_double_pendulum_moves_as_lagranges_equations_require(engine):
+    """Released with the lower body held; the upper one hangs in equilibrium beside it."""
+    bodies = (
+        Body("upper", 0.5, 2e-3, (0.0, -0.2), {"pin": (0.0, 0.0), "low": (0.0, -0.3)}),
+        Body("lower", 0.3, 7e-4, (0.0, -0.45), {"pin": (0.0, -0.3)}),
+    )
+    chain = replace(
+        pendulum(0.0), bodies=bodies, release=Release("lower", angle=2.0),
+        joints=(
+            Joint("pin", "ground.pin", "upper.pin"), Joint("elbow", "upper.low", "lower.pin"),
+        ),
+    )  # fmt: skip
+    times = np.linspace(0.0, 2.0, 21)
+    outputs = [*advanced(chain, engine, times, tolerance=1e-11)]
+    start = [outputs[0][f"{name}.angle"] for name in ("upper", "lower")]
+    assert start == pytest.approx([0.0, 2.0], abs=1e-9)
+    expected = double_pendulum(start, times)
+    for name, angles in zip(("upper", "lower"), expected, strict=True):
+        found = [out[f"{name}.angle"] for out in outputs]
+        np.testing.assert_allclose(found, angles, atol=1e-6)
+    assert np.ptp(expected[0]) > 0.5
 
 
 @engines
