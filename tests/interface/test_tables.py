@@ -255,6 +255,8 @@ class Comparison:
         for joint in m.joints:
             assert r.text() == joint.name
             self.between(joint)
+            assert r.take("I") == (joint.stiffness is not None)
+            self.fields(joint)
 
     def contacts_and_forces(self) -> None:
         m, r = self.mechanism, self.reader
@@ -370,7 +372,7 @@ def test_mechanisms_too_large_for_the_kernel_are_not_written(parts, counted):
         ("chain", 5, 100000, "an index out of range"),
         ("chain", 5, 200, "a wrong number of independent coordinates"),
         ("hook", 0, 1, "a part that connects a body with itself"),
-        ("hook", 0, 2, "a body without a connection to the ground"),
+        ("hook", 20, 2, "an index out of range"),
         ("tip", 0, 9, "an index out of range"),
     ],
 )

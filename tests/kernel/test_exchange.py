@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from exchange import assert_directional, integrate
+from free_bodies import ball, flying
 from kernel_simulation import KernelMistake, KernelSimulation
 from many_parts import anvil, beams, elastic, profiles, two_stops
 from prbm.mechanics.assembly import assemble
@@ -105,6 +106,36 @@ def test_directional_derivatives_of_a_mechanism_with_all_kinds_of_parts_equal_di
     friction = {"rub.coefficient": 0.2, "dry.coefficient": 0.1, "dry.normal_force": 0.3}
     for discrete in ((0, 0, 0, 2, 2, 2, 1, 2), (1, 1, 1, 1, 2, -1, 0, -1)):
         assert_directional(guide, friction, inputs, discrete)
+
+
+@pytest.mark.parametrize("discrete", [
+    (0, 0, 0, 2, 2, 2, 2), (1, 0, 0, 2, 2, 2, 1), (1, 1, 0, 1, -1, 2, -1), (1, 0, 1, 0, 2, 2, 0),
+    (0, 1, 1, 2, 0, 2, 1),
+])  # fmt: skip
+def test_directional_derivatives_with_free_bodies_equal_differences(discrete):
+    """Free bodies press on each other and on the stage; contacts stick, slip, or do not."""
+    guide = flying()
+    inputs = dict.fromkeys(input_names(guide), 0.1) | {"push.moment": 1e-3, "blow.moment": -1e-3}
+    inputs |= {f"{stop.name}.velocity": 0.04 for stop in guide.stops}
+    inputs |= {f"{stop.name}.displacement": 1e-3 for stop in guide.stops}
+    assert_directional(guide, {}, inputs, discrete)
+
+
+def test_a_ball_bounces_and_rests_in_model_exchange_as_in_co_simulation():
+    """Its states are displacements [m], rotation, and their rates."""
+    kernel, times = KernelSimulation(ball(), exchange=True), []
+    assert kernel.states[:6] == [f"ball.{x}" for x in ("x", "y", "angle", "vx", "vy", "omega")]
+    for t, z in integrate(kernel, 3.0, h=1e-3):
+        assert (z > 0.0).all()
+        if kernel.get("floor.impact_count") > len(times):
+            times.append(t)
+    alone = KernelSimulation(ball())
+    alone.advance(3.0)
+    assert len(times) == alone.get("floor.impact_count") > 10
+    assert times[0] == pytest.approx((2 / 9.81) ** 0.5, abs=1e-9)
+    assert times[-1] == pytest.approx(alone.get("floor.impact_time"), abs=1e-7)
+    assert kernel.get("floor.contact") == alone.get("floor.contact") == 1.0
+    assert kernel.get("ball.y") == pytest.approx(-1.0, abs=1e-9)
 
 
 @each_shipped

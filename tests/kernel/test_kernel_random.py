@@ -17,9 +17,9 @@ PEAKS = ("peak_stress", "peak_stress_time", "peak_stress_position")
 PEAK_RTOL = 1e-2  # Largest of the samples at the ends of steps, whose lengths vary by round-off.
 
 
-def deviations(seed):
+def deviations(seed, free):
     """Return the largest deviation of each output over its nominal; check that counts are equal."""
-    mechanism = seeded(seed)
+    mechanism = seeded(seed, free=free)
     values = inputs(mechanism, seed)
     engine, kernel = Simulation(mechanism, values), KernelSimulation(mechanism, values)
     nominal = {v.name: v.nominal or 1.0 for v in interface(mechanism, {})}
@@ -42,10 +42,11 @@ def deviations(seed):
     return result
 
 
+@pytest.mark.parametrize("free", [False, True])
 @pytest.mark.parametrize(
     "seed", [*SEEDS, *(pytest.param(seed, marks=pytest.mark.slow) for seed in SLOW_SEEDS)]
 )
-def test_the_kernel_computes_the_motion_of_a_random_mechanism_as_the_engine_does(seed):
-    found = deviations(seed)
+def test_the_kernel_computes_the_motion_of_a_random_mechanism_as_the_engine_does(seed, free):
+    found = deviations(seed, free)
     worst = max(found, key=found.__getitem__)
     assert found[worst] <= DEVIATION_MAX, (worst, found[worst])

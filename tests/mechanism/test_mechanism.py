@@ -192,14 +192,16 @@ def test_a_value_that_is_not_a_number_is_rejected(bad):
         GUIDE.values({"flexure.length": bad})
 
 
-def test_a_mechanism_with_unconnected_bodies_is_rejected():
+def test_bodies_that_nothing_connects_to_the_ground_are_free():
     loose = Body("loose", 1.0, 1.0, (1.0, 1.0), {"a": (1.0, 1.0)})
     other = Body("other", 1.0, 1.0, (2.0, 1.0), {"a": (2.0, 1.0)})
     between = Flexure("between", "flexure", "loose.a", "other.a")
-    with pytest.raises(MechanismError, match="loose is not held"):
-        changed(bodies=(BODY, loose, other), flexures=(LEFT, RIGHT, between))
-    with pytest.raises(MechanismError, match="loose is not held"):
-        changed(bodies=(BODY, loose))
+    both = changed(bodies=(BODY, loose, other), flexures=(LEFT, RIGHT, between))
+    assert both.free_bodies == ("loose", "other")
+    assert changed(bodies=(BODY, loose)).free_bodies == ("loose",)
+    assert changed().free_bodies == ()
+    with pytest.raises(MechanismError, match=r"the closed form has no bodies .* connect loose to"):
+        changed(bodies=(BODY, loose)).check_connected("the closed form")
 
 
 def test_a_flexure_without_length_is_rejected():

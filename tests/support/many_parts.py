@@ -105,7 +105,8 @@ def elastic():
             Flexure("strut", "bar", "lever.end", "ground.far", ("pin", "pin")),
         ),
         joints=(
-            Joint("hinge", "stage.hinge", "lever.pin"), Joint("hook", "pendulum.pin", "stage.hook"),
+            Joint("hinge", "stage.hinge", "lever.pin", stiffness="L/40"),
+            Joint("hook", "pendulum.pin", "stage.hook"),
         ),
         stops=(
             Stop("knock", "hammer", (0.035, "L + 0.055"), 5.0, 2e-3, "L/20", 0.7, 0.2, on="stage"),

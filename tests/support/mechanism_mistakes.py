@@ -792,12 +792,6 @@ CHANGES = {
         'thickness = "0.1 mm"',
         "flexure left: its notch of the length 0.024 m is longer than the flexure, 0.02 m",
     ),
-    "body that nothing holds": (
-        '[[flexures]]\nname = "left"',
-        '[[bodies]]\nname = "extra"\nmass = 1\ninertia = 1\ncentre = [0, 0]\n'
-        '[[flexures]]\nname = "left"',
-        "the body extra is not held: no flexures or joints connect it to the ground",
-    ),
     "joint of points drawn apart": (
         'points.hook = ["arm.length", 0]',
         "points.hook = [0.041, 0]",

@@ -132,10 +132,12 @@ def build(
     stops: int = 2,
     friction: bool = True,
     damping: bool = True,
+    free: bool = False,
 ) -> Mechanism:
     """Return a mechanism, which may be over-constrained.
 
-    ``bodies``, ``loops`` and ``stops`` are the largest numbers of these parts.
+    ``bodies``, ``loops`` and ``stops`` are the largest numbers of these parts.  With ``free``, one
+    or two more bodies fly freely, alone or connected to each other.
     """
     b = _Builder(choose, rng)
     for _ in range(choose((1, 2, 3))):
@@ -150,6 +152,8 @@ def build(
         first, second = choose((GROUND, *names)), choose(names)
         if first != second:
             b.connect(first, second, joint=choose((False, False, True)))
+    if free:
+        names += _add_free_bodies(b)
     directions = (0.0, 90.0, 180.0, 31.7, 200.3)
     coefficient = (0.0, 0.3) if friction else (0.0,)
     walls = []
@@ -193,9 +197,19 @@ def build(
         probes=tuple(probes),
         release=Release(body, direction, velocity=b.real(0.2, 0.6)),
         gravity=gravity,
-        damping_zeta=choose((0.0, 0.02)) if damping else 0.0,
+        damping_zeta=choose((0.0, 0.02)) if damping and not free else 0.0,
         damping_beta=choose((0.0, 1e-5)) if damping else 0.0,
     )
+
+
+def _add_free_bodies(b: _Builder) -> list[str]:
+    """Add bodies that nothing connects to the ground, and return their names."""
+    names = [b.add_body(complex(k, 2)) for k in range(b.choose((1, 2)))]
+    for name in names:
+        b.point(name, b.near(name))
+    if len(names) == 2 and b.choose((False, True)):
+        b.connect(*names, joint=b.choose((False, True)))
+    return names
 
 
 def inputs(mechanism: Mechanism, seed: int) -> dict[str, float]:
@@ -227,6 +241,8 @@ def starts(mechanism: Mechanism) -> bool:
     e = system.directions(sim.front.q)
     M, _ = inertia(system.H, np.diag(system.J), e)
     rows = jacobian(system.spread(np.vstack([system.loops, system.release])), e)
+    own = np.setdiff1d(np.arange(system.d), system.floats)  # No coordinate moves these directions.
+    M, rows = M[np.ix_(own, own)], rows[:, own]
     left, free = (
         (rows[-1] @ response(M, held, rows[-1:], system.length)).item()
         for held in (rows[:-1], rows[:0])
@@ -237,6 +253,7 @@ def starts(mechanism: Mechanism) -> bool:
 @st.composite
 def mechanisms(draw, *, starting: bool = False, **most) -> Mechanism:
     """Draw mechanisms that can be assembled and, if ``starting``, also simulated."""
+    most.setdefault("free", draw(st.booleans()))
 
     def attempt() -> Mechanism | None:
         rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))

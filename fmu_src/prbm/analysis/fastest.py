@@ -53,6 +53,8 @@ def fastest(mechanism: Mechanism, values: Mapping[str, float]) -> Fastest | None
     parameters = mechanism.values(dict(values))
     try:
         frequency = _highest(mechanism, parameters)
+        if frequency == 0.0:
+            return None
         effects = {
             p.name: -math.log(_highest(mechanism, changed) / frequency) / math.log(CHANGE)
             for p in mechanism.parameters
@@ -67,4 +69,4 @@ def fastest(mechanism: Mechanism, values: Mapping[str, float]) -> Fastest | None
 
 def _highest(mechanism: Mechanism, parameters: Mapping[str, float]) -> float:
     system = assemble(mechanism, parameters)
-    return float(modes(system, equilibrium(system)).frequency[-1])
+    return float(modes(system, equilibrium(system)).frequency.max(initial=0.0))

@@ -9,6 +9,7 @@ displacement d the holding force is F(d) and the position of the point z(d).  Th
 where ``across`` is the error of a straight-line guide.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -45,7 +46,7 @@ class Held:
         Rotation of the body, counter-clockwise [rad].
     frequency : float
         Fundamental frequency of the free body about the shape, with the force as a constant load
-        [Hz]; negative if unstable.
+        [Hz]; negative if unstable, NaN if all bodies are free.
     unstable, unstable_held : int
         Numbers of unstable directions of the free body under that load, and of the held one.
     """
@@ -76,10 +77,11 @@ def described(system: System, displacement: float, shape: Equilibrium) -> Held:
     frame, e = system.released, system.directions(shape.q)
     moved = unit(release.direction).conjugate() * complex(frame.c + frame.A @ e - frame.drawn)
     found = modes(system, shape)
+    frequency = found.frequency
     along = moved_by(system, shape.q, found.shape)
     return Held(
         displacement, shape.force, holding_stiffness(system, shape), moved.imag,
-        float(shape.q[frame.j]), float(found.frequency[0]),
+        float(shape.q[frame.j]), float(frequency[0]) if len(frequency) else math.nan,
         unstable_directions(found.frequency), unstable_directions(found.frequency, along),
     )  # fmt: skip
 

@@ -285,6 +285,8 @@ def linearize(
         If a name is unknown, or a value out of its bounds.
     EquilibriumError
         If no such shape is found.
+    MechanismError
+        If no flexures or joints connect a body to the ground.
 
     Examples
     --------
@@ -294,6 +296,7 @@ def linearize(
     >>> model.A.shape, model.states[0]
     ((10, 10), 'mode[1].amplitude')
     """
+    mechanism.check_connected("a linear model")
     system = assemble(mechanism, mechanism.values(dict(values or {})))
     given = dict(loads or {})
     free = equilibrium(system, None, given)

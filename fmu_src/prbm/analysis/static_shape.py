@@ -70,7 +70,7 @@ class StaticShape:
     @property
     def stable(self) -> bool:
         """Whether the shape is stable under dead loads."""
-        return bool(self.modes.frequency[0] > 0.0)
+        return bool((self.modes.frequency[:1] > 0.0).all())
 
     @cached_property
     def positions(self) -> dict[str, Place]:

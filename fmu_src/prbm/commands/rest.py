@@ -65,7 +65,7 @@ def _shapes(
         for x, shape in zip(held, shapes, strict=True)
     ]
     _print(head + load_text(loads), points, system)
-    if not options.held:
+    if not options.held and not math.isnan(points[0].frequency):
         _print_rest(points[0].displacement, points[0].frequency > 0.0, system)
     output.table(f"{mechanism.name}-equilibrium.csv", _csv_head(unit), _rows(points))
     places = [
@@ -236,6 +236,8 @@ def _stability(stable: bool) -> str:
 
 def _frequency(point: holding.Held) -> str:
     """Return the frequency as text; a star marks shapes that are unstable while they are held."""
+    if math.isnan(point.frequency):  # No body is held.
+        return "-"
     text = f"{point.frequency:.5g}" if point.frequency > 0.0 else "unstable"
     return f"{text}*" if point.unstable_held else text
 

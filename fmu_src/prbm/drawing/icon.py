@@ -130,7 +130,7 @@ def shape(system: System, sample: Mapping[str, float]) -> Real:
     """Return the coordinates of a sample of outputs; the stretches close the loops."""
     q = np.array(system.q0)
     for name, j in angles(system).items():
-        q[j] = sample[name]
+        q[j] = sample[name] / system.units[j]
     displacements = {
         name: np.array([complex(sample[f"{name}.x"], sample[f"{name}.y"])])
         for name in system.bodies

@@ -86,6 +86,9 @@ def stretched(system: System, q: Real, displacements: Mapping[str, Complex]) -> 
 
 
 def angles(system: System) -> dict[str, int]:
-    """Return the indices of the angles among the coordinates, by the names of their outputs."""
+    """Return the indices of the coordinates other than strains, by the names of their outputs.
+
+    They are angles, and displacements of free bodies: the outputs have the units ``system.units``.
+    """
     bodies = (frame.j for frame in system.bodies.values())
-    return {system.variables[j][0]: j for j in (*system.links, *bodies)}
+    return {system.variables[j][0]: j for j in (*system.links, *bodies, *system.placed)}

@@ -227,6 +227,7 @@ class JointTable(Named):
 
     start: Reference = Field(description="First point, body.point or ground.point")
     end: Reference = Field(description="Second point, body.point or ground.point")
+    stiffness: Annotated[Quantity, measured(parts.Joint, "stiffness")] | None = None
     mirror: LineOrLines = _mirror()
     repeat: RepeatTable | None = _repeat()
 
@@ -329,7 +330,9 @@ class MechanismTable(Table):
         Measured("Time constant of stiffness-proportional damping", "s", 0.0, 1e-2,
                  expression=False),
     ] = 0.0  # fmt: skip
-    ground: dict[PointName, Point] = Field(description="Fixed points, by name [m]")
+    ground: dict[PointName, Point] = Field(
+        default_factory=dict, description="Fixed points, by name [m]"
+    )
     geometry: tuple[ParameterTable, ...] = Field(
         (), description="Parameters for points and other quantities"
     )
@@ -338,7 +341,7 @@ class MechanismTable(Table):
     flexure_types: tuple[FlexureTypeTable, ...] = Field(
         (), description="Sections, materials and models that several flexures share"
     )
-    flexures: tuple[FlexureTable, ...] = Field(description="Flexures")
+    flexures: tuple[FlexureTable, ...] = Field((), description="Flexures")
     joints: tuple[JointTable, ...] = Field((), description="Pins")
     stops: tuple[StopTable, ...] = Field((), description="Walls")
     frictions: tuple[FrictionTable, ...] = Field((), description="Coulomb friction")
@@ -579,7 +582,7 @@ def _density(table: BodyTable, materials: Mapping[str, dict[str, Quantity]]) -> 
 
 def _joint(table: JointTable) -> parts.Joint:
     """Return the joint of a table."""
-    return parts.Joint(table.name, table.start, table.end)
+    return parts.Joint(table.name, table.start, table.end, table.stiffness)
 
 
 def _flexure(table: FlexureTable) -> parts.Flexure:

@@ -1,10 +1,8 @@
 """The documentation page of an FMU: summary, use, equations, variables, limits of the model."""
 
-import html
 import math
 from collections.abc import Iterable, Iterator, Sequence
 
-from ..base.text import printable
 from ..base.version import GENERATION_TOOL
 from ..interface.native import NativeInterface
 from ..interface.variables import Variable
@@ -12,10 +10,11 @@ from ..mechanics.inputs import Wall
 from ..mechanics.stress import stressed
 from ..mechanism.description import Mechanism
 from ..mechanism.flexure import BEAM, MODELS
-from ..mechanism.parts import COMPLIANT, LAWS, RIGID, FlexureType
+from ..mechanism.parts import COMPLIANT, RIGID
 from ..runs.experiment import Experiment
+from .equations import equations, laws_of, stretches
 from .live.page import LivePart
-from .mathml import block, formula, inline, matrix, row
+from .mathml import escape, formula, inline
 from .policy import policy
 from .related import FOLDER
 
@@ -81,18 +80,13 @@ COMPLIANT_SOURCE = (
 )
 
 
-def escape(text: str) -> str:
-    """Return a text escaped for HTML, without unprintable characters."""
-    return "\n".join(html.escape(printable(line)) for line in text.splitlines())
-
-
 def page(mechanism: Mechanism, variables: tuple[Variable, ...], experiment: Experiment) -> str:
     """Return the HTML page of the Python FMU of a mechanism."""
     return _page(
         mechanism,
         _summary(mechanism, "FMI 2.0 co-simulation"),
         _use(mechanism, experiment),
-        _equations(mechanism),
+        equations(mechanism),
         _walls(mechanism),
         _variables(variables),
         _limits(mechanism, variables, INPUTS_OF_STEPS),
@@ -134,7 +128,7 @@ def native_page(
         mechanism,
         _summary(mechanism, f"FMI {version}.0 model exchange and co-simulation", live),
         _native_use(mechanism, interface, version, platforms, experiment, with_reference),
-        _equations(mechanism),
+        equations(mechanism),
         _exchange(interface, version),
         _events(mechanism, interface, version),
         _walls(mechanism),
@@ -161,7 +155,7 @@ def explorer_page(mechanism: Mechanism, variables: tuple[Variable, ...], live: L
     return _page(
         mechanism,
         _summary(mechanism, "Simulation in the browser", live),
-        _equations(mechanism),
+        equations(mechanism),
         _walls(mechanism),
         _variables(variables),
         _limits(mechanism, variables, INPUTS_OF_STEPS),
@@ -198,14 +192,8 @@ def _list(title: str, items: Iterable[str], *, ordered: bool = False) -> str:
 
 
 def _sources(mechanism: Mechanism) -> str:
-    more = [COMPLIANT_SOURCE] if COMPLIANT in _laws(mechanism) else []
+    more = [COMPLIANT_SOURCE] if COMPLIANT in laws_of(mechanism) else []
     return _list("Sources", map(escape, [*SOURCES, *more]), ordered=True)
-
-
-def _laws(mechanism: Mechanism) -> list[str]:
-    """Return the laws of the stops, the rigid one first; without stops the rigid one."""
-    found = {stop.law for stop in mechanism.stops} or {RIGID}
-    return [law for law in LAWS if law in found]
 
 
 def _flexures(mechanism: Mechanism) -> str:
@@ -226,7 +214,7 @@ def _impacts(mechanism: Mechanism) -> str:
         COMPLIANT: "Compliant stops are indented, and their contact force brakes and returns the "
         "body.",
     }
-    return " ".join(sentences[law] for law in _laws(mechanism))
+    return " ".join(sentences[law] for law in laws_of(mechanism))
 
 
 def _summary(mechanism: Mechanism, flavour: str, live: LivePart | None = None) -> str:
@@ -287,92 +275,6 @@ def _use(mechanism: Mechanism, experiment: Experiment) -> str:
         "<li>The wrapper forwards log messages, those of impacts included, only if the importer "
         "requests them (FMPy: <code>debug_logging=True</code>).</li>\n</ul>"
     )
-
-
-STRETCHING = (
-    "where links that stretch have e = exp(s + i q), with a further coordinate s, the logarithm of "
-    "the stretch (and v is q' - i s' where it is squared), "
-)
-
-
-BEAMS = (
-    "The angles of the nodes of a beam are a constant linear map of the coordinates; the equations "
-    "of the angles are multiplied by it. "
-)
-
-
-def _beams(mechanism: Mechanism) -> bool:
-    return any(kind.model == BEAM for kind in mechanism.flexure_types)
-
-
-def _stretches(mechanism: Mechanism) -> bool:
-    return any(kind.axial for kind in mechanism.flexure_types)
-
-
-STOP_LAWS = {
-    RIGID: "<p>At an impact on a rigid stop,</p>\n"
-    + formula(
-        "M (v^+ - v^-) + Phi_q^T Lambda = G^T P",
-        "Phi_q v^+ = 0",
-        "dot(g)^+ = -restitution dot(g)^-",
-        "P >= 0",
-    )
-    + "\n<p>With friction at the stop, the coefficient of restitution is energetic (Stronge), so "
-    "that no impact gains energy. Without friction it equals Newton's coefficient.</p>\n",
-    COMPLIANT: f"<p>A compliant stop with the indentation {inline('d = -g')} has the contact "
-    "force</p>\n"
-    + formula(
-        "F = max(0, k d^n (1 + alpha dot(d)/v_0))",
-        "(1 + alpha)/(1 - epsilon alpha) = exp((1 + epsilon) alpha)",
-    )
-    + f"\n<p>with {inline('k')} the <code>stiffness</code>, {inline('n')} the "
-    f"<code>exponent</code>, {inline('epsilon')} the <code>restitution</code> of a point mass, and "
-    f"{inline('v_0')} the largest closing speed of the contact so far, at least "
-    "<code>rest_speed</code>. With friction at the stop, F is the normal force. A contact that "
-    "has settled holds like a rigid stop.</p>\n",
-}
-
-
-def _equations(mechanism: Mechanism) -> str:
-    flexures = "".join(_flexure_row(mechanism, kind) for kind in mechanism.flexure_types)
-    beams = _beams(mechanism)
-    motion = block(
-        matrix([["M", "Phi_q^T", "-G^T"], ["Phi_q", "0", "0"], ["G", "0", "0"]]),
-        matrix([["a"], ["lambda"], ["force"]]),
-        row("="),
-        matrix([["Q - C v^2"], ["-dot(Phi_q) v"], ["-dot(G) v"]]),
-    )
-    mass = formula("M = Re(bar(e)_i H_{ij} e_j) + diag(J)", "C = -Im(bar(e)_i H_{ij} e_j)")
-    loads = "Q = springs + gravity + damping (2 zeta omega_1 M v + beta K v) + friction + inputs"
-    laws = _laws(mechanism)
-    loads += " + G^T F" if COMPLIANT in laws else ""
-    return (
-        "<h2>Equations</h2>\n"
-        f"<p>{BEAMS if beams else ''}With the absolute angles {inline('q')} of the links "
-        f"{'and nodes ' if beams else ''}and {inline('e = exp(i q)')}, every point is "
-        f"{inline('z = c + A e')}, {STRETCHING if _stretches(mechanism) else ''}and</p>\n"
-        f"{motion}\n{mass}\n{formula(loads)}\n"
-        "<p>The last row acts while a stop holds. "
-        f"{inline('Phi(q) = 0')} are the loop constraints; positions and velocities are "
-        "projected onto them. The gap "
-        f"{inline('g')} has the rate {inline('dot(g) = G v + w')}, with {inline('w')} the velocity "
-        f"of the wall.</p>\n{''.join(STOP_LAWS[law] for law in laws)}"
-        '<div class="table"><table><caption>Flexure models</caption><thead><tr><th>type</th>'
-        "<th>model</th><th>coefficients (published)</th><th>source</th></tr></thead><tbody>"
-        f"{flexures}</tbody></table></div>\n"
-        "<p>Energy balance: kinetic + elastic + gravitational + dissipated energy - work is "
-        "constant, also across impacts.</p>"
-    )
-
-
-def _flexure_row(mechanism: Mechanism, kind: FlexureType) -> str:
-    model = mechanism.model(kind)
-    coefficients = ", ".join(f"{c.name} = {c.value:g}" for c in model.coefficients)
-    if model.order:
-        coefficients = f"order = {model.order}, nodes = {model.nodes}, profile = {kind.profile}"
-    coefficients = coefficients or f"n = {kind.n}"
-    cells = (kind.name, kind.model, coefficients, model.source)
-    return "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>"
 
 
 def _variables(variables: tuple[Variable, ...]) -> str:
@@ -494,7 +396,7 @@ def _drawn_wall() -> str:
 
 def _limits(mechanism: Mechanism, variables: tuple[Variable, ...], inputs: str) -> str:
     models = {kind.model for kind in mechanism.flexure_types}
-    laws = _laws(mechanism)
+    laws = laws_of(mechanism)
     impact = [IMPACT_LIMIT] if RIGID in laws else []
     planar = (
         "The motion is planar. Flexures are slender, of uniform section and of linear elastic "
@@ -513,7 +415,9 @@ def _limits(mechanism: Mechanism, variables: tuple[Variable, ...], inputs: str) 
         "off the centre of mass loses more energy of the fundamental mode. The loss of a real "
         "impact depends on the duration of the contact.",
     ]
-    items = [*impact, planar] if _stretches(mechanism) else rigid
+    items = [*impact, planar] if stretches(mechanism) else rigid
+    if not mechanism.flexures:
+        items = [*impact, "The motion is planar, and bodies are rigid."]
     for name in sorted(models):
         if MODELS[name].coefficients:
             items.append(
@@ -526,7 +430,7 @@ def _limits(mechanism: Mechanism, variables: tuple[Variable, ...], inputs: str) 
             "Beams: the bending moment is a polynomial along each flexure. Vibrations of a flexure "
             "with more waves than its polynomial are missing."
         )
-    straight = "kilohertz" if _stretches(mechanism) else "infinite stiffness"
+    straight = "kilohertz" if stretches(mechanism) else "infinite stiffness"
     if "2R" in models:
         items.append(
             "Without damping, the motion of a guide on 2R flexures through its straight shape is "

@@ -9,6 +9,8 @@ import html
 import re
 from collections.abc import Sequence
 
+from ..base.text import printable
+
 GREEK = {
     "alpha": "\u03b1", "beta": "β", "epsilon": "ε", "zeta": "ζ", "lambda": "λ", "omega": "ω",
     "Lambda": "Λ", "Phi": "Φ",
@@ -102,3 +104,8 @@ class _Reader:
         if token[0].isalpha():
             return f"<mi>{GREEK.get(token, token)}</mi>"
         return f"<mo>{html.escape(OPERATORS.get(token, token), quote=False)}</mo>"
+
+
+def escape(text: str) -> str:
+    """Return a text escaped for HTML, without unprintable characters."""
+    return "\n".join(html.escape(printable(line)) for line in text.splitlines())

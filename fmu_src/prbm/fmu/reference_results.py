@@ -236,7 +236,11 @@ def steps(mechanism: Mechanism, changes: Mapping[str, float], experiment: Experi
     """
     simulation = Simulation(mechanism, changes)
     system, n = simulation.system, simulation.system.n
-    omega = 2 * math.pi * float(abs(modes_at(system, simulation.state()[:n]).frequency).max())
+    omega = (
+        2
+        * math.pi
+        * float(abs(modes_at(system, simulation.state()[:n]).frequency).max(initial=0.0))
+    )
     fastest = max(omega, simulation.values["damping.beta"] * omega**2)
     return experiment.stop_time * fastest / STABLE_STEP_FACTOR
 

@@ -64,7 +64,9 @@ class Scales:
     @classmethod
     def of(cls, system: System, omega: float) -> "Scales":
         """Return the scales of a system with a fundamental angular frequency [rad/s], or 0."""
-        K, inertia = np.abs(system.K), float(np.abs(system.H).max())
+        arms = np.ones(system.d)
+        arms[system.shifts] = arms[system.floats] = system.length
+        K, inertia = np.abs(system.K), float((np.abs(system.H) * np.outer(arms, arms)).max())
         turns = np.setdiff1d(np.arange(system.n), system.strains)
         rate, fast = (omega, omega) if omega else slow_rates(system)
         energy = float(K[np.ix_(turns, turns)].max()) or inertia * rate**2

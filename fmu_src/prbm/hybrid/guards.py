@@ -244,7 +244,8 @@ def _closing_time_between(view: StepView, guard: Guard, stop: int, j: int) -> fl
     closing_rate = _gap_rate if guard is gap else indentation_rate
     if abs(rate_a) <= view.scales.zero_speed and gap_a <= _round_off(view):
         # The stop was released too early, and is pressed again.
-        return _deep_time(view, z, a, b) if gap_b < min(gap_a, -depth) else None
+        pressed = gap_b < min(gap_a - _round_off(view), -depth)
+        return _deep_time(view, z, a, b) if pressed else None
     if rate_a > 0.0:
         if rate_b >= 0.0:
             return None  # The gap opens throughout the interval.

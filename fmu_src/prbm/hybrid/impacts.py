@@ -70,6 +70,7 @@ def impact(configuration: Configuration, front: Front, hit: int) -> tuple[Front,
     restitution = np.array(
         [0.0 if i in soft else configuration.stop_value(i, "restitution") for i in struck]
     )
+    held += _joined(configuration, front, struck, restitution)
     impulses = _impulses(configuration, front, struck, held, restitution)
     counted = [i for i in struck if i not in soft]
     front, impacts = _after_impact(configuration, front, counted, impulses)
@@ -77,6 +78,30 @@ def impact(configuration: Configuration, front: Front, hit: int) -> tuple[Front,
     resting = [i for i in (*struck, *held) if rates[i] <= zero]
     front = compliant.rephased(front.with_contacts(front.contacts.opened()))
     return settle(configuration, front, resting=resting), impacts
+
+
+def _joined(
+    configuration: Configuration, front: Front, struck: Sequence[int], restitution: Real
+) -> list[int]:
+    """Return the open stops that touch at rest and take part in an impact like held stops.
+
+    Without restitution, bodies that touch each other move on together.  Impacts one after the other
+    would reach this motion only in the limit of infinitely many.  Impacts with restitution do
+    follow each other, unless the speed is round-off.
+    """
+    if restitution.any():
+        return []
+    gaps, rates = front.gaps_and_rates()
+    near, zero = configuration.scales.touching, configuration.scales.zero_speed
+    slow = bool(np.all(rates[struck] >= -zero))
+    stops = configuration.mechanism.stops
+    return [
+        i
+        for i in front.contacts.open_stops
+        if i not in struck and not stops[i].compliant and gaps[i] <= near and rates[i] <= zero
+        if slow or configuration.stop_value(i, "restitution") == 0.0
+        if _can_be_struck(front, i)
+    ]
 
 
 def _can_be_struck(front: Front, stop: int) -> bool:

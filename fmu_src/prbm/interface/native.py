@@ -91,14 +91,17 @@ def native_interface(
         If two variables share a name or a value reference, or a name is not ASCII.
     """
     nominal = scales(mechanism, sample)
-    names = coordinate_variables(mechanism)
+    system = assemble(mechanism, mechanism.values())
+    names, units = system.variables, system.units
     angles, rates = (tuple(names[j][order] for j in independent) for order in (0, 1))
     contacts = compliant_states(mechanism)
     states = (*angles, *rates, *STORED, *contacts)
     sizes = {
-        name: magnitudes.strain if name.endswith(".strain") else magnitudes.angle for name in angles
+        name: magnitudes.strain if name.endswith(".strain") else magnitudes.angle * units[j]
+        for name, j in zip(angles, independent, strict=True)
     }
-    sizes |= dict.fromkeys(rates, magnitudes.rate) | dict.fromkeys(STORED, magnitudes.energy)
+    sizes |= {name: magnitudes.rate * units[j] for name, j in zip(rates, independent, strict=True)}
+    sizes |= dict.fromkeys(STORED, magnitudes.energy)
     for name in contacts:
         impulse = name.endswith(".impulse_sum")
         sizes[name] = magnitudes.impulse if impulse else magnitudes.energy
@@ -125,11 +128,6 @@ def native_interface(
         clocks,
         tuple(independent),
     )
-
-
-def coordinate_variables(mechanism: Mechanism) -> tuple[tuple[str, str], ...]:
-    """Return the names of each coordinate and its rate: an angle or a strain."""
-    return assemble(mechanism, mechanism.values()).variables
 
 
 def state_derivatives(
@@ -159,6 +157,8 @@ def _derivative(name: str, nominal: Scales) -> Variable:
     unit, description = {
         "omega": ("rad/s2", f"Angular acceleration of {owner}"),
         "strain_rate": ("1/s2", f"Rate of the strain rate of {owner}"),
+        "vx": ("m/s2", f"Acceleration of {owner} along x"),
+        "vy": ("m/s2", f"Acceleration of {owner} along y"),
         "impulse_sum": ("N", f"Force of the wall at {owner}"),
         "contact_loss": ("W", f"Power lost in the contact at {owner}"),
     }.get(rate, ("W", DERIVATIVES.get(state, "")))

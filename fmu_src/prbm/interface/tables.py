@@ -50,7 +50,7 @@ from .variables import (
 )
 
 FILE = "mechanism.bin"
-MAGIC, VERSION = b"PRBM", 8
+MAGIC, VERSION = b"PRBM", 9
 HEAD = 16  # Bytes before those that the checksum covers.
 DIMENSIONS = (
     "end_thickness", "end_width", "notch_radius", "notch_depth", "waist_length", "curvature",
@@ -261,6 +261,7 @@ class _Writer:
             yield _u32(*map(ENDS.index, flexure.ends))
         for joint in m.joints:
             yield _text(joint.name) + self._between(joint)
+            yield _u32(joint.stiffness is not None) + self._fields(joint)
 
     def _contacts(self) -> Iterator[bytes]:
         """Yield stops, friction points, forces and probes."""
@@ -352,8 +353,8 @@ class _Writer:
     def _bounds(self) -> Iterator[bytes]:
         """Yield the bounds of the fields that are expressions."""
         m = self.mechanism
-        parts: tuple[Part, ...] = (*m.flexure_types, *m.bodies, *m.frictions, *m.stops, m.release)
-        for part in parts:
+        parts: tuple[Part, ...] = (*m.flexure_types, *m.bodies, *m.joints, *m.frictions, *m.stops)
+        for part in (*parts, m.release):
             for name, (unit, _, minimum, maximum, *_) in fields_of(part).items():
                 quantity = _given(part, name)
                 if isinstance(quantity, str):

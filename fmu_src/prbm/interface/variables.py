@@ -123,7 +123,7 @@ class Scales:
 def scales(mechanism: Mechanism, sample: Mapping[str, Number]) -> Scales:
     """Return typical magnitudes, from the release, the masses and the fundamental frequency."""
     values = mechanism.values()
-    span = extent(mechanism)
+    span = extent(mechanism) or 1.0
     release = mechanism.release
     amount = abs(_quantity(getattr(release, release.start), f"release.{release.start}", values))
     x = (span * min(amount, 1.0) if release.turns else amount) or span / 10

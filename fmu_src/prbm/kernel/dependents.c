@@ -29,7 +29,9 @@ PRBM int coordinate_slot(const Mechanism *m, int j, bool rate) {
     if (c->link >= 0) {
         return m->slots.links + PER_LINK * c->link + (rate ? LINK_OMEGA : LINK_ANGLE);
     }
-    return m->slots.bodies + PER_BODY * (c->body - 1) + (rate ? BODY_OMEGA : BODY_ANGLE);
+    const int values[] = {BODY_X, BODY_Y, BODY_ANGLE}, rates[] = {BODY_VX, BODY_VY, BODY_OMEGA};
+    int quantity = c->axis < 0 ? SHIFTS_EACH : c->axis;
+    return m->slots.bodies + PER_BODY * (c->body - 1) + (rate ? rates : values)[quantity];
 }
 
 static const char *coordinate_name(const Mechanism *m, int j) {
@@ -141,8 +143,9 @@ PRBM void states_of(const Simulation *sim, const double *y, double *x) {
     const Mechanism *m = sim->configuration.mechanism;
     int n = m->coordinate_count, count = m->independent_count;
     for (int k = 0; k < count; k++) {
-        x[k] = y[m->independent[k]];
-        x[count + k] = y[n + m->independent[k]];
+        double unit_of = coordinate_unit(system_of(sim), m->independent[k]);
+        x[k] = y[m->independent[k]] * unit_of;
+        x[count + k] = y[n + m->independent[k]] * unit_of;
     }
     copy(2, y + 2 * n, x + 2 * count);
     for (int c = 0; c < m->compliant_count; c++) {
@@ -155,8 +158,9 @@ PRBM void load_states(const Simulation *sim, const double *x, double *y) {
     const Mechanism *m = sim->configuration.mechanism;
     int n = m->coordinate_count, count = m->independent_count;
     for (int k = 0; k < count; k++) {
-        y[m->independent[k]] = x[k];
-        y[n + m->independent[k]] = x[count + k];
+        double unit_of = coordinate_unit(system_of(sim), m->independent[k]);
+        y[m->independent[k]] = x[k] / unit_of;
+        y[n + m->independent[k]] = x[count + k] / unit_of;
     }
     copy(2, x + 2 * count, y + 2 * n);
     for (int c = 0; c < m->compliant_count; c++) {

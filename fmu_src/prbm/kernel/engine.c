@@ -320,8 +320,7 @@ EXPORTED void prbm_points(Engine *engine, const double *q, double *points) {
 }
 
 EXPORTED int prbm_mode_count(const Engine *engine) {
-    const System *system = system_of(engine->simulation);
-    return system->n - system->r;
+    return mode_count(system_of(engine->simulation));
 }
 
 EXPORTED int prbm_modes(Engine *engine, double *q, double *frequencies, double *shapes,

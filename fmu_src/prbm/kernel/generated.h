@@ -207,7 +207,7 @@ typedef enum {
 
 /* --- prbm.interface.tables ---------------------------------------------------------------------- */
 
-enum { TABLES_VERSION = 8 };
+enum { TABLES_VERSION = 9 };
 enum { TABLES_HEAD = 16 };
 enum { COORDINATES_MAX = 512 };
 enum { DIRECTIONS_MAX = 1024 };

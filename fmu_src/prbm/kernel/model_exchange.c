@@ -184,11 +184,13 @@ PRBM void exchange_nominals(const Simulation *simulation, double *x) {
     const Mechanism *m = simulation->configuration.mechanism;
     const State *state = &simulation->state;
     int count = m->independent_count;
-    double rate = nearest_power_of_ten(state->angle * simulation->configuration.scales.rate);
+    double rate = state->angle * simulation->configuration.scales.rate;
     for (int k = 0; k < count; k++) {
-        bool turns = m->coordinates[m->independent[k]].strain < 0;
-        x[k] = nearest_power_of_ten(turns ? state->angle : typical_strain(simulation));
-        x[count + k] = rate;
+        int j = m->independent[k];
+        bool turns = m->coordinates[j].strain < 0;
+        double unit_of = coordinate_unit(system_of(simulation), j);
+        x[k] = nearest_power_of_ten(turns ? state->angle * unit_of : typical_strain(simulation));
+        x[count + k] = nearest_power_of_ten(rate * unit_of);
     }
     x[2 * count] = x[2 * count + 1] = nearest_power_of_ten(state->energy);
     double speed = state->angle * simulation->configuration.scales.rate *

@@ -12,6 +12,24 @@
 
 /* --- changes of coordinates --- */
 
+/* Set p of the arms that float for rates v, see swings. */
+static void float_swings(const System *system, const double *v, Complex *p) {
+    float_velocities(system, v, p);
+    for (int k = 0; k < system->shift_count; k += SHIFTS_EACH) {
+        Complex *each = &p[arm_of(system, system->shifts[k])];
+        *each = complex_of(each->im, -each->re);
+    }
+}
+
+/* Set the changes of the arms that float, whose accelerations do not depend on place and rates. */
+static void move_floats(const Tangent *t) {
+    const System *system = t->eq->system;
+    float_velocities(system, t->dq, t->dE);
+    float_velocities(system, t->a, t->bend);
+    float_swings(system, t->v, t->swing);
+    float_swings(system, t->dv, t->dswing);
+}
+
 /* Compute the changes of the arms from dq and dv. */
 static void move_arms(const Tangent *t) {
     const System *system = t->eq->system;
@@ -25,6 +43,7 @@ static void move_arms(const Tangent *t) {
         t->bend[j] = product(arm.E, bend_of(&arm));
         t->dbend[j] = bend_change(&arm);
     }
+    move_floats(t);
 }
 
 /* Compute the changes of the dependent coordinates from the loops, with the right side s. */
@@ -51,8 +70,9 @@ static bool tangent_coordinates(Tangent *t, const double *dx, Problem *problem) 
     zeros(n, t->dq);
     zeros(n, t->dv);
     for (int k = 0; k < count; k++) {
-        t->dq[m->independent[k]] = dx[k];
-        t->dv[m->independent[k]] = dx[count + k];
+        double unit_of = coordinate_unit(system, m->independent[k]);
+        t->dq[m->independent[k]] = dx[k] / unit_of;
+        t->dv[m->independent[k]] = dx[count + k] / unit_of;
     }
     for (int i = 0; i < r; i++) {
         x.s[i] = -dot(n, x.rows + i * n, t->dq);
@@ -97,18 +117,23 @@ static void load_row_change(const Tangent *t, Complex *dw, double *dmoment) {
     t->sim->scratch.used = mark;
 }
 
+/* Return the factor of the load on an arm in the pull on it: E, or 1 if it floats. */
+static Complex lever(const Tangent *t, int j) {
+    return is_float(t->eq->system, j) ? complex_of(1.0, 0.0) : t->e[j];
+}
+
 /* Change of the momentum E conj(H (E w)) of an arm. */
 static Complex momentum_change(const Tangent *t, int j) {
-    Complex momentum = product(t->e[j], conjugate(through_mass(t, j, t->swing)));
+    Complex momentum = product(lever(t, j), conjugate(through_mass(t, j, t->swing)));
     Complex turned = times_i(product(t->dphi[j], momentum));
-    return plus(turned, product(t->e[j], conjugate(through_mass(t, j, t->dswing))));
+    return plus(turned, product(lever(t, j), conjugate(through_mass(t, j, t->dswing))));
 }
 
 /* Change of the inertial load -i E conj(H E'') of an arm, without the change of w'. */
 static Complex inertial_change(const Tangent *t, int j) {
-    Complex load = product(t->e[j], conjugate(through_mass(t, j, t->bend)));
+    Complex load = product(lever(t, j), conjugate(through_mass(t, j, t->bend)));
     Complex turned = times_i(product(t->dphi[j], load));
-    Complex change = plus(turned, product(t->e[j], conjugate(through_mass(t, j, t->dbend))));
+    Complex change = plus(turned, product(lever(t, j), conjugate(through_mass(t, j, t->dbend))));
     return scaled(-1.0, times_i(change));
 }
 
@@ -117,7 +142,9 @@ static void arm_load_change(const Tangent *t, const Complex *dw, const double *d
     const Equations *eq = t->eq;
     for (int j = 0; j < eq->system->d; j++) {
         if (arm_of(eq->system, j) == j) {
-            Complex load = plus(product(dw[j], t->e[j]), product(eq->w[j], t->dE[j]));
+            Complex turned = product(eq->w[j], t->dE[j]), none = {0.0, 0.0};
+            Complex load = plus(product(dw[j], lever(t, j)),
+                                is_float(eq->system, j) ? none : turned);
             load.re += dmoment[j] - eq->mass_damping * eq->system->J[j] * t->dw[j].re;
             Complex lost = scaled(-eq->mass_damping, momentum_change(t, j));
             t->pull[j] = plus(plus(load, inertial_change(t, j)), lost);
@@ -168,12 +195,14 @@ static void row_change(const Tangent *t) {
     }
 }
 
-/* Add the pull to the loads: its real part for an angle, its imaginary part for a stretch. */
+/* Add the pull to the loads: its real part for an angle or a displacement along y, its imaginary part
+ * for a stretch or a displacement along x. */
 static void apply_pull(const Tangent *t) {
     const System *system = t->eq->system;
     for (int j = 0; j < system->d; j++) {
         int a = arm_of(system, j);
-        pull(system, j, a == j ? t->pull[j].re : t->pull[a].im, t->dx);
+        bool along_y = is_shift(system, j) && t->e[j].re != 0.0;
+        pull(system, j, a == j || along_y ? t->pull[a].re : t->pull[a].im, t->dx);
     }
 }
 
@@ -247,6 +276,7 @@ static void bend_arms(const Tangent *t) {
     for (int j = 0; j < t->eq->system->d; j++) {
         t->dbend[j] = plus(t->dbend[j], times_i(product(t->e[j], dalpha[j])));
     }
+    float_velocities(t->eq->system, t->dx, t->dbend);
 }
 
 static void base_changes(const Tangent *t, double *out) {
@@ -327,6 +357,8 @@ static Tangent at_rates(const Tangent *t, const double *x) {
         u.swing[j] = product(arm.E, arm.w);
         u.dswing[j] = swing_change(&arm);
     }
+    float_swings(t->eq->system, x, u.swing);
+    float_swings(t->eq->system, u.dv, u.dswing);
     return u;
 }
 
@@ -423,7 +455,8 @@ static void all_changes(const Tangent *t, const double *dx, const Complex *dw,
     energy_changes(t, dx, out + slots->energies);
     stress_changes(t, out + slots->stresses);
     for (int k = 0; k < m->independent_count; k++) {
-        out[slots->derivatives + k] = t->dx[m->independent[k]];
+        int j = m->independent[k];
+        out[slots->derivatives + k] = t->dx[j] * coordinate_unit(t->eq->system, j);
     }
     double *powers = out + slots->derivatives + m->independent_count;
     powers[0] = dissipation_change(t);

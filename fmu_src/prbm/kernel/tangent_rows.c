@@ -20,6 +20,9 @@ PRBM Arm arm_at(const Tangent *t, int j) {
 static bool relative_term(const Tangent *t, const Rows *rows, int i, int j, Arm *seen) {
     int d = rows->system->d, on = seen_from(rows, i);
     Complex size = {0.0, 0.0};
+    if (j < d && is_float(rows->system, j)) {
+        return false; /* See float_changes. */
+    }
     if (j < d) {
         size = rows->B[i * d + j];
     } else if (on != FIXED) {
@@ -47,8 +50,48 @@ PRBM Complex bend_change(const Arm *arm) {
     return product(arm->E, minus(turned, scaled(2.0, product(arm->w, arm->dw))));
 }
 
+/* Changes of f B E for an arm that floats, of f B, and of the time derivatives of f B E, the second
+ * one at constant accelerations. */
+typedef struct {
+    Complex value, lever, rate, second;
+} FloatChanges;
+
+static FloatChanges float_changes(const Tangent *t, const Rows *rows, int i, int j) {
+    const Arm body = arm_at(t, seen_from(rows, i));
+    const double turn = body.w.re, dphi = body.dphi.re, dturn = body.dw.re;
+    const Complex f = product(conjugate(body.E), rows->B[i * rows->system->d + j]);
+    const Complex E = t->e[j], speed = times_i(t->swing[j]), dspeed = times_i(t->dswing[j]);
+    const Complex bent = complex_of(turn * turn, body.alpha.re);
+    Complex rate = minus(speed, scaled(turn, times_i(E)));
+    Complex second = minus(minus(t->bend[j], scaled(2.0 * turn, times_i(speed))), product(bent, E));
+    Complex drate = minus(minus(dspeed, scaled(turn, times_i(t->dE[j]))), scaled(dturn, times_i(E)));
+    Complex dsecond = scaled(-2.0, times_i(plus(scaled(dturn, speed), scaled(turn, dspeed))));
+    dsecond = minus(dsecond, plus(product(bent, t->dE[j]), scaled(2.0 * turn * dturn, E)));
+    FloatChanges result = {
+        product(f, minus(t->dE[j], scaled(dphi, times_i(E)))),
+        scaled(-dphi, times_i(f)),
+        product(f, minus(drate, scaled(dphi, times_i(rate)))),
+        product(f, minus(dsecond, scaled(dphi, times_i(second)))),
+    };
+    return result;
+}
+
+/* Return the changes of the arms that float, summed over a row; the term of lever is not. */
+static FloatChanges all_floats(const Tangent *t, const Rows *rows, int i) {
+    const Complex none = {0.0, 0.0};
+    FloatChanges sum = {none, none, none, none};
+    for (int k = 0; k < rows->system->shift_count; k += SHIFTS_EACH) {
+        int arm = arm_of(rows->system, rows->system->shifts[k]);
+        FloatChanges each = float_changes(t, rows, i, arm);
+        sum.value = plus(sum.value, each.value);
+        sum.rate = plus(sum.rate, each.rate);
+        sum.second = plus(sum.second, each.second);
+    }
+    return sum;
+}
+
 static double value_change(const Tangent *t, const Rows *rows, int i) {
-    double sum = 0.0;
+    double sum = all_floats(t, rows, i).value.re;
     Arm part;
     for (int j = 0; j <= rows->system->d; j++) {
         sum -= relative_term(t, rows, i, j, &part) ? product(part.E, part.dphi).im : 0.0;
@@ -57,7 +100,7 @@ static double value_change(const Tangent *t, const Rows *rows, int i) {
 }
 
 PRBM double rate_change(const Tangent *t, const Rows *rows, int i) {
-    double sum = 0.0;
+    double sum = all_floats(t, rows, i).rate.re;
     Arm part;
     for (int j = 0; j <= rows->system->d; j++) {
         sum -= relative_term(t, rows, i, j, &part) ? swing_change(&part).im : 0.0;
@@ -66,7 +109,7 @@ PRBM double rate_change(const Tangent *t, const Rows *rows, int i) {
 }
 
 PRBM double second_change(const Tangent *t, const Rows *rows, int i) {
-    double sum = 0.0;
+    double sum = all_floats(t, rows, i).second.re;
     Arm part;
     for (int j = 0; j <= rows->system->d; j++) {
         sum += relative_term(t, rows, i, j, &part) ? bend_change(&part).re : 0.0;
@@ -86,6 +129,14 @@ PRBM void add_pull(const Tangent *t, const Rows *rows, int i, double force) {
             if (on != FIXED) {
                 t->pull[on] = plus(t->pull[on], change);
             }
+        }
+    }
+    for (int k = 0; k < rows->system->shift_count; k += SHIFTS_EACH) {
+        int arm = arm_of(rows->system, rows->system->shifts[k]);
+        FloatChanges each = float_changes(t, rows, i, arm);
+        t->pull[arm] = plus(t->pull[arm], scaled(force, times_i(each.lever)));
+        if (on != FIXED) {
+            t->pull[on] = minus(t->pull[on], scaled(force, times_i(each.value)));
         }
     }
 }

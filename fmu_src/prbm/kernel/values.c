@@ -71,6 +71,7 @@ static bool get_derivative(Simulation *sim, int k, double *x, Problem *problem) 
     *x = now.rates[k < count     ? n + m->independent[k]
                    : contact < 0 ? 2 * n + k - count
                                  : m->first_extra + extra];
+    *x *= k < count ? coordinate_unit(system_of(sim), m->independent[k]) : 1.0;
     return true;
 }
 

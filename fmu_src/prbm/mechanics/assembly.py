@@ -2,7 +2,8 @@
 
 A flexure starts at the ground or at a body that earlier parts have reached, and reaches the body at
 its other end.  A flexure or joint whose two bodies have both been reached before closes a loop; the
-links of such a flexure begin at the flexure's start.
+links of such a flexure begin at the flexure's start.  If no part reaches a further body, the first
+one that is left, in the order of the description, is free: it is reached by its own displacements.
 """
 
 from collections.abc import Mapping, Sequence
@@ -92,19 +93,26 @@ class _Assembler(Collection):
     def system(self) -> System:
         names: list[str] = []  # Of the parts that move with the coordinates.
         waiting: list[Flexure | Joint] = [*self.mechanism.flexures, *self.mechanism.joints]
-        while waiting:
+        while waiting or len(self.origin) <= len(self.mechanism.bodies):
             part = next(
-                part
-                for part in waiting
-                if body_of(part.start) in self.origin or body_of(part.end) in self.origin
+                (
+                    part
+                    for part in waiting
+                    if body_of(part.start) in self.origin or body_of(part.end) in self.origin
+                ),
+                None,
             )
-            waiting.remove(part)
-            if isinstance(part, Joint):
-                self.joint(part)
+            if part is None:
+                bodies = (body.name for body in self.mechanism.bodies)
+                self.set_free(next(body for body in bodies if body not in self.origin))
             else:
-                add_flexure(self, part)
+                waiting.remove(part)
+                if isinstance(part, Joint):
+                    self.joint(part)
+                else:
+                    add_flexure(self, part)
             names += [
-                f"body {owner}" if owner in self.index else f"flexure {part.name}"
+                f"body {owner}" if owner in self.index or part is None else f"flexure {part.name}"
                 for owner in self.owners[len(names) :]
             ]
         for body in self.mechanism.bodies:
@@ -140,6 +148,9 @@ class _Assembler(Collection):
             self.close(joint.name, place, self.on(far, z_end))
         else:
             self.reach(far, place, z_end, self.turn(far))
+        if joint.stiffness is not None:
+            near, turned = (self.angle(self.index[body]) for body in (body_of(start), far))
+            self.spring(value(joint, "stiffness", self.values), near, turned)
         self.connect(body_of(start), far, known)
         self.lines.append((joint.name, "joint", [place], NO_THICKNESS))
 
@@ -149,10 +160,11 @@ class _Assembler(Collection):
         """Return the arrays from the collected parts."""
         d, mechanism = len(self.arm), self.mechanism
         q0, Phi, arm = np.array(self.q0), self.map(), np.array(self.arm)
-        A = np.array([place.row(d) for place, _ in self.masses])
+        A = stacked([place.row(d) for place, _ in self.masses], d)
         m = np.array([mass for _, mass in self.masses])
         # At zero stretch the directions e equal the arms E.  Rows of places are zero at stretches.
         e0 = np.exp(1j * Phi.of(q0))
+        e0[self.floats] = 0.0
         spread = A[:, arm]
         frames = {body.name: self.frame(body.name, body.name, None) for body in mechanism.bodies}
         self.lines += [(body, "body", self.corners(body), NO_THICKNESS) for body in frames]
@@ -166,6 +178,8 @@ class _Assembler(Collection):
             rest=np.array(self.rest),
             Phi=Phi,
             arm=arm,
+            floats=np.array(self.floats, int),
+            placed=np.array(self.placed, int),
             H=spread.conj().T @ (m[:, None] * spread),
             J=np.array(self.J),
             K=self.stiffness(),

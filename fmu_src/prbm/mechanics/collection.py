@@ -45,6 +45,8 @@ class Collection:
         self.depth = {GROUND: 0}  # Flexures and joints between each body and the ground.
         self.index: dict[str, int | None] = {GROUND: None}  # Directions of the bodies.
         self.links: list[int] = []
+        self.floats: list[int] = []  # Arms that float.
+        self.placed: list[int] = []  # Coordinates of the bodies on them.
         self.link_count = 0
         self.owners: list[str] = []
         self.lines: list[tuple[str, str, list[Place], Real]] = []
@@ -74,13 +76,16 @@ class Collection:
         """Size of the mechanism as drawn [m].
 
         It is the largest distance between any two ground points or centres of mass, or the length
-        of the longest flexure if that is larger.
+        of the longest flexure if that is larger.  Without flexures, hit points count, too; if all
+        points coincide, the size is 1 m.
         """
         drawn = [self.at(p) for p in self.mechanism.ground.values()]
         drawn += [self.at(body.centre) for body in self.mechanism.bodies]
-        points = np.array(drawn)
         lengths = [self.length(flexure) for flexure in self.mechanism.flexures]
-        return max(*lengths, *(float(np.abs(points - p).max()) for p in points))
+        if not lengths:
+            drawn += [self.at(stop.point) for stop in self.mechanism.stops]
+        points = np.array(drawn)
+        return max(*lengths, *(float(np.abs(points - p).max()) for p in points), 0.0) or 1.0
 
     def on(self, body: str, drawn: complex) -> Place:
         """Return the place of a drawn point of a body."""
@@ -120,7 +125,7 @@ class Collection:
         changes : dict of int to float
             Changes of the direction with the coordinates [-].
         arm : int or None
-            Arm that the direction stretches; None: a new arm, which it turns.
+            Arm that the direction stretches or displaces; None: a new arm, which it turns.
         """
         j = len(self.arm)
         self.changes.append(changes)
@@ -131,6 +136,19 @@ class Collection:
     def turn(self, owner: str) -> int:
         """Add the arm of a body, whose angle is a coordinate, and return its direction."""
         return self.direction({self.coordinate(owner): 1.0})
+
+    def set_free(self, body: str) -> None:
+        """Add a body that nothing connects to the ground: its displacements and its rotation."""
+        drawn = self.at(next(b for b in self.mechanism.bodies if b.name == body).centre)
+        shifts = self.coordinate(body), self.coordinate(body)
+        arm, size = self.direction({}), self.size
+        for j in shifts:
+            self.direction({j: size}, arm=arm)
+        turn = self.turn(body)
+        self.reach(body, Place(drawn, {arm: 1.0 + 0.0j}), drawn, turn)
+        self.depth[body] = 0
+        self.floats.append(arm)
+        self.placed += [*shifts, *self.changes[turn]]
 
     def angle(self, j: int | None) -> int | None:
         """Return the coordinate that is a direction of a body or a link; None: the ground."""

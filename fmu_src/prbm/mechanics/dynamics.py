@@ -186,7 +186,7 @@ class Equations:
         M = system.Phi.congruence(Hq.real) + system.inertia
         Q = system.Phi.pull(forces.generalised(self.w, e) + Hq.dot(w * w).imag)
         Q -= system.K.dot(q - system.rest + self.beta * v)
-        R, bent = self.rows.terms(e, w)
+        R, bent = self.rows.terms(e, v)
         kkt = constraints.saddle(M, R, R)
         if self.moving_walls:
             bent[self.first_hold : self.first_stick] -= self.held_motions(t)[2]
@@ -484,10 +484,10 @@ def base_reaction(equations: Equations, q: Real, v: Real, a: Real) -> tuple[comp
     e = system.directions(q)
     z = system.A @ e + system.c - system.anchor
     field = system.gravity - inputs.base
-    speed, change = system.turning(v), system.turning(a)
-    load = system.m * (field - mass_accelerations(system.A, e, speed, change))
+    bent = mass_accelerations(system.A, e, system.turning(v), system.swing(e, a))
+    load = system.m * (field - bent)
     force = complex(load.sum())
-    moment = float((z.conj() * load).imag.sum() - system.J @ change.real)
+    moment = float((z.conj() * load).imag.sum() - system.J @ system.turning(a).real)
     for f, m, frame in zip(inputs.forces, inputs.moments, system.pushed, strict=True):
         place = complex(frame.A @ e) + frame.c - system.anchor
         force += f

@@ -69,7 +69,11 @@ def kinetic_energy(M: Real, v: Real) -> float:
     return 0.5 * float(v @ M @ v)
 
 
-def mass_accelerations(A: Complex, e: Complex, w: Real | Complex, dw: Real | Complex) -> Complex:
-    """Accelerations z'' = A (i e w' - e w^2) of the mass points [m/s^2]."""
-    result: Complex = A @ (1j * e * dw - e * w * w)
+def mass_accelerations(A: Complex, e: Complex, w: Real | Complex, change: Complex) -> Complex:
+    """Accelerations z'' = A (i p' - e w^2) of the mass points [m/s^2].
+
+    p' are the changes e w' of the arms, as :meth:`prbm.mechanics.system.System.swing` returns them
+    for the accelerations.
+    """
+    result: Complex = A @ (1j * change - e * w * w)
     return result

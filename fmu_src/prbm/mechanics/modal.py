@@ -40,7 +40,7 @@ class Modes:
     @property
     def rounding(self) -> float:
         """Frequency below which a frequency is round-off: the mode is free [Hz]."""
-        return ZERO_FREQUENCY_RTOL * float(np.abs(self.frequency).max())
+        return ZERO_FREQUENCY_RTOL * float(np.abs(self.frequency).max(initial=0.0))
 
 
 def modes(system: System, shape: Equilibrium) -> Modes:
@@ -66,10 +66,12 @@ def modes(system: System, shape: Equilibrium) -> Modes:
 def _modes(system: System, e: Complex, M: Real, B: Complex, lam: Real, w: Complex) -> Modes:
     """Solve K_t phi = omega^2 M phi for phi on the tangent space of the loops.
 
+    Bodies that nothing connects to the ground do not move.
     The tangent stiffness K_t is that of the loads w and of the multipliers lam along B.
     """
     K_t = tangent_stiffness(system.K, w, B, lam, e, system.arm, system.Phi)
-    return vibrations(M, K_t, system.loop_rows.jacobian(e))
+    still = np.eye(system.n)[system.placed]
+    return vibrations(M, K_t, np.vstack([system.loop_rows.jacobian(e), still]))
 
 
 def vibrations(M: Real, K_t: Real, rows: Real) -> Modes:
@@ -180,7 +182,7 @@ def fundamental_frequency(system: System) -> float:
     It is zero if that equilibrium is unstable, or if a motion deforms no spring.
     """
     found = modes(system, equilibrium(system))
-    lowest = float(found.frequency[0])
+    lowest = float(found.frequency[0]) if len(found.frequency) else 0.0
     return lowest if lowest > found.rounding else 0.0
 
 
@@ -197,7 +199,7 @@ def slow_rates(system: System) -> tuple[float, float]:
     """
     found = modes(system, equilibrium(system))
     frequency, least = found.frequency, found.rounding
-    if frequency[0] < -least:
+    if len(frequency) and frequency[0] < -least:
         return (-2 * math.pi * float(frequency[0]),) * 2
     speed = abs(value(system.mechanism.release, "velocity", system.values))
     fall = math.sqrt(abs(system.gravity) / system.length)
@@ -213,11 +215,13 @@ def fundamental_at(system: System, q: Real) -> tuple[Real, Real]:
     Returns
     -------
     phi : (n,)
-        Mass-normalised mode.
+        Mass-normalised mode; zeros if all bodies are free.
     M : (n, n)
         Mass matrix [kg m^2].
     """
     found = modes_at(system, q)
+    if not len(found.frequency):
+        return np.zeros(system.n), found.M
     return found.shape[:, 0], found.M
 
 

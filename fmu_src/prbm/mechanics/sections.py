@@ -149,10 +149,10 @@ def static_section_loads(
 def point_loads(equations: Equations, e: Complex, v: Real, a: Real) -> Complex:
     """Return gravity, inertia and mass-proportional damping of all mass points, (p,) [N]."""
     system = equations.system
-    w, dw = system.turning(v), system.turning(a)
-    change = system.gravity - equations.inputs.base - mass_accelerations(system.A, e, w, dw)
+    bent = mass_accelerations(system.A, e, system.turning(v), system.swing(e, a))
+    change = system.gravity - equations.inputs.base - bent
     if equations.mass_damping:
-        change = change - equations.mass_damping * 1j * (system.A @ (e * w))
+        change = change - equations.mass_damping * 1j * (system.A @ system.swing(e, v))
     result: Complex = system.m * change
     return result
 

@@ -8,6 +8,9 @@ with the springs K, the row w of gravity and the forces, the moments Q (those of
 included), the Jacobian J of the loops and their forces lam, the Jacobian r of the held displacement
 and the holding force F.  Second derivatives by the directions couple at most the angle and the
 stretch of one arm, because every position is linear in the arms.
+
+Bodies that nothing connects to the ground are placed: no balance determines their displacements and
+rotations.  They are as drawn, or at the displacement or rotation of the release.
 """
 
 import math
@@ -42,6 +45,7 @@ from .direction_map import DirectionMap
 from .forces import field_row, force_row, springs
 from .inputs import checked_loads
 from .system import System, values
+from .system import unit as unit_vector
 
 _Given = tuple[float | None, Complex, Real]  # Displacement, row of the loads, moments.
 
@@ -81,7 +85,7 @@ def tangent_stiffness(
     r"""Stiffness about a shape, K + Phi^T D Phi with D = diag(Im(w e) + Re(lam^T B e)) [N m/rad].
 
     An arm with g = Im(w e) + Re(lam^T B e) and h = Im(lam^T B e) - Re(w e) has the diagonal entries
-    g for its angle and -g for its stretch, and h couples both.
+    g for its angle and -g for its stretch, and h couples both.  Displacements have none.
 
     Parameters
     ----------
@@ -113,8 +117,9 @@ def tangent_stiffness(
     if arm is not None:
         k = np.flatnonzero(arm != np.arange(len(arm)))
         a = arm[k]
-        D[k, k] = -pull[a].real
-        D[k, a] = D[a, k] = pull[a].imag
+        turns = 1.0 if Phi is None else Phi.Phi[a].any(axis=1) * 1.0  # Not displacements.
+        D[k, k] = -turns * pull[a].real
+        D[k, a] = D[a, k] = turns * pull[a].imag
     return K + (D if Phi is None else Phi.congruence(D))
 
 
@@ -161,7 +166,8 @@ def equilibrium(
     closed = np.abs(open_by).max(initial=0.0) <= STATICS_CONSTRAINT_RTOL * system.length
     if closed and near is None and not loaded:
         return Equilibrium(system.q0, np.zeros(len(system.loops)), 0.0, w)
-    if displacement is not None:
+    holding = displacement is not None and not system.released_free
+    if holding and displacement is not None:
         if held_by_loops(system):  # The matrix of the balance would be singular.
             raise EquilibriumError(f"{_release_text(system, displacement)}: {immobile(system)}")
         if displacement != 0.0 and turns_about_point(system):
@@ -175,17 +181,17 @@ def equilibrium(
         return None if displacement is None else share * displacement, share * w, share * moment
 
     done = 0.0
-    if near is not None and displacement is not None:
+    if near is not None and displacement is not None and holding:
         begin = system.amount(near.q)
         change = displacement - begin
         state = np.concatenate([near.q, near.lam, [near.force / unit]])
         state, done = _follow(system, lambda share: (begin + share * change, w, moment), state)
     if done < 1.0:
-        straight = np.concatenate([system.q0, np.zeros(r + (displacement is not None))])
+        straight = np.concatenate([system.q0, np.zeros(r + holding)])
         state, done = _load_fully(system, from_straight, straight)
     if done < 1.0:
         raise EquilibriumError(_unreachable(system, displacement, bool(loads), done))
-    force = unit * float(state[n + r]) if displacement is not None else 0.0
+    force = unit * float(state[n + r]) if holding else 0.0
     return Equilibrium(state[:n], state[n : n + r], force, w)
 
 
@@ -255,7 +261,7 @@ def _follow(
 def _determinant_sign(system: System, given: _Given, state: Real) -> int:
     """Return the sign of the determinant of the balance in a state; 0 if it is singular."""
     held, w, _ = given
-    B = system.loops if held is None else np.vstack([system.loops, system.holding(held)[0]])
+    B = _holding_rows(system, held)[0]
     kkt = _linear_balance(system, state[: system.n], w, B, state[system.n :])
     return constraints.determinant_sign(kkt, system.n, system.length)
 
@@ -265,7 +271,41 @@ def _linear_balance(system: System, q: Real, w: Complex, B: Complex, lam: Real) 
     e = system.directions(q)
     rows = system.gradient(B, e)
     K_t = tangent_stiffness(system.K, w, B, lam, e, system.arm, system.Phi)
-    return constraints.saddle(K_t, rows, rows)
+    return _placed(system, constraints.saddle(K_t, rows, rows))
+
+
+def _holding_rows(system: System, held: float | None) -> tuple[Complex, Real]:
+    """Return B, c of the loops and, if a force holds the released body, of its displacement."""
+    B, c = system.loops, system.loops_c
+    if held is None or system.released_free:
+        return B, c
+    row, constant = system.holding(held)
+    return np.vstack([B, row]), np.append(c, constant)
+
+
+def _places(system: System, amount: float) -> Real:
+    """Return the coordinates that are placed, at a displacement [m] or rotation [rad].
+
+    The released body is displaced or turned, if it is among them; the others are as drawn.
+    """
+    q, release = system.q0.copy(), system.mechanism.release
+    if system.released_free and release.turns:
+        q[system.released.j] += amount
+    elif system.released_free:
+        k = system.placed.tolist().index(system.released.j)
+        shift = amount * unit_vector(release.direction) / system.length
+        q[system.placed[k - 2 : k]] += shift.real, shift.imag
+    return q[system.placed]
+
+
+def _placed(system: System, kkt: Real) -> Real:
+    """Return the balance without the coordinates that are placed: their changes are zero."""
+    placed = system.placed
+    if len(placed):
+        scale = float(np.abs(kkt[: system.n, : system.n]).max()) or 1.0
+        kkt[placed], kkt[:, placed] = 0.0, 0.0
+        kkt[placed, placed] = scale
+    return kkt
 
 
 def _holding_unit(system: System) -> float:
@@ -302,18 +342,17 @@ def _newton(
     """Find the equilibrium under a load (row w, moments); None without convergence."""
     n = system.n
     w, moment = load
-    B, c = system.loops, system.loops_c
-    if held is not None:
-        row, constant = system.holding(held)
-        B, c = np.vstack([B, row]), np.append(c, constant)
+    B, c = _holding_rows(system, held)
     springs_scale = STATICS_FORCE_RTOL * float(np.abs(system.K).max())
     state, turn = start.copy(), math.inf
+    state[system.placed] = _places(system, held or 0.0)
     for _ in range(STATICS_ITERATIONS_MAX):
         q, lam = state[:n], state[n:]
         e = system.directions(q)
         rows = system.gradient(B, e)
         loads = system.Phi.pull((w * e).real) + moment
         torque = springs(system.K, q - system.q0) + loads + lam @ rows
+        torque[system.placed] = 0.0
         open_by = values(B, c, e)
         closed = (
             not len(open_by) or np.abs(open_by).max() <= STATICS_CONSTRAINT_RTOL * system.length
@@ -325,7 +364,7 @@ def _newton(
         if balanced and turn <= STATICS_STEP_ATOL:
             return state
         K_t = tangent_stiffness(system.K, w, B, lam, e, system.arm, system.Phi)
-        kkt = constraints.saddle(K_t, rows, rows)
+        kkt = _placed(system, constraints.saddle(K_t, rows, rows))
         try:
             right = np.concatenate([torque, -open_by])
             change = constraints.solve(kkt, right, n, system.length)
@@ -344,7 +383,7 @@ def _holds(system: System, held: float | None, state: Real) -> bool:
 
     The sine that holds a rotation vanishes there, too.
     """
-    if held is None or not system.mechanism.release.turns:
+    if held is None or not system.mechanism.release.turns or system.released_free:
         return True
     return abs(system.amount(state[: system.n]) - held) < STATICS_TURN_MAX
 
@@ -436,6 +475,10 @@ def _turning_message(system: System) -> str:
 
 def immobile(system: System) -> str:
     """Return why the released body, as drawn, cannot be held, and a remedy."""
+    if system.released_free:
+        return (
+            f"the body {system.mechanism.release.body} flies freely, and is placed without a force"
+        )
     if system.mechanism.release.turns:
         return (
             f"the body {system.mechanism.release.body} cannot turn; give release.displacement "

@@ -1,26 +1,34 @@
 r"""The constant arrays of a mechanism, and the scalars that they define (gaps, loop closures).
 
-A direction is the absolute angle theta of an arm, or its stretch s, which is the logarithm of its
-length divided by its drawn length.  Directions are a constant linear map of the coordinates, see
-:mod:`prbm.mechanics.direction_map`.  Each link and body has one arm; its directions are coordinates
-themselves.  An arm is
+A direction is the absolute angle theta of an arm, its stretch s, which is the logarithm of its
+length divided by its drawn length, or a displacement u of an arm that floats.  Directions are a
+constant linear map of the coordinates, see :mod:`prbm.mechanics.direction_map`.  Each link and body
+has one arm; its directions are coordinates themselves.  An arm is
 
     E = exp(s + i theta),       E' = i w E,     w = theta' - i s',
 
-with s = 0 for arms that do not stretch.  Every position is z = c + A E with constant c, A.  Every
-scalar that is constrained, watched or reported (loop closures, gaps, displacements) therefore has
-one form,
+with s = 0 for arms that do not stretch.  The arm of a body that nothing connects to the ground
+floats: E = u_x + i u_y is the displacement of its centre of mass, so that it may vanish, and
+E' = i p with p = u_y' - i u_x'; for other arms, p = w E.  Its displacements are coordinates times
+the size of the mechanism, so that no coordinate has a unit.
 
-    x = Re(B E) + c,      x' = -Im(B E w),      x'' = -Im(B E w') - Re(B E w^2).
+Every position is z = c + A E with constant c, A.  Every scalar that is constrained, watched or
+reported (loop closures, gaps, displacements) therefore has one form,
+
+    x = Re(B E) + c,      x' = -Im(B p),      x'' = -Im(B p') = -Im(B E w') - Re(B E w^2).
+
+An arm that floats adds to the part of p' with the accelerations only: its w is zero.
 
 A scalar that is measured relative to a moving body, for example a gap to a wall on a body, is
 
     x = Re(f (B E + z)) + c,    f = conj(E of that body).
 
 Arrays have a column for every direction.  The vector e contains E for the angle of an arm and
--i E for its stretch, so that the derivative of E by its direction is i e for both.  The columns of
-A and B at stretches are zero; :meth:`System.spread` replaces them by the columns of the arms.  Then
-dx/dtheta = -Im(spread(B) e), and dx/dq = dx/dtheta Phi.
+-i E for its stretch, and -i and 1 for the displacements along x and y of an arm that floats, so
+that the derivative of E by its direction is i e for all.  (An arm that floats has no direction of
+its own: its angle depends on no coordinate, and its element of e is E.)  The columns of A and B at
+stretches and displacements are zero; :meth:`System.spread` replaces them by the columns of the
+arms.  Then dx/dtheta = -Im(spread(B) e), and dx/dq = dx/dtheta Phi.
 """
 
 import cmath
@@ -39,6 +47,7 @@ from .kinetics import turned_moments
 
 ANGLE = ("angle", "omega")  # Names of the variables of a coordinate that is an angle.
 STRAIN = ("strain", "strain_rate")  # Those of a coordinate that is a stretch.
+SHIFTS = ("x", "vx"), ("y", "vy")  # Those of the coordinates of an arm that floats.
 FIXED = -1  # In place of a direction: fixed to the ground.
 
 
@@ -218,17 +227,21 @@ class Rows:
         return result
 
     def reach(self) -> Real:
-        """Return the largest |dx/dq| with arms of their drawn length, (r, n) [m/rad]."""
-        most = np.abs(self.spread)
-        most[self.carried, self.on] += np.abs(self.B).sum(axis=1)[self.carried] + np.abs(self.z)
+        """Return the largest |dx/dq| with arms of their drawn length, (r, n) [m/rad].
+
+        That of arms that float is the size.
+        """
+        most, lengths = np.abs(self.spread), np.ones(self.system.d)
+        lengths[self.system.floats] = self.system.length
+        most[self.carried, self.on] += (np.abs(self.B) @ lengths)[self.carried] + np.abs(self.z)
         return most @ np.abs(self.system.Phi.Phi)
 
     def rates(self, e: Complex, v: Real) -> Real:
         """Return x' [m/s], (..., r); e and v may be stacks (..., d), (..., n)."""
-        w = self.system.turning(v)
-        y: Complex = (e * w) @ self.B.T
+        y: Complex = self.system.swing(e, v) @ self.B.T
         if len(self.carried):
             f = e[..., self.on].conj()
+            w = self.system.turning(v)
             turned = w[..., self.on].real * self._carried_values(e @ self.B.T, e)
             y[..., self.carried] = f * y[..., self.carried] - turned
         return -y.imag
@@ -238,23 +251,25 @@ class Rows:
         w = self.system.turning(v)
         result = convective(self.B, e, w)
         if len(self.carried):
-            result[self.carried] = self._carried_convective(e, w)
+            result[self.carried] = self._carried_convective(e, v)
         return result
 
-    def terms(self, e: Complex, w: Real | Complex) -> tuple[Real, Real]:
-        """Return :meth:`jacobian` and :meth:`convective` for the rates w (d,) of the arms."""
+    def terms(self, e: Complex, v: Real) -> tuple[Real, Real]:
+        """Return :meth:`jacobian` and :meth:`convective` for rates v (n,) of the coordinates."""
+        w = self.system.turning(v)
         turned = self.spread * e
         slopes, bent = -turned.imag, turned.dot(w * w).real
         if len(self.carried):
             slopes[self.carried] = self._carried_by_direction(e)
-            bent[self.carried] = self._carried_convective(e, w)
+            bent[self.carried] = self._carried_convective(e, v)
         return self.system.Phi.pull(slopes), bent
 
-    def _carried_convective(self, e: Complex, w: Real | Complex) -> Real:
+    def _carried_convective(self, e: Complex, v: Real) -> Real:
         """Return the convective terms of the carried rows [m/s^2]."""
-        f, turn = e[self.on].conj(), w[self.on].real
-        B = self.B[self.carried]
-        bent = ((w - turn[:, None]) ** 2 * (B * e)).sum(axis=1) + turn**2 * self.z
+        w, p = self.system.turning(v), self.system.swing(e, v)
+        f, turn = e[self.on].conj(), w[self.on].real[:, None]
+        seen = e * w**2 - 2.0 * turn * p + turn**2 * e  # (w - turn)^2 E of arms that do not float.
+        bent = (self.B[self.carried] * seen).sum(axis=1) + turn[:, 0] ** 2 * self.z
         result: Real = (f * bent).real
         return result
 
@@ -267,13 +282,17 @@ class System:
     ----------
     q0 : (n,)
         Coordinates of the straight shape: absolute angles, counter-clockwise from +x [rad], and
-        stretches, which are zero there [-].
+        stretches and displacements over the size, which are zero there [-].
     rest : (n,)
         Coordinates at which no spring has a force: q0, but the initial strains [rad], [-].
     Phi : DirectionMap
         The map from coordinates to directions.
     arm : (d,) int
-        Index of the arm that a direction turns or stretches.
+        Index of the arm that a direction turns, stretches or displaces.
+    floats : (b,) int
+        Arms that float.
+    placed : (3 b,) int
+        The coordinates of the bodies on these arms: displacements along x and y, and rotation.
     H : (d, d) complex
         A^H diag(m) A with the columns of A spread, Hermitian [kg m^2].
     J : (d,)
@@ -327,6 +346,8 @@ class System:
     rest: Real
     Phi: DirectionMap
     arm: Whole
+    floats: Whole
+    placed: Whole
     H: Complex
     J: Real
     K: Real
@@ -405,10 +426,20 @@ class System:
         return Rows(self, self.loops, self.loops_c)
 
     @cached_property
-    def stretches(self) -> Whole:
-        """The directions that are stretches."""
+    def shared(self) -> Whole:
+        """The directions that have no arm of their own: stretches and displacements."""
         result: Whole = np.flatnonzero(self.arm != np.arange(self.d))
         return result
+
+    @cached_property
+    def shifts(self) -> Whole:
+        """The displacements of arms that float, along x and y in turn."""
+        return self.shared[np.isin(self.arm[self.shared], self.floats)]
+
+    @cached_property
+    def stretches(self) -> Whole:
+        """The directions that are stretches."""
+        return self.shared[~np.isin(self.arm[self.shared], self.floats)]
 
     @cached_property
     def strains(self) -> Whole:
@@ -419,12 +450,24 @@ class System:
     @property
     def variables(self) -> tuple[tuple[str, str], ...]:
         """The names of each coordinate and its rate, such as link[1].angle and link[1].omega."""
-        strains = set(self.strains.tolist())
+        kinds = dict.fromkeys(self.strains.tolist(), STRAIN)
+        for place in self.placed.reshape(-1, 3).tolist():
+            kinds |= zip(place, SHIFTS, strict=False)
         return tuple(
             (f"{owner}.{x}", f"{owner}.{rate}")
             for j, owner in enumerate(self.owners)
-            for x, rate in [STRAIN if j in strains else ANGLE]
+            for x, rate in [kinds.get(j, ANGLE)]
         )
+
+    @cached_property
+    def units(self) -> Real:
+        """What the variable of a coordinate is for each unit of the coordinate, (n,).
+
+        It is the size for displacements [m], which are coordinates over the size, otherwise 1.
+        """
+        result = np.ones(self.n)
+        result[self.placed.reshape(-1, 3)[:, :2]] = self.length
+        return result
 
     @cached_property
     def _exponents(self) -> tuple[Complex, Complex]:
@@ -438,17 +481,27 @@ class System:
         exponents[stretched] += self.Phi.Phi[self.stretches]
         exponents[self.stretches] = exponents[stretched]
         factors[self.stretches] = -1j
+        exponents[self.shifts] = 0.0
+        factors[self.shifts[::2]] = -1j  # Along x; along y the factor is 1.
         return exponents.T.copy(), factors
+
+    def _floating(self, x: Real) -> Complex:
+        """Return displacements u_x + i u_y of the arms that float for coordinates or rates x."""
+        u = x @ self.Phi.Phi[self.shifts].T
+        result: Complex = u[..., ::2] + 1j * u[..., 1::2]
+        return result
 
     @cached_property
     def _turns(self) -> Complex:
         """The map from rates to theta' - i s' of the arms, (n, d); zero for stretches."""
         turns = -1j * self._exponents[0]
-        turns[:, self.stretches] = 0.0
+        turns[:, self.shared] = 0.0
         return turns
 
     def directions(self, q: Real) -> Complex:
         """Return e: the arms exp(s + i theta) for angles, and -i times the arms for stretches.
+
+        For displacements along x and y of an arm that floats they are -i and 1.
 
         Parameters
         ----------
@@ -464,15 +517,18 @@ class System:
         A link that stands up, stretched by 1 %:
 
         >>> bar = object.__new__(System)
-        >>> vars(bar).update(arm=np.array([0, 0]), Phi=DirectionMap(np.eye(2)))
+        >>> none = np.zeros(0, int)
+        >>> vars(bar).update(arm=np.array([0, 0]), floats=none, Phi=DirectionMap(np.eye(2)))
         >>> e = bar.directions(np.array([np.pi / 2, np.log(1.01)]))
         >>> bool(abs(e - [1.01j, 1.01]).max() < 1e-15)
         True
         """
-        if len(self.stretches):
+        if len(self.shared):
             exponents, factors = self._exponents
             e: Complex = np.exp(q @ exponents)
             e *= factors
+            if len(self.floats):
+                e[..., self.floats] = self._floating(q)
             return e
         theta = self.Phi.of(q)
         turned = np.empty(theta.shape, complex)
@@ -482,12 +538,23 @@ class System:
     def turning(self, v: Real) -> Real | Complex:
         """Return the rates w = theta' - i s' of the arms (..., d) for rates v (..., n) [1/s].
 
-        The entries of stretches are zero.  Without stretches the result is real.
+        The entries of stretches, of displacements and of arms that float are zero.  Without these
+        the result is real.
         """
-        if len(self.stretches):
+        if len(self.shared):
             w: Complex = v @ self._turns
             return w
         return self.Phi.of(v)
+
+    def swing(self, e: Complex, v: Real) -> Complex:
+        """Return p (..., d) of the arms, whose velocities are E' = i p, for rates v (..., n).
+
+        The same with accelerations a (n,) in place of v gives the part of E'' that depends on them.
+        """
+        p: Complex = e * self.turning(v)
+        if len(self.floats):
+            p[..., self.floats] = -1j * self._floating(v)
+        return p
 
     def mass_matrix(self, e: Complex) -> Real:
         """Return the mass matrix M, (n, n) [kg m^2]."""
@@ -500,11 +567,11 @@ class System:
     def motion(self, frame: BodyFrame, e: Complex, v: Real) -> tuple[complex, complex]:
         """Return the displacement from the straight shape [m] and the velocity [m/s] of a point."""
         displacement = complex(frame.A @ e) + frame.c - frame.drawn
-        return displacement, complex(1j * (frame.A @ (e * self.turning(v))))
+        return displacement, complex(1j * (frame.A @ self.swing(e, v)))
 
     def spread(self, B: Complex) -> Complex:
-        """Return rows with the column of each arm repeated for its stretch."""
-        return B[..., self.arm] if len(self.stretches) else B
+        """Return rows with the column of each arm repeated for its stretch or displacements."""
+        return B[..., self.arm] if len(self.shared) else B
 
     def holding(self, amount: float) -> tuple[Complex, float]:
         """Return B, c of the constraint Re(B E) + c = 0 that holds the released body.
@@ -525,6 +592,11 @@ class System:
         row = np.zeros(self.d, complex)
         row[arm] = -1j * self.length * np.exp(-1j * (self.q0[j] + amount))
         return row, 0.0
+
+    @property
+    def released_free(self) -> bool:
+        """Whether the released body is one of those that are placed, not held by a force."""
+        return self.released.j in self.placed
 
     def amount(self, q: Real) -> float:
         """Return the displacement [m] or, if the release is by an angle, the rotation [rad]."""

@@ -144,6 +144,12 @@ class Mechanism:
         if len(self.gravity) != 2:
             raise MechanismError(f"gravity = {self.gravity!r} must have an x and a y component")
         self._check_references()
+        if self.damping_zeta and self.free_bodies:
+            raise MechanismError(
+                f"damping_zeta = {self.damping_zeta:g}: damping in proportion to mass would slow "
+                f"the flight of {', '.join(self.free_bodies)}, which no flexures or joints connect "
+                "to the ground; use damping_beta, or connect them"
+            )
         self._check_names()
         known = {p.name: p for p in self.parameters}
         given = dict(self._quantities())
@@ -178,8 +184,9 @@ class Mechanism:
                     yield Parameter(
                         f"{kind.name}.{c.name}", value, "", c.description, c.minimum, c.maximum
                     )
-        for body in self.bodies:
-            yield from _fields(body)
+        jointed: tuple[Part, ...] = (*self.bodies, *self.joints)
+        for part in jointed:
+            yield from _fields(part)
         for axis, g in zip("xy", self.gravity, strict=True):
             yield Parameter(
                 f"gravity.{axis}", g, "m/s2", f"Acceleration of gravity along {axis}",
@@ -194,8 +201,10 @@ class Mechanism:
         )  # fmt: skip
         yield Parameter(
             "damping.zeta", self.damping_zeta, "",
-            "Damping ratio of the fundamental mode, from mass-proportional damping", 0.0, 10.0,
-            tunable=True,
+            "Damping ratio of the fundamental mode, from mass-proportional damping; 0 with bodies "
+            "that fly freely" if self.free_bodies else
+            "Damping ratio of the fundamental mode, from mass-proportional damping",
+            0.0, 0.0 if self.free_bodies else 10.0, tunable=True,
         )  # fmt: skip
         yield Parameter(
             "damping.beta", self.damping_beta, "s",
@@ -249,8 +258,24 @@ class Mechanism:
 
     def _parts(self) -> tuple[Part, ...]:
         """Return the parts whose fields are parameters or expressions."""
-        parts: tuple[Part, ...] = (*self.flexure_types, *self.bodies, *self.frictions)
-        return (*parts, *self.stops, self.release)
+        parts: tuple[Part, ...] = (*self.flexure_types, *self.bodies, *self.joints)
+        return (*parts, *self.frictions, *self.stops, self.release)
+
+    @cached_property
+    def free_bodies(self) -> tuple[str, ...]:
+        """Names of the bodies that no flexures or joints connect to the ground."""
+        neighbours: dict[str, list[str]] = {}
+        parts: tuple[Flexure | Joint, ...] = (*self.flexures, *self.joints)
+        for part in parts:
+            ends = body_of(part.start), body_of(part.end)
+            for one, other in (ends, ends[::-1]):
+                neighbours.setdefault(one, []).append(other)
+        held, waiting = {GROUND}, [GROUND]
+        while waiting:
+            found = {*neighbours.get(waiting.pop(), ())} - held
+            held |= found
+            waiting += found
+        return tuple(body.name for body in self.bodies if body.name not in held)
 
     # -- checks --
 
@@ -277,8 +302,8 @@ class Mechanism:
 
     def _check_references(self) -> None:
         """Reject undefined references and inconsistent parts."""
-        if not self.bodies or not self.flexures:
-            raise MechanismError(f"{self.name} needs at least one body and one flexure")
+        if not self.bodies:
+            raise MechanismError(f"{self.name} needs at least one body")
         for kind in self.flexure_types:
             self._check_type(kind)
         types = {kind.name: kind for kind in self.flexure_types}
@@ -286,7 +311,6 @@ class Mechanism:
             self._check_flexure(flexure, types)
         for joint in self.joints:
             self._check_connection("joint", joint)
-        self._check_held()
         for probe in self.probes:
             self.point(probe.point, probe.name)
         self._check_attached({body.name: body for body in self.bodies})
@@ -413,26 +437,6 @@ class Mechanism:
                 "bodies"
             )
 
-    def _check_held(self) -> None:
-        """Reject bodies that no flexures or joints connect to the ground."""
-        neighbours: dict[str, list[str]] = {}
-        parts: tuple[Flexure | Joint, ...] = (*self.flexures, *self.joints)
-        for part in parts:
-            ends = body_of(part.start), body_of(part.end)
-            for one, other in (ends, ends[::-1]):
-                neighbours.setdefault(one, []).append(other)
-        held, waiting = {GROUND}, [GROUND]
-        while waiting:
-            found = {*neighbours.get(waiting.pop(), ())} - held
-            held |= found
-            waiting += found
-        for body in self.bodies:
-            if body.name not in held:
-                raise MechanismError(
-                    f"the body {body.name} is not held: no flexures or joints connect it to the "
-                    "ground; add one, or remove the body"
-                )
-
     def check_rigid(self, use: str) -> None:
         """Reject compliant stops, for a computation that has rigid impacts only.
 
@@ -452,6 +456,26 @@ class Mechanism:
                     f'{stop.name}.law = "{stop.law}": {use} has rigid impacts only; choose the '
                     "law rigid, or simulate the mechanism"
                 )
+
+    def check_connected(self, use: str) -> None:
+        """Reject free bodies, for a computation that needs a force or a flexure to hold each body.
+
+        Parameters
+        ----------
+        use : str
+            The computation, with an article.
+
+        Raises
+        ------
+        MechanismError
+            If no flexures or joints connect a body to the ground.
+        """
+        if self.free_bodies:
+            raise MechanismError(
+                f"{use} has no bodies that fly freely: no flexures or joints connect "
+                f"{', '.join(self.free_bodies)} to the ground; connect them, or simulate the "
+                "mechanism"
+            )
 
     def point(self, reference: str, user: str) -> Point:
         """Return the coordinates of the point ``body.point`` as drawn [m].

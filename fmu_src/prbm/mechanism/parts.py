@@ -178,11 +178,16 @@ class Flexure:
 
 @dataclass(frozen=True)
 class Joint:
-    """A pin between two points, each ``body.point``, that are drawn at the same position."""
+    """A pin between two points, each ``body.point``, that are drawn at the same position.
+
+    With a torsional ``stiffness`` [N m/rad], a spring without a moment in the drawn shape joins the
+    bodies.
+    """
 
     name: str
     start: str
     end: str
+    stiffness: Quantity | None = None
 
 
 @dataclass(frozen=True)
@@ -405,6 +410,11 @@ FIELDS: dict[type, dict[str, tuple[str, str, float, float, float | None, bool]]]
         "mass": _meta("kg", "Mass", MASS_MIN, 1e6, 0.1),
         "inertia": _meta(
             "kg.m2", "Moment of inertia about the centre of mass", 1e-30, 1e9, 1e-4
+        ),
+    },
+    Joint: {
+        "stiffness": _meta(
+            "N.m/rad", "Torsional stiffness, without a moment in the drawn shape", 0.0, 1e12, 1.0
         ),
     },
     Stop: {

@@ -151,7 +151,7 @@ def motion(
         )
     q = np.zeros((len(time), system.n))
     for name, j in columns_of.items():
-        q[:, j] = columns[name]
+        q[:, j] = columns[name] / system.units[j]
     if not np.isfinite(q).all():
         raise ResultError("the result has angles that are not finite numbers")
     q = stretched(system, q, _displacements(system, columns))

@@ -265,6 +265,8 @@ def _free(columns: Columns, system: System) -> list[str]:
     frequency = column(columns, FREQUENCY)[0]
     if frequency == 0.0:
         found = modes(system, equilibrium(system))
+        if not len(found.frequency):
+            return ["fundamental          none: all bodies fly freely"]
         if found.frequency[0] >= -found.rounding:
             return ["fundamental          none: without stops, a motion deforms no flexure"]
         weight = " under gravity" if system.gravity else ""

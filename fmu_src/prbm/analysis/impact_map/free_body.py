@@ -61,6 +61,7 @@ def closed_form(
           mode along the path.
     """
     mechanism.check_rigid("the closed form")
+    mechanism.check_connected("the closed form")
     which = MovedStop.of(mechanism, stop)
     s = mechanism.stops[which.index]
     if s.on != GROUND:

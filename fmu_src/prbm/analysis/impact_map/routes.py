@@ -114,6 +114,7 @@ def algebraic(
         If a wall cannot be reached by a force on the released body.
     """
     mechanism.check_rigid("the algebraic map")
+    mechanism.check_connected("the algebraic map")
     which = MovedStop.of(mechanism, stop)
     count = point_counter(progress, len(walls) * len(offsets))
 
@@ -153,6 +154,7 @@ def by_elements(
         If Exudyn is not installed.
     """
     mechanism.check_rigid("the map by finite elements")
+    mechanism.check_connected("the map by finite elements")
     which = MovedStop.of(mechanism, stop)
     count = point_counter(progress, len(walls) * len(offsets))
 

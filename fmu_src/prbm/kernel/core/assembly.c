@@ -12,7 +12,13 @@
 #include "core/matrix.h"
 #include "core/vectors.h"
 
-/* --- flexures and joints, from the ground outwards -------------------------------------------- */
+/* --- flexures, joints and free bodies, from the ground outwards ------------------------------- */
+
+/* Return the coordinate that rotates a body; FIXED: the ground. */
+static int rotation_of_body(const System *system, int body) {
+    int j = system->origins[body].j;
+    return j == FIXED ? FIXED : angle_of(system, j);
+}
 
 static bool walk_joint(System *system, const Step *step, Scratch *scratch, Problem *problem) {
     Span span = span_of(system, step);
@@ -31,7 +37,34 @@ static bool walk_joint(System *system, const Step *step, Scratch *scratch, Probl
     } else {
         reach(system, span.far, &spot, span.z_end, step->first_direction);
     }
+    if (step->joint->elastic) {
+        add_spring(system, evaluate(step->joint->stiffness, system->values),
+                   rotation_of_body(system, span.root), rotation_of_body(system, span.far));
+    }
     return true;
+}
+
+/* Place a free body at its centre of mass, with an arm that floats. */
+static void walk_free_body(System *system, const Step *step, Scratch *scratch) {
+    const int arm = step->first_direction, turn = arm + 1 + SHIFTS_EACH;
+    const int *first = system->mechanism->map.first;
+    Place spot = new_place(system, scratch);
+    Complex drawn = at_point(system, system->mechanism->bodies[step->body - 1].centre);
+    for (int j = arm + 1; j < turn; j++) {
+        system->factors[first[j]] = system->length;
+    }
+    extend(&spot, FIXED, drawn);
+    extend(&spot, arm, complex_of(1.0, 0.0));
+    reach(system, step->body, &spot, drawn, turn);
+}
+
+static bool walk_step(System *system, const Step *step, Scratch *scratch, Problem *problem) {
+    if (step->body != GROUND) {
+        walk_free_body(system, step, scratch);
+        return true;
+    }
+    return step->flexure ? walk_flexure(system, step, scratch, problem)
+                         : walk_joint(system, step, scratch, problem);
 }
 
 static bool walk_all(System *system, Scratch *scratch, Problem *problem) {
@@ -39,12 +72,10 @@ static bool walk_all(System *system, Scratch *scratch, Problem *problem) {
     bool ok = true;
     system->r = 0;
     clear_branches(system);
-    for (int i = 0; ok && i < m->flexure_count + m->joint_count; i++) {
+    for (int i = 0; ok && i < m->step_count; i++) {
         size_t mark = scratch->used;
-        const Step *step = &m->steps[i];
         begin_branch(system, i);
-        ok = step->flexure ? walk_flexure(system, step, scratch, problem)
-                           : walk_joint(system, step, scratch, problem);
+        ok = walk_step(system, &m->steps[i], scratch, problem);
         scratch->used = mark;
     }
     system->r = m->loop_count;
@@ -285,11 +316,13 @@ static void add_moments(System *system, Scratch *scratch) {
 }
 
 /* Return the size of the drawn mechanism [m]: the largest distance between points of the ground and
- * centres of mass, but at least the length of the longest flexure. */
+ * centres of mass, but at least the length of the longest flexure.  Without flexures, hit points
+ * count, too; if all points coincide, the size is 1 m. */
 static double size_of(const System *system, Scratch *scratch) {
     const Mechanism *m = system->mechanism;
     size_t mark = scratch->used;
-    int count = m->ground_count + m->body_count;
+    int others = m->ground_count + m->body_count;
+    int count = others + (m->flexure_count > 0 ? 0 : m->stop_count);
     Complex *points = take_complex(scratch, count, 1);
     double longest = 0.0;
     for (int i = 0; i < m->flexure_count; i++) {
@@ -299,13 +332,14 @@ static double size_of(const System *system, Scratch *scratch) {
     }
     for (int i = 0; i < count; i++) {
         points[i] = at_point(system, i < m->ground_count ? m->ground[i]
-                                                         : m->bodies[i - m->ground_count].centre);
+                                     : i < others ? m->bodies[i - m->ground_count].centre
+                                                  : m->stops[i - others].point);
         for (int k = 0; k < i; k++) {
             longest = greater(modulus(minus(points[i], points[k])), longest);
         }
     }
     scratch->used = mark;
-    return longest;
+    return longest > 0.0 ? longest : 1.0;
 }
 
 static Complex first_ground_end(const System *system) {
@@ -327,7 +361,7 @@ static const char *part_of(const Mechanism *m, int j) {
     if (body != GROUND) {
         return m->bodies[body - 1].name;
     }
-    int i = m->flexure_count + m->joint_count - 1;
+    int i = m->step_count - 1;
     while (m->steps[i].first > j) {
         i--;
     }
@@ -473,7 +507,7 @@ static void name_loops(const Mechanism *m, bool *repeated, char *text, size_t si
     for (size_t used = 0;;) {
         const char *next = NULL;
         int which = 0;
-        for (int i = 0, loop = 0; i < m->flexure_count + m->joint_count; i++) {
+        for (int i = 0, loop = 0; i < m->step_count; i++) {
             const Step *step = &m->steps[i];
             if (step->closes && repeated[loop] && (!next || strcmp(step->name, next) < 0)) {
                 next = step->name;

@@ -42,18 +42,19 @@ static void add_sizes(BranchSizes *sizes, int directions, int coordinates, bool 
 
 /* Return the end of the directions that a step adds. */
 static int end_of_step(const Mechanism *m, int step) {
-    bool last = step + 1 == m->flexure_count + m->joint_count;
+    bool last = step + 1 == m->step_count;
     return last ? m->direction_count : m->steps[step + 1].first_direction;
 }
 
 static BranchSizes branch_sizes(const Mechanism *m) {
     BranchSizes sizes = {0};
-    for (int i = 0; i < m->flexure_count + m->joint_count; i++) {
+    for (int i = 0; i < m->step_count; i++) {
         const Step *step = &m->steps[i];
         const FlexureType *kind = step->flexure ? kind_of(m, step->flexure) : NULL;
         int size = end_of_step(m, i) - step->first_direction;
         bool beam = kind && kind->order > 0;
-        add_sizes(&sizes, size, beam ? kind->order + 3 + kind->axial : size, beam);
+        bool mixed = beam || step->body != GROUND;
+        add_sizes(&sizes, size, beam ? kind->order + 3 + kind->axial : size, mixed);
     }
     return sizes;
 }
@@ -104,8 +105,8 @@ PRBM void clear_branches(System *system) {
 PRBM void begin_branch(System *system, int step) {
     const Step *added = &system->mechanism->steps[step];
     const Connection *between = added->between;
-    const int near = added->backwards ? between->end : between->start;
-    const int far = added->backwards ? between->start : between->end;
+    const int near = !between ? GROUND : added->backwards ? between->end : between->start;
+    const int far = !between ? added->body : added->backwards ? between->start : between->end;
     const int start = added->first_direction, end = end_of_step(system->mechanism, step);
     Branch *branch = &system->branches[system->branch_count];
     if (!system->mapped || start == end) {

@@ -57,7 +57,7 @@ PRBM double row_value(const Rows *rows, int i, const Complex *e) {
 }
 
 /* Return B E w of row i, with the complex rates w of the arms. */
-PRBM Complex swing(const Rows *rows, int i, const Complex *e, const double *v) {
+PRBM Complex row_swing(const Rows *rows, int i, const Complex *e, const double *v) {
     const System *system = rows->system;
     const Complex *B = rows->B + i * system->d;
     Complex sum = {0.0, 0.0};
@@ -69,12 +69,17 @@ PRBM Complex swing(const Rows *rows, int i, const Complex *e, const double *v) {
         Complex arm = product(B[arm_of(system, j)], e[j]);
         sum = plus(sum, scaled(direction_of(system, v, j), arm));
     }
+    for (int k = 0; k < system->shift_count; k++) {
+        int j = system->shifts[k];
+        Complex arm = product(B[arm_of(system, j)], e[j]);
+        sum = plus(sum, scaled(direction_of(system, v, j), arm));
+    }
     return sum;
 }
 
 PRBM double row_rate(const Rows *rows, int i, const Complex *e, const double *v) {
     int on = seen_from(rows, i);
-    Complex speed = swing(rows, i, e, v);
+    Complex speed = row_swing(rows, i, e, v);
     if (on == FIXED) {
         return -speed.im;
     }
@@ -126,6 +131,11 @@ PRBM double row_convective(const Rows *rows, int i, const Complex *e, const doub
         double rate = direction_of(system, v, a) - turn, strain = direction_of(system, v, j);
         Complex more = complex_of(-strain * strain, -2.0 * rate * strain);
         sum = plus(sum, product(more, product(B[a], e[a])));
+    }
+    for (int k = 0; on != FIXED && k < system->shift_count; k++) {
+        int j = system->shifts[k];
+        Complex arm = product(B[arm_of(system, j)], e[j]);
+        sum = plus(sum, scaled(-2.0 * turn * direction_of(system, v, j), arm));
     }
     return on == FIXED ? sum.re : product(conjugate(e[on]), sum).re;
 }

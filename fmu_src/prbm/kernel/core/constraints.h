@@ -72,6 +72,6 @@ PRBM bool project_velocities(int n, int r, const double *M, const double *rows,
                              Scratch *scratch, Problem *problem);
 PRBM int seen_from(const Rows *rows, int i);
 PRBM Complex seen_value(const Rows *rows, int i, const Complex *e);
-PRBM Complex swing(const Rows *rows, int i, const Complex *e, const double *v);
+PRBM Complex row_swing(const Rows *rows, int i, const Complex *e, const double *v);
 
 #endif

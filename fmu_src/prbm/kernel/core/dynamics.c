@@ -131,6 +131,7 @@ PRBM void arm_accelerations(const System *system, const Complex *e, const double
         Complex change = minus(complex_of(-dw[j].im, dw[j].re), product(w[j], w[j]));
         result[j] = product(e[j], change);
     }
+    float_velocities(system, a, result);
     scratch->used = mark;
 }
 

@@ -91,7 +91,8 @@ PRBM void set_reference(Reference *reference, const System *system, const double
     stretch(system, reference->theta, reference->e);
 }
 
-/* Set the arms of links that stretch, and the diagonal of M, which is proportional to |E|^2. */
+/* Set the arms of links that stretch, and the diagonal of M, which is proportional to |E|^2.  Set the
+ * arms that float, whose part of M is constant. */
 NOINLINE void stretch_links(const System *system, Kinematics *at) {
     stretch(system, at->theta, at->e);
     pad_parts(system->wide, at->e, at->e_parts);
@@ -115,7 +116,7 @@ SHARED void directions_of(int even, const System *system, const Reference *near,
         unit_vectors(even, at->theta, at->e);
         pad_parts(even, at->e, at->e_parts);
     }
-    if (system->stretch_count > 0) {
+    if (has_shared_arms(system)) {
         stretch_links(system, at);
     }
 }
@@ -146,6 +147,9 @@ NOINLINE void stretch_squares(const System *system, double *squares) {
         squares[arm_of(system, j)] -= squares[j];
         squares[j] = 0.0;
     }
+    for (int k = 0; k < system->shift_count; k++) {
+        squares[system->shifts[k]] = 0.0;
+    }
 }
 
 /* Compute the loads Re(w e) + moment of the directions, and the squares of their rates. */
@@ -160,7 +164,7 @@ SIZED void find_loads(int even, const Equations *eq, Evaluation *result) {
         set_lanes(x + j, lanes_at(moment + j) + (re - im));
         set_lanes(squares + j, lanes_at(v + j) * lanes_at(v + j));
     }
-    if (eq->system->stretch_count > 0) {
+    if (has_shared_arms(eq->system)) {
         stretch_squares(eq->system, squares);
     }
 }

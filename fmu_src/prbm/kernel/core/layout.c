@@ -51,6 +51,45 @@ static Addition addition_of(const Mechanism *m, const Flexure *flexure) {
     return kind->order > 0 ? beam_addition(kind, flexure) : links_addition(m, flexure);
 }
 
+static const Connection *connection(const Mechanism *m, int i) {
+    return i < m->flexure_count ? &m->flexures[i].between : &m->joints[i - m->flexure_count].between;
+}
+
+/* Mark what parts connect to a marked body. */
+static void mark_connected(const Mechanism *m, bool *marked) {
+    for (bool more = true; more;) {
+        more = false;
+        for (int i = 0; i < m->flexure_count + m->joint_count; i++) {
+            const Connection *c = connection(m, i);
+            if (marked[c->start] != marked[c->end]) {
+                more = marked[c->start] = marked[c->end] = true;
+            }
+        }
+    }
+}
+
+/* Return the number of bodies that are free: the first one of each group of bodies that parts
+ * connect to each other, but not to the ground. */
+static int free_count(Reader *reader, const Mechanism *m) {
+    size_t b = (size_t)m->body_count;
+    bool *marked = kept(reader, b + 1, sizeof *marked);
+    int count = 0;
+    if (reader->wrong) {
+        return 0;
+    }
+    memset(marked, 0, (b + 1) * sizeof *marked);
+    marked[GROUND] = true;
+    mark_connected(m, marked);
+    for (int body = 1; body <= m->body_count; body++) {
+        if (!marked[body]) {
+            count++;
+            marked[body] = true;
+            mark_connected(m, marked);
+        }
+    }
+    return count;
+}
+
 PRBM void count_coordinates(Reader *reader, Mechanism *m) {
     long long b = m->body_count, links = 0, strains = 0, springs = 0;
     long long arms = b, stretching = 0, masses = b, map = b, corners = 0;
@@ -71,24 +110,39 @@ PRBM void count_coordinates(Reader *reader, Mechanism *m) {
                           : 0;
         m->beam_size = size > m->beam_size ? size : m->beam_size;
     }
+    for (int i = 0; i < m->joint_count && !reader->wrong; i++) {
+        springs += m->joints[i].elastic;
+    }
     long long parts = (long long)m->flexure_count + m->joint_count;
-    long long n = links + strains + b, r = 2 * (parts - b);
+    long long n = links + strains + b, r = 2 * (parts - b), shifts = 0, floats = 0;
+    bool few = n <= COORDINATES_MAX && r < n; /* Otherwise, do not search. */
+    if (!reader->wrong && few) {
+        floats = free_count(reader, m);
+        shifts = SHIFTS_EACH * floats;
+        n += shifts;
+        r += 2 * floats;
+        arms += floats;
+        map += shifts;
+    }
     if (!reader->wrong &&
-        (n > COORDINATES_MAX || arms + stretching > DIRECTIONS_MAX || map > DIRECTION_MAP_MAX ||
-         r >= n || m->stop_count > STOPS_MAX || m->friction_count > STOPS_MAX ||
+        (!few || n > COORDINATES_MAX || arms + stretching + shifts > DIRECTIONS_MAX ||
+         map > DIRECTION_MAP_MAX || r >= n || m->stop_count > STOPS_MAX || m->friction_count > STOPS_MAX ||
          m->force_count > PLACES_MAX || m->probe_count > PLACES_MAX ||
          m->ground_count > GROUND_POINTS_MAX)) {
         reader->wrong = "more parts than the kernel supports, or loops that leave no degree of "
                         "freedom";
-    } else if (!reader->wrong && (b < 1 || r < 0)) {
-        reader->wrong = "a body without a connection to the ground";
+    } else if (!reader->wrong && b < 1) {
+        reader->wrong = "no body";
     }
     if (!reader->wrong) {
         m->link_count = (int)links;
         m->strain_count = (int)strains;
         m->stretch_count = (int)stretching;
         m->coordinate_count = (int)n;
-        m->direction_count = (int)(arms + stretching);
+        m->shift_count = (int)shifts;
+        m->placed_count = PLACED_EACH * (int)floats;
+        m->step_count = (int)(parts + floats);
+        m->direction_count = (int)(arms + stretching + shifts);
         m->map.count = (int)map; /* An upper bound. */
         m->loop_count = (int)r;
         m->spring_count = (int)springs;
@@ -104,27 +158,27 @@ typedef struct {
     int *body; /* (b + 1,) coordinates of the bodies */
     int *depth; /* (b + 1,) numbers of parts between the bodies and the ground */
     Coordinate *coordinates;
-    int *links, *strains, *arms, *stretches;
+    int *links, *strains, *arms, *stretches, *shifts, *placed;
     DirectionMap map;
-    int added, link_count, strain_count, directed, stretch_count;
+    int added, link_count, strain_count, directed, stretch_count, shift_count, placed_count;
 } Walk;
 
 static int add_angle(Walk *walk) {
-    Coordinate coordinate = {walk->link_count, -1, 0};
+    Coordinate coordinate = {walk->link_count, -1, 0, -1};
     walk->links[walk->link_count++] = walk->added;
     walk->coordinates[walk->added] = coordinate;
     return walk->added++;
 }
 
 static int add_strain(Walk *walk) {
-    Coordinate coordinate = {-1, walk->strain_count, 0};
+    Coordinate coordinate = {-1, walk->strain_count, 0, -1};
     walk->strains[walk->strain_count++] = walk->added;
     walk->coordinates[walk->added] = coordinate;
     return walk->added++;
 }
 
 static int add_body_angle(Walk *walk, int body) {
-    Coordinate coordinate = {-1, -1, body};
+    Coordinate coordinate = {-1, -1, body, -1};
     walk->held[body] = true;
     walk->body[body] = walk->added;
     walk->coordinates[walk->added] = coordinate;
@@ -142,15 +196,17 @@ static void depend(Walk *walk, int coordinate) {
     }
 }
 
-/* Add a direction that depends on no coordinate yet: an angle, or the stretch of an arm. */
+/* Add a direction that depends on no coordinate yet: an angle, or a change of an arm. */
 static int add_direction(Walk *walk, int arm) {
     int j = walk->directed++;
     walk->map.first[j + 1] = walk->map.count;
     walk->arms[j] = arm == FIXED ? j : arm;
-    if (arm != FIXED) {
-        walk->stretches[walk->stretch_count++] = j;
-    }
     return j;
+}
+
+/* Add the stretch of an arm, which depends on no coordinate yet. */
+static void add_stretch(Walk *walk, int arm) {
+    walk->stretches[walk->stretch_count++] = add_direction(walk, arm);
 }
 
 /* Add a link: its angle and, if it stretches, its strain. */
@@ -158,7 +214,7 @@ static void add_link(Walk *walk, bool stretching) {
     int angle = add_angle(walk), arm = add_direction(walk, FIXED);
     depend(walk, angle);
     if (stretching) {
-        add_direction(walk, arm);
+        add_stretch(walk, arm);
         depend(walk, add_strain(walk));
     }
 }
@@ -167,6 +223,27 @@ static void add_link(Walk *walk, bool stretching) {
 static void add_body_direction(Walk *walk, int coordinate) {
     add_direction(walk, FIXED);
     depend(walk, coordinate);
+}
+
+/* Add a displacement of a free body. */
+static int add_shift(Walk *walk, int body, int axis) {
+    Coordinate coordinate = {-1, -1, body, axis};
+    walk->placed[walk->placed_count++] = walk->added;
+    walk->coordinates[walk->added] = coordinate;
+    return walk->added++;
+}
+
+/* Add a free body: its displacements, its arm that floats, and its rotation. */
+static void add_free_body(Walk *walk, int body) {
+    int shifts[SHIFTS_EACH] = {add_shift(walk, body, AXIS_X), add_shift(walk, body, AXIS_Y)};
+    int arm = add_direction(walk, FIXED);
+    for (int k = 0; k < SHIFTS_EACH; k++) {
+        walk->shifts[walk->shift_count++] = add_direction(walk, arm);
+        depend(walk, shifts[k]);
+    }
+    int turn = add_body_angle(walk, body);
+    walk->placed[walk->placed_count++] = turn;
+    add_body_direction(walk, turn);
 }
 
 /* Return the coordinate that rotates an end of a beam. */
@@ -194,7 +271,7 @@ static void add_beam(const FlexureType *kind, const Flexure *flexure, Walk *walk
             depend(walk, first + k);
         }
         if (strain != FIXED) {
-            add_direction(walk, arm);
+            add_stretch(walk, arm);
             depend(walk, strain);
         }
     }
@@ -205,14 +282,13 @@ static void add_beam(const FlexureType *kind, const Flexure *flexure, Walk *walk
 
 /* Return part i: the flexures come first, then the joints. */
 static Step part(const Mechanism *m, int i) {
-    Step step = {NULL, NULL, NULL, false, false, 0, 0};
+    Step step = {NULL, connection(m, i), NULL, NULL, 0, false, false, 0, 0};
     if (i < m->flexure_count) {
         step.name = m->flexures[i].name;
-        step.between = &m->flexures[i].between;
         step.flexure = &m->flexures[i];
     } else {
-        step.name = m->joints[i - m->flexure_count].name;
-        step.between = &m->joints[i - m->flexure_count].between;
+        step.joint = &m->joints[i - m->flexure_count];
+        step.name = step.joint->name;
     }
     return step;
 }
@@ -226,6 +302,18 @@ static bool laid_backwards(const Mechanism *m, const Walk *walk, const Step *ste
         return !walk->held[start];
     }
     return beam && walk->depth[end] < walk->depth[start];
+}
+
+/* Visit the first body that has not been reached, which is free. */
+static void walk_free(const Mechanism *m, Walk *walk, Step *step) {
+    Step result = {NULL, NULL, NULL, NULL, 1, false, false, walk->added, walk->directed};
+    while (walk->held[result.body]) {
+        result.body++;
+    }
+    result.name = m->bodies[result.body - 1].name;
+    *step = result;
+    walk->depth[result.body] = 0;
+    add_free_body(walk, result.body);
 }
 
 /* Visit the first unvisited part with an end on a connected body; false if there is none. */
@@ -270,15 +358,17 @@ static void add_coordinates(const Mechanism *m, Walk *walk, Step *step) {
 PRBM void lay_out_coordinates(Reader *reader, Mechanism *m) {
     size_t parts = (size_t)m->flexure_count + (size_t)m->joint_count;
     size_t n = (size_t)m->coordinate_count, b = (size_t)m->body_count;
-    size_t d = (size_t)m->direction_count;
+    size_t d = (size_t)m->direction_count, all = (size_t)m->step_count;
     DirectionMap map = {false, kept(reader, d + 1, sizeof(int)),
                         kept(reader, (size_t)m->map.count, sizeof(int)), 0};
     Walk walk = {kept(reader, b + 1, sizeof(bool)), kept(reader, parts, sizeof(bool)),
                  kept(reader, b + 1, sizeof(int)), kept(reader, b + 1, sizeof(int)),
                  kept(reader, n, sizeof(Coordinate)),
                  kept(reader, n, sizeof(int)), kept(reader, n, sizeof(int)),
-                 kept(reader, d, sizeof(int)), kept(reader, d, sizeof(int)), map, 0, 0, 0, 0, 0};
-    Step *steps = kept(reader, parts, sizeof *steps);
+                 kept(reader, d, sizeof(int)), kept(reader, d, sizeof(int)),
+                 kept(reader, (size_t)m->shift_count, sizeof(int)),
+                 kept(reader, (size_t)m->placed_count, sizeof(int)), map, 0, 0, 0, 0, 0, 0, 0};
+    Step *steps = kept(reader, all, sizeof *steps);
     if (reader->wrong) {
         return;
     }
@@ -287,13 +377,12 @@ PRBM void lay_out_coordinates(Reader *reader, Mechanism *m) {
     walk.held[GROUND] = true;
     walk.depth[GROUND] = 0;
     walk.map.first[0] = 0;
-    size_t reached = 1;
-    for (size_t i = 0; i < parts && walk_on(m, &walk, &steps[i]); i++) {
-        add_coordinates(m, &walk, &steps[i]);
-        reached += !steps[i].closes;
-    }
-    if (reached != b + 1) {
-        reader->wrong = "a body without a connection to the ground";
+    for (size_t i = 0; i < all; i++) {
+        if (walk_on(m, &walk, &steps[i])) {
+            add_coordinates(m, &walk, &steps[i]);
+        } else {
+            walk_free(m, &walk, &steps[i]);
+        }
     }
     m->steps = steps;
     m->coordinates = walk.coordinates;
@@ -301,6 +390,8 @@ PRBM void lay_out_coordinates(Reader *reader, Mechanism *m) {
     m->strains = walk.strains;
     m->arms = walk.arms;
     m->stretches = walk.stretches;
+    m->shifts = walk.shifts;
+    m->placed = walk.placed;
     walk.map.mapped = walk.map.mapped || walk.directed != walk.added;
     m->map = walk.map;
 }

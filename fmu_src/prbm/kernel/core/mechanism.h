@@ -62,6 +62,8 @@ typedef struct {
 typedef struct {
     const char *name;
     Connection between;
+    bool elastic; /* Whether it has a stiffness. */
+    Expression stiffness;
 } Joint;
 
 typedef struct {
@@ -128,24 +130,32 @@ typedef struct {
     int walls, impulses, mobilities, base;
 } InputGroups;
 
-/* A step of the assembly: a flexure or joint, from a body that is already placed. */
+/* A step of the assembly: a flexure or joint, from a body that is already placed, or a body that
+ * nothing connects to the ground. */
 typedef struct {
     const char *name;
-    const Connection *between;
-    const Flexure *flexure; /* NULL for a joint. */
+    const Connection *between; /* NULL for a free body. */
+    const Flexure *flexure;    /* NULL for a joint and a free body. */
+    const Joint *joint;        /* NULL for a flexure and a free body. */
+    int body;                  /* The free body, counted from 1, or 0. */
     bool backwards;         /* The part is added from its end to its start. */
     bool closes;            /* The part closes a loop: both its bodies are already placed. */
     int first;              /* The first coordinate that the part adds. */
     int first_direction;    /* The first direction that the part adds. */
 } Step;
 
-/* A coordinate: an angle or a strain of a flexure, or the angle of a body.  Two of the three
- * numbers are -1, -1 and 0. */
+/* A coordinate: an angle or a strain of a flexure, the angle of a body, or the displacement of a free
+ * body over the size.  Two of the first three numbers are -1, -1 and 0. */
 typedef struct {
     int link;   /* Index among the angles of the flexures, or -1. */
     int strain; /* Index among the strains, or -1. */
     int body;   /* The body, counted from 1, or 0. */
+    int axis;   /* Of a displacement: AXIS_X or AXIS_Y, otherwise -1. */
 } Coordinate;
+
+enum { AXIS_X, AXIS_Y };
+/* The coordinates, directions without an arm of their own, and changes, of a free body. */
+enum { PLACED_EACH = 3, SHIFTS_EACH = 2, FREE_CHANGES = 3 };
 
 /* The map from coordinates to directions, row by row: direction j depends on the coordinates with
  * the indices first[j] to first[j + 1] - 1 in the list.  It is the identity unless mapped. */
@@ -175,11 +185,14 @@ typedef struct {
     const char *const *input_names;
     const double *input_starts; /* (input_count,) */
     InputGroups input;
-    const Step *steps;             /* Flexures and joints in the order of the assembly. */
+    const Step *steps;             /* Flexures, joints, free bodies in the order of the assembly. */
     const Coordinate *coordinates; /* (coordinate_count,) */
     const int *links, *strains;    /* Coordinates that are angles and strains of flexures. */
-    const int *arms;               /* (direction_count,) arm that a direction turns or stretches */
+    const int *placed;             /* Coordinates of the free bodies: along x and y, rotation. */
+    const int *arms;               /* (direction_count,) arm that a direction turns, stretches or
+                                    * displaces */
     const int *stretches;          /* Directions that are stretches. */
+    const int *shifts;             /* Displacements of arms that float, along x and y in turn. */
     DirectionMap map;
     const int *independent; /* Coordinates that are states of model exchange. */
     Release release;
@@ -187,7 +200,7 @@ typedef struct {
     double default_step; /* Step of the default experiment [s]; 0: unknown. */
     /* Sizes of the assembled system. */
     int coordinate_count, direction_count, loop_count, link_count, strain_count, stretch_count,
-        mass_count, spring_count, corner_count;
+        shift_count, placed_count, step_count, mass_count, spring_count, corner_count;
     int compliant_count; /* Number of compliant stops. */
     int first_extra;     /* 2 n + 2: position of the states of compliant stops in a state. */
     int state_count;     /* Size of a state: 2 n + 2, and 4 of each compliant stop. */

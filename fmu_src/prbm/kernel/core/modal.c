@@ -85,15 +85,24 @@ static void gravity_row(const System *system, Complex *w) {
     spread(system, 1, w, w);
 }
 
-/* Compute a basis Z (n, k) of the motions that the loops allow.  It is orthonormal in coordinates of
+PRBM int mode_count(const System *system) {
+    return system->n - system->r - system->mechanism->placed_count;
+}
+
+/* Compute a basis Z (n, k) of the motions that the loops allow, without those of free bodies.  It is orthonormal in coordinates of
  * unit inertia, so that it does not depend on how the inertias differ. */
 static void tangent_space(const System *system, const Complex *e, const double *M, double *Z,
                           Scratch *scratch) {
     size_t used = scratch->used;
-    int n = system->n, r = system->r, k = n - r;
+    const Mechanism *m = system->mechanism;
+    int n = system->n, k = mode_count(system), r = n - k;
     double *rows = take_matrix(scratch, r, n);
-    Rows loops = plain_rows(system, r, system->loops, system->loops_c);
+    Rows loops = plain_rows(system, system->r, system->loops, system->loops_c);
     jacobian(&loops, e, rows);
+    zeros(m->placed_count * n, rows + system->r * n);
+    for (int i = 0; i < m->placed_count; i++) {
+        rows[(system->r + i) * n + m->placed[i]] = 1.0;
+    }
     for (int j = 0; j < n; j++) {
         double scale = 1.0 / square_root(M[j * n + j]);
         for (int i = 0; i < r; i++) {
@@ -117,7 +126,7 @@ static bool modes_about(const System *system, const Complex *e, const double *M,
                         const Complex *B, const double *lam, double *frequency, double *phi,
                         Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
-    int n = system->n, k = n - system->r;
+    int n = system->n, k = mode_count(system);
     Complex *w = take_complex(scratch, 1, system->d);
     double *K_t = take_matrix(scratch, n, n), *Z = take_matrix(scratch, n, k);
     double *K_z = take_matrix(scratch, k, k), *M_z = take_matrix(scratch, k, k);
@@ -127,7 +136,7 @@ static bool modes_about(const System *system, const Complex *e, const double *M,
     tangent_space(system, e, M, Z, scratch);
     congruent(n, k, Z, K_t, K_z, scratch);
     congruent(n, k, Z, M, M_z, scratch);
-    bool found = generalised_eigen(k, K_z, M_z, frequency, reduced, scratch, problem);
+    bool found = k == 0 || generalised_eigen(k, K_z, M_z, frequency, reduced, scratch, problem);
     for (int j = 0; found && j < k; j++) {
         double omega2 = frequency[j];
         frequency[j] = (omega2 < 0.0 ? -1.0 : 1.0) * square_root(fabs(omega2)) / FULL_TURN;
@@ -180,7 +189,7 @@ PRBM int unstable_directions(int k, const double *frequency, const double *along
 PRBM void moved_by(const System *system, const double *q, const double *phi, double *moved,
                    Scratch *scratch) {
     size_t used = scratch->used;
-    int n = system->n, r = system->r, k = n - r;
+    int n = system->n, r = system->r, k = mode_count(system);
     Complex *B = take_complex(scratch, r + 1, system->d);
     Complex *e = take_complex(scratch, 1, system->d);
     double *c = take(scratch, (size_t)r + 1), *row = take(scratch, (size_t)n);
@@ -207,7 +216,7 @@ static bool resting_frequencies(const System *system, double *frequencies, Scrat
     size_t used = scratch->used;
     int n = system->n, r = system->r;
     Equilibrium shape = {take(scratch, (size_t)n), take(scratch, (size_t)r), 0.0};
-    double *phi = take_matrix(scratch, n, n - r);
+    double *phi = take_matrix(scratch, n, mode_count(system));
     bool found = equilibrium(system, false, 0.0, &shape, scratch, problem) &&
                  modes(system, &shape, frequencies, phi, scratch, problem);
     scratch->used = used;
@@ -218,11 +227,11 @@ static bool resting_frequencies(const System *system, double *frequencies, Scrat
 PRBM bool fundamental_frequency(const System *system, double *frequency, Scratch *scratch,
                                 Problem *problem) {
     size_t used = scratch->used;
-    int k = system->n - system->r;
+    int k = mode_count(system);
     double *frequencies = take(scratch, (size_t)k);
     bool found = resting_frequencies(system, frequencies, scratch, problem);
     if (found) {
-        bool bends = frequencies[0] > ZERO_FREQUENCY_RTOL * largest(k, frequencies);
+        bool bends = k > 0 && frequencies[0] > ZERO_FREQUENCY_RTOL * largest(k, frequencies);
         *frequency = bends ? frequencies[0] : 0.0;
     }
     scratch->used = used;
@@ -235,7 +244,7 @@ PRBM bool fundamental_frequency(const System *system, double *frequency, Scratch
 PRBM bool slow_rates(const System *system, double *rate, double *fast, Scratch *scratch,
                      Problem *problem) {
     size_t used = scratch->used;
-    int k = system->n - system->r, j = 0;
+    int k = mode_count(system), j = 0;
     double *frequencies = take(scratch, (size_t)k);
     bool found = resting_frequencies(system, frequencies, scratch, problem);
     if (found) {
@@ -249,7 +258,7 @@ PRBM bool slow_rates(const System *system, double *rate, double *fast, Scratch *
         *rate = greater(fall, speed / system->length);
         *rate = *rate > 0.0 ? *rate : lowest > 0.0 ? lowest : SPRINGLESS_RATE;
         *fast = greater(*rate, lowest);
-        if (frequencies[0] < -least) {
+        if (k > 0 && frequencies[0] < -least) {
             *rate = *fast = -FULL_TURN * frequencies[0];
         }
     }
@@ -289,7 +298,7 @@ static bool resting_multipliers(const System *system, const double *q, const Com
 PRBM bool fundamental_at(const System *system, const double *q, double *phi, double *M,
                          Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
-    int n = system->n, r = system->r + 1, k = n - system->r;
+    int n = system->n, r = system->r + 1, k = mode_count(system);
     Complex *B = take_complex(scratch, r, system->d);
     double *lam = take(scratch, (size_t)r), *frequency = take(scratch, (size_t)k);
     double *all = take_matrix(scratch, n, k);
@@ -300,7 +309,7 @@ PRBM bool fundamental_at(const System *system, const double *q, double *phi, dou
     bool found = resting_multipliers(system, q, e, M, B, lam, scratch, problem) &&
                  modes_about(system, e, M, r, B, lam, frequency, all, scratch, problem);
     for (int i = 0; found && i < n; i++) {
-        phi[i] = all[i * k];
+        phi[i] = k > 0 ? all[i * k] : 0.0;
     }
     scratch->used = used;
     return found;

@@ -4,7 +4,9 @@
 
 #include "core/statics.h"
 
-/* Compute frequencies [Hz] (k,) and mass-normalised modes (n, k), k = n - r. */
+/* Return the number k of modes: free bodies do not move. */
+PRBM int mode_count(const System *system);
+/* Compute frequencies [Hz] (k,) and mass-normalised modes (n, k). */
 PRBM bool modes(const System *system, const Equilibrium *shape, double *frequency, double *phi,
                 Scratch *scratch, Problem *problem);
 /* Return the number of unstable directions of a shape with these frequencies (k,): under dead loads

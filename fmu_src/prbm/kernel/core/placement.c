@@ -74,6 +74,8 @@ PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memor
     result.corners_c = place(memory, (size_t)m->corner_count, sizeof(Complex));
     result.stretch_count = m->stretch_count;
     result.stretches = m->stretches;
+    result.shift_count = m->shift_count;
+    result.shifts = m->shifts;
     result.spring = place(memory, (size_t)m->spring_count, sizeof(Spring));
     result.grounded = place(memory, (size_t)result.even, sizeof(double));
     result.factors = place(memory, (size_t)m->map.count, sizeof(double));

@@ -85,7 +85,7 @@ SIZED double active_sum(int even, const Equations *eq, const Kinematics *at, int
 
 /* The value of an active row without its constant. */
 SIZED double active_value(int even, const Equations *eq, const Kinematics *at, int k) {
-    if (eq->system->stretch_count > 0 || eq->on[k] != FIXED) {
+    if (has_shared_arms(eq->system) || eq->on[k] != FIXED) {
         return row_value(&eq->active, k, at->e);
     }
     return eq->system->mapped ? active_sum(eq->system->wide, eq, at, k)

@@ -15,13 +15,12 @@ static void point_loads_at(const Equations *eq, const Complex *e, const double *
     size_t mark = scratch->used;
     int d = system->d;
     Complex field = minus(system->gravity, eq->inputs.base);
-    Complex *bend = take_complex(scratch, d, 1), *w = take_complex(scratch, d, 1);
+    Complex *bend = take_complex(scratch, d, 1), *p = take_complex(scratch, d, 1);
     arm_accelerations(system, e, v, a, bend, scratch);
     if (eq->mass_damping != 0.0) {
-        turning(system, v, w);
+        swings(system, e, v, p);
         for (int j = 0; j < d; j++) {
-            Complex rate = product(e[j], w[j]);
-            bend[j] = plus(bend[j], scaled(eq->mass_damping, complex_of(-rate.im, rate.re)));
+            bend[j] = plus(bend[j], scaled(eq->mass_damping, complex_of(-p[j].im, p[j].re)));
         }
     }
     for (int i = 0; i < system->p; i++) {
@@ -99,8 +98,8 @@ static void load_bodies(const System *system, const Step *step, Complex far, Sec
 
 PRBM void transmit(const System *system, const double *lam, SectionState *at) {
     const Mechanism *m = system->mechanism;
-    int parts = m->flexure_count + m->joint_count, row = 0;
-    for (int k = 0; k < parts; k++) {
+    int row = 0;
+    for (int k = 0; k < m->step_count; k++) {
         const Step *step = &m->steps[k];
         if (step->closes) {
             Complex far = complex_of(lam[row], lam[row + 1]);
@@ -115,9 +114,9 @@ PRBM void transmit(const System *system, const double *lam, SectionState *at) {
             row += 2;
         }
     }
-    for (int k = parts - 1; k >= 0; k--) {
+    for (int k = m->step_count - 1; k >= 0; k--) {
         const Step *step = &m->steps[k];
-        if (!step->closes) {
+        if (!step->closes && step->between) {
             int reached = step->backwards ? step->between->start : step->between->end;
             load_bodies(system, step, at->on[reached], at);
         }

@@ -10,7 +10,7 @@
 static bool displace(const System *system, const double *phi, int k, double moved,
                      double amplitude, double *q, Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
-    int n = system->n, r = system->r, count = n - r;
+    int n = system->n, r = system->r, count = mode_count(system);
     Complex *B = take_complex(scratch, r + 1, system->d);
     Complex *e = take_complex(scratch, 1, system->d);
     double *c = take(scratch, (size_t)r + 1);
@@ -34,7 +34,7 @@ static bool displace(const System *system, const double *phi, int k, double move
 static bool mode_shape(const System *system, double amplitude, double *q, Scratch *scratch,
                        Problem *problem) {
     size_t used = scratch->used;
-    int n = system->n, count = n - system->r, mode = system->mechanism->release.mode;
+    int n = system->n, count = mode_count(system), mode = system->mechanism->release.mode;
     Equilibrium rest = {q, take(scratch, (size_t)system->r + 1), 0.0};
     double *frequency = take(scratch, (size_t)count), *phi = take_matrix(scratch, n, count);
     double *moved = take(scratch, (size_t)count);
@@ -82,7 +82,7 @@ PRBM bool start_shape(const System *system, const double *values, double *q, Scr
 static bool unstable_shape(const System *system, bool held, double amount, int *count,
                            Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
-    int n = system->n, k = n - system->r;
+    int n = system->n, k = mode_count(system);
     Equilibrium shape = {take(scratch, (size_t)n), take(scratch, (size_t)system->r + 1), 0.0};
     double *frequency = take(scratch, (size_t)k), *phi = take_matrix(scratch, n, k);
     double *moved = take(scratch, (size_t)k);

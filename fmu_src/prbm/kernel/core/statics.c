@@ -47,6 +47,59 @@ PRBM void stack_holding_at(const System *system, const double *q, Complex *B, do
     stack_holding(system, turns(system) ? q[j] - system->q0[j] : 0.0, B, c);
 }
 
+/* --- free bodies ------------------------------------------------------------------------------ */
+
+PRBM bool released_free(const System *system) {
+    const Mechanism *m = system->mechanism;
+    bool found = false;
+    for (int k = 0; k < m->placed_count; k++) {
+        found = found || m->placed[k] == system->released.j;
+    }
+    return found;
+}
+
+PRBM void place_bodies(const System *system, double amount, double *q) {
+    const Mechanism *m = system->mechanism;
+    for (int k = 0; k < m->placed_count; k += PLACED_EACH) {
+        const int *place = m->placed + k, turn = place[SHIFTS_EACH];
+        for (int i = 0; i < PLACED_EACH; i++) {
+            q[place[i]] = system->q0[place[i]];
+        }
+        if (turn == system->released.j && turns(system)) {
+            q[turn] += amount;
+        } else if (turn == system->released.j) {
+            Complex shift = scaled(amount, unit(m->release.direction));
+            q[place[AXIS_X]] += shift.re / system->length;
+            q[place[AXIS_Y]] += shift.im / system->length;
+        }
+    }
+}
+
+/* Set the elements of the coordinates that are placed to zero. */
+static void clear_placed(const System *system, double *x) {
+    for (int k = 0; k < system->mechanism->placed_count; k++) {
+        x[system->mechanism->placed[k]] = 0.0;
+    }
+}
+
+/* Remove the coordinates that are placed from a balance (size, size): their changes are zero. */
+static void remove_placed(const System *system, int size, double *kkt) {
+    const Mechanism *m = system->mechanism;
+    double scale = 0.0;
+    for (int i = 0; m->placed_count > 0 && i < system->n; i++) {
+        scale = greater(scale, largest(system->n, kkt + i * size));
+    }
+    for (int k = 0; k < m->placed_count; k++) {
+        int j = m->placed[k];
+        for (int i = 0; i < size; i++) {
+            kkt[i * size + j] = kkt[j * size + i] = 0.0;
+        }
+        kkt[j * size + j] = scale > 0.0 ? scale : 1.0;
+    }
+}
+
+/* --- stiffness -------------------------------------------------------------------------------- */
+
 /* Add an element of the stiffness of the directions to that of the coordinates. */
 static void stiffen(const System *system, int i, int j, double x, double *K_t) {
     if (system->mapped) {
@@ -69,6 +122,9 @@ PRBM void tangent_stiffness(const System *system, int r, const Complex *w, const
             row = plus(row, scaled(lam[i], B[i * d + a]));
         }
         Complex stress = product(row, e[a]);
+        if (is_shift(system, j)) {
+            continue; /* Positions are linear in displacements. */
+        }
         stiffen(system, j, j, a == j ? stress.re : -stress.re, K_t);
         if (a != j) {
             stiffen(system, j, a, stress.im, K_t);
@@ -112,6 +168,7 @@ static void unbalanced(const Balance *balance, const double *state, const Comple
             torque[j] += state[n + i] * rows[i * n + j];
         }
     }
+    clear_placed(system, torque);
     scalars(&balance->rows, e, open_by);
     scratch->used = used;
 }
@@ -126,6 +183,7 @@ static bool newton_step(const Balance *balance, const Complex *e, double *torque
     Problem ignored;
     tangent_stiffness(balance->system, r, balance->w, balance->rows.B, state + n, e, K_t);
     saddle(n, r, K_t, rows, rows, kkt);
+    remove_placed(balance->system, size, kkt);
     copy(n, torque, change);
     for (int i = 0; i < r; i++) {
         change[n + i] = -open_by[i];
@@ -194,6 +252,7 @@ static bool loaded(const System *system, bool held, double displacement, double 
                    double *state, Scratch *scratch) {
     size_t used = scratch->used;
     Balance balance = balance_at(system, held, displacement, fraction, scratch);
+    place_bodies(system, fraction * displacement, state);
     bool balanced = balance_out(&balance, state, scratch);
     scratch->used = used;
     return balanced;
@@ -212,6 +271,7 @@ static int sign_at(const System *system, bool held, double displacement, double 
     jacobian(&balance.rows, e, rows);
     tangent_stiffness(system, r, balance.w, balance.rows.B, state + n, e, K_t);
     saddle(n, r, K_t, rows, rows, kkt);
+    remove_placed(system, size, kkt);
     int sign = determinant_sign(n, r, kkt, system->length, scratch);
     scratch->used = used;
     return sign;
@@ -241,6 +301,8 @@ static bool turns_about_point(const System *system, Scratch *scratch) {
     Rows held = plain_rows(system, r + 1, B, NULL);
     jacobian(&held, system->e0, rows);
     saddle(n, r, system->K, rows, rows, kkt);
+    remove_placed(system, size, kkt);
+    clear_placed(system, rows + r * n);
     zeros(size, response);
     copy(n, rows + r * n, response);
     Problem ignored; /* A body without a spring, for instance on a pin. */
@@ -406,9 +468,10 @@ PRBM bool equilibrium(const System *system, bool held, double displacement, Equi
     size_t used = scratch->used;
     int n = system->n, r = system->r;
     double *state = take(scratch, (size_t)n + (size_t)r + 1);
-    straighten(system, true, state);
     bool straight = !heavy(system) && !strained(system) && !(held && displacement != 0.0) &&
                     drawn_closed(system, scratch);
+    held = held && !released_free(system);
+    straighten(system, true, state);
     bool found = straight || ((!held || displaceable(system, displacement, scratch, problem)) &&
                               load_fully(system, held, displacement, state, scratch, problem));
     copy(n, state, shape->q);

@@ -17,6 +17,10 @@ PRBM void stack_release(const System *system, Complex *B, double *c);
 PRBM void stack_holding(const System *system, double amount, Complex *B, double *c);
 /* Stack the loops and the row that holds the released body at its place in a shape q (n,). */
 PRBM void stack_holding_at(const System *system, const double *q, Complex *B, double *c);
+/* Return whether the released body is free, so that it is placed instead of held by a force. */
+PRBM bool released_free(const System *system);
+/* Set the coordinates q (n,) of the free bodies: as drawn, and the released one displaced or turned. */
+PRBM void place_bodies(const System *system, double amount, double *q);
 /* Compute the tangent stiffness K_t (n, n).  The row w has columns for stretches, B does not. */
 PRBM void tangent_stiffness(const System *system, int r, const Complex *w, const Complex *B,
                             const double *lam, const Complex *e, double *K_t);

@@ -4,7 +4,8 @@
  * Each link and body has an arm E = exp(s + i theta).  Its derivative is E' = i w E, with the
  * complex rate w = theta' - i s'.  A point is at z = c + A E.  A direction is an angle theta or a
  * stretch s, and a linear function of the coordinates.  The elements of e are E for angles and -i E
- * for stretches, so that the derivative of E by its direction is i e for both.
+ * for stretches, so that the derivative of E by its direction is i e for both.  The arm of a free body
+ * floats: E = u_x + i u_y, with the directions u_x and u_y, whose elements of e are -i and 1.
  */
 #include "core/kinetics.h"
 #include "core/matrix.h"
@@ -13,8 +14,22 @@
 
 /* --- arms ------------------------------------------------------------------------------------- */
 
+PRBM bool has_shared_arms(const System *system) {
+    return system->stretch_count + system->shift_count > 0;
+}
+
 PRBM int arm_of(const System *system, int j) {
     return system->mechanism->arms[j];
+}
+
+PRBM bool is_float(const System *system, int j) {
+    const int *first = system->mechanism->map.first;
+    return system->shift_count > 0 && arm_of(system, j) == j && first[j] == first[j + 1];
+}
+
+PRBM bool is_shift(const System *system, int j) {
+    const int a = arm_of(system, j);
+    return a != j && is_float(system, a);
 }
 
 PRBM double direction_of(const System *system, const double *x, int j) {
@@ -47,8 +62,19 @@ PRBM void pull_both(const System *system, int i, int j, double x, double *sum) {
     }
 }
 
+PRBM double coordinate_unit(const System *system, int j) {
+    return system->mechanism->coordinates[j].axis < 0 ? 1.0 : system->length;
+}
+
 PRBM int angle_of(const System *system, int j) {
     return system->mechanism->map.coordinate[system->mechanism->map.first[j]];
+}
+
+/* Set e of an arm that floats, with the displacements x and y in the directions j and j + 1. */
+static void float_arm(const System *system, int j, double x, double y, Complex *e) {
+    e[arm_of(system, j)] = complex_of(x, y);
+    e[j] = complex_of(0.0, -1.0);
+    e[j + 1] = complex_of(1.0, 0.0);
 }
 
 PRBM void stretch(const System *system, const double *theta, Complex *e) {
@@ -56,6 +82,10 @@ PRBM void stretch(const System *system, const double *theta, Complex *e) {
         int j = system->stretches[k], a = arm_of(system, j);
         e[a] = scaled(exponential(theta[j]), e[a]);
         e[j] = complex_of(e[a].im, -e[a].re);
+    }
+    for (int k = 0; k < system->shift_count; k += SHIFTS_EACH) {
+        int j = system->shifts[k];
+        float_arm(system, j, theta[j], theta[j + 1], e);
     }
 }
 
@@ -76,6 +106,10 @@ PRBM void directions(const System *system, const double *q, Complex *e) {
         e[a] = scaled(exponential(direction_of(system, q, j)), e[a]);
         e[j] = complex_of(e[a].im, -e[a].re);
     }
+    for (int k = 0; k < system->shift_count; k += SHIFTS_EACH) {
+        int j = system->shifts[k];
+        float_arm(system, j, direction_of(system, q, j), direction_of(system, q, j + 1), e);
+    }
 }
 
 PRBM void turning(const System *system, const double *v, Complex *w) {
@@ -86,6 +120,29 @@ PRBM void turning(const System *system, const double *v, Complex *w) {
         int j = system->stretches[k];
         w[arm_of(system, j)].im = -w[j].re;
         w[j] = complex_of(0.0, 0.0);
+    }
+    for (int k = 0; k < system->shift_count; k++) {
+        w[system->shifts[k]] = complex_of(0.0, 0.0);
+    }
+}
+
+PRBM void float_velocities(const System *system, const double *v, Complex *velocity) {
+    for (int k = 0; k < system->shift_count; k += SHIFTS_EACH) {
+        int j = system->shifts[k];
+        velocity[arm_of(system, j)] =
+            complex_of(direction_of(system, v, j), direction_of(system, v, j + 1));
+    }
+}
+
+PRBM void swings(const System *system, const Complex *e, const double *v, Complex *p) {
+    turning(system, v, p);
+    for (int j = 0; j < system->d; j++) {
+        p[j] = product(e[j], p[j]);
+    }
+    for (int k = 0; k < system->shift_count; k += SHIFTS_EACH) {
+        int j = system->shifts[k];
+        p[arm_of(system, j)] =
+            complex_of(direction_of(system, v, j + 1), -direction_of(system, v, j));
     }
 }
 
@@ -101,6 +158,13 @@ PRBM void motion(const System *system, const BodyFrame *frame, const Complex *e,
     }
     for (int k = 0; k < system->stretch_count; k++) {
         int j = system->stretches[k];
+        Complex along_arm = product(frame->A[arm_of(system, j)], e[j]);
+        double rate = direction_of(system, v, j);
+        speed.re -= along_arm.im * rate;
+        speed.im += along_arm.re * rate;
+    }
+    for (int k = 0; k < system->shift_count; k++) {
+        int j = system->shifts[k];
         Complex along_arm = product(frame->A[arm_of(system, j)], e[j]);
         double rate = direction_of(system, v, j);
         speed.re -= along_arm.im * rate;

@@ -122,6 +122,8 @@ typedef struct {
     int *body_masses;         /* (b,) mass points of the bodies, if so */
     int stretch_count;
     const int *stretches;     /* directions that are stretches */
+    int shift_count;
+    const int *shifts;        /* displacements of arms that float, along x and y in turn */
     int corner_count;
     Complex *corners, *corners_c; /* (corners, d), (corners,): flexures, for drawings */
     int spring_count;
@@ -153,8 +155,14 @@ typedef struct {
     double least_mobility;    /* of the shortest row that is not round-off [1/kg] */
 } System;
 
-/* Return the arm that a direction turns or stretches. */
+/* Return whether directions have no arm of their own: stretches and displacements. */
+PRBM bool has_shared_arms(const System *system);
+/* Return the arm that a direction turns, stretches or displaces. */
 PRBM int arm_of(const System *system, int j);
+/* Return whether a direction is a displacement of an arm that floats. */
+PRBM bool is_shift(const System *system, int j);
+/* Return whether a direction stands for an arm that floats. */
+PRBM bool is_float(const System *system, int j);
 /* Return direction j of coordinates x (n,), or its rate if x are rates. */
 PRBM double direction_of(const System *system, const double *x, int j);
 /* Add x times the change of direction j with the coordinates to sum (n,). */
@@ -163,17 +171,28 @@ PRBM void pull(const System *system, int j, double x, double *sum);
 PRBM void pull_both(const System *system, int i, int j, double x, double *sum);
 /* Return the coordinate that is the direction of a body or a link. */
 PRBM int angle_of(const System *system, int j);
-/* Compute e (d,): the arms exp(s + i theta), and -i times the arm for stretches. */
+/* Return what the variable of a coordinate is for each unit of the coordinate: the size for a
+ * displacement [m], otherwise 1. */
+PRBM double coordinate_unit(const System *system, int j);
+/* Compute e (d,): the arms exp(s + i theta), and -i times the arm for stretches.  The arms that float
+ * are displacements u_x + i u_y, for which e is -i and 1. */
 PRBM void directions(const System *system, const double *q, Complex *e);
-/* Compute w (d,): the complex rates theta' - i s' of the arms, zero for stretches. */
+/* Compute w (d,): the complex rates theta' - i s' of the arms, zero for stretches, displacements and
+ * arms that float. */
 PRBM void turning(const System *system, const double *v, Complex *w);
+/* Compute the velocities i p (d,) of the arms that float; others do not change.  Accelerations a in
+ * place of v give second derivatives. */
+PRBM void float_velocities(const System *system, const double *v, Complex *velocity);
+/* Compute p (d,) of the arms, whose velocities are E' = i p. */
+PRBM void swings(const System *system, const Complex *e, const double *v, Complex *p);
 /* Compute the displacement of a point from the straight shape, and its velocity. */
 PRBM void motion(const System *system, const BodyFrame *frame, const Complex *e, const double *v,
                  Complex *displacement, Complex *velocity);
-/* Copy B (r, d) to rows, and repeat the column of each arm for its stretch.  rows may be B. */
+/* Copy B (r, d) to rows, and repeat the column of each arm for its stretch or displacements.  rows
+ * may be B. */
 PRBM void spread(const System *system, int r, const Complex *B, Complex *rows);
-/* Replace the unit vectors e by the arms, and by -i times the arms for stretches.  theta (d,)
- * are the directions. */
+/* Replace the unit vectors e by the arms, and by what belongs to stretches and displacements, see
+ * directions.  theta (d,) are the directions. */
 PRBM void stretch(const System *system, const double *theta, Complex *e);
 /* Compute the mass matrix M (n, n). */
 PRBM void mass_matrix(const System *system, const Complex *e, double *M, Scratch *scratch);

@@ -174,6 +174,10 @@ static void read_joints(Reader *reader, Mechanism *m) {
     for (int i = 0; i < m->joint_count && !reader->wrong; i++) {
         joints[i].name = read_text(reader);
         joints[i].between = read_connection(reader, m);
+        joints[i].elastic = read_flag(reader);
+        if (joints[i].elastic) {
+            joints[i].stiffness = read_expression(reader, m);
+        }
     }
     m->joints = joints;
 }

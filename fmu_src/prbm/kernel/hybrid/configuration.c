@@ -26,6 +26,11 @@ PRBM double release_penetration(const Configuration *configuration) {
 /* The scale of rates is the fundamental angular frequency; if it is zero, the rate of a fall or of
  * the initial motion.  The scale of energies is the torque of the stiffest torsion spring at one
  * radian; without torsion springs, the largest inertia times the square of the rate. */
+/* Return the length of the arm of a direction in units of inertias: displacements have none. */
+static double arm_length(const System *system, int j) {
+    return is_float(system, j) || is_shift(system, j) ? system->length : 1.0;
+}
+
 PRBM bool set_scales(Configuration *configuration, double frequency, Scratch *scratch,
                      Problem *problem) {
     const System *system = &configuration->system;
@@ -38,7 +43,8 @@ PRBM bool set_scales(Configuration *configuration, double frequency, Scratch *sc
         torsion = turns ? greater(torsion, fabs(system->K[i])) : torsion;
     }
     for (int i = 0; i < system->d * system->d; i++) {
-        heaviest = greater(heaviest, modulus(system->H[i]));
+        double lengths = arm_length(system, i / system->d) * arm_length(system, i % system->d);
+        heaviest = greater(heaviest, modulus(system->H[i]) * lengths);
     }
     double fast = configuration->omega = scales->rate = TWO_PI * frequency;
     if (frequency == 0.0 && !slow_rates(system, &scales->rate, &fast, scratch, problem)) {

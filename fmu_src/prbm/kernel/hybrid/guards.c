@@ -128,7 +128,7 @@ static void bound_directions(const System *system, const double *coordinates, do
 
 /* Bound the changes |dE| of the arms within the step.  The dense output bounds the changes of the
  * coordinates, and hence dtheta of angles and ds of stretches; then
- * |dE| <= |E| exp(|ds|) (|dtheta| + |ds|). */
+ * |dE| <= |E| exp(|ds|) (|dtheta| + |ds|).  For arms that float, |dE| <= |du_x| + |du_y|. */
 static void bound_arms(const Simulation *sim, double *reach) {
     const System *system = system_of(sim);
     double *coordinates = system->mapped ? reach + system->d : reach;
@@ -140,6 +140,10 @@ static void bound_arms(const Simulation *sim, double *reach) {
         int j = system->stretches[k], a = arm_of(system, j);
         double longest = modulus(sim->stepping.reference.e[a]) * exponential(reach[j]);
         reach[a] = longest * (reach[a] + reach[j]);
+    }
+    for (int k = 0; k < system->shift_count; k++) {
+        int j = system->shifts[k];
+        reach[arm_of(system, j)] += reach[j];
     }
 }
 
@@ -428,8 +432,8 @@ typedef struct {
 static bool detect_closing(Search *search, const double *gaps, const double *rates, int k,
                            Closing *closing) {
     Simulation *sim = search->sim;
-    double length = system_of(sim)->length, depth = closing_depth(&sim->configuration);
-    double sign = sign_of_gap(search->guard);
+    double round_off = CONSTRAINT_RTOL * system_of(sim)->length;
+    double depth = closing_depth(&sim->configuration), sign = sign_of_gap(search->guard);
     ArcGuard guard = arc_guard(search), rate = {search, gap_rate_guard, false, sign, 0.0};
     bool dips = rates[0] < 0.0 && 0.0 < rates[1];
     closing->a = sample_time(sim, k);
@@ -438,10 +442,9 @@ static bool detect_closing(Search *search, const double *gaps, const double *rat
     if (gaps[1] > 0.0 && !dips) {
         return false;
     }
-    if (fabs(rates[0]) <= zero_speed(&sim->configuration) &&
-        gaps[0] <= CONSTRAINT_RTOL * length) {
+    if (fabs(rates[0]) <= zero_speed(&sim->configuration) && gaps[0] <= round_off) {
         closing->pressed = true;
-        return gaps[1] < lesser(gaps[0], -depth);
+        return gaps[1] < lesser(gaps[0] - round_off, -depth);
     }
     if (rates[0] > 0.0) {
         if (rates[1] >= 0.0) {

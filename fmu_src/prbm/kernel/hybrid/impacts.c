@@ -484,6 +484,36 @@ static bool choose_restitutions(Simulation *sim, const double *q, const double *
     return ok;
 }
 
+/* Add the open stops that touch at rest and take part in an impact to the held stops.  Without
+ * restitution, bodies that touch each other move on together.  Impacts one after the other would reach
+ * this motion only in the limit of infinitely many.  Impacts with restitution do follow each other,
+ * unless the speed is round-off. */
+static bool join_touching(Simulation *sim, const double *q, const double *rates, Hits *hits,
+                          Problem *problem) {
+    size_t mark = sim->scratch.used;
+    const Stop *stops = sim->configuration.mechanism->stops;
+    double near = TOUCHING_RTOL * system_of(sim)->length, zero = zero_speed(&sim->configuration);
+    double t = sim->state.front_time;
+    bool ok = true, slow = true, elastic = false;
+    Complex *e = directions_at(sim, q);
+    for (int k = 0; k < hits->struck_count; k++) {
+        slow = slow && rates[hits->struck[k]] >= -zero;
+        elastic = elastic || hits->restitution[k] != 0.0;
+    }
+    for (int i = 0; ok && !elastic && i < system_of(sim)->s; i++) {
+        bool joins = !stops[i].compliant && !held_stop(&sim->equations, i) &&
+                     !has_contact(hits->struck_count, hits->struck, i) && rates[i] <= zero &&
+                     gap(&sim->equations, i, t, e, NULL) <= near &&
+                     (slow || field_value(sim, stops[i].restitution) == 0.0);
+        ok = !joins || can_be_struck(sim, i, q, &joins, problem);
+        if (ok && joins) {
+            hits->held[hits->held_count++] = i;
+        }
+    }
+    sim->scratch.used = mark;
+    return ok;
+}
+
 /* Open all held stops.  List those that took part and do not separate; return their number. */
 static int open_all(Simulation *sim, const Hits *hits, int *touching) {
     size_t mark = sim->scratch.used;
@@ -531,6 +561,7 @@ PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
         return settle(sim, &hit, rates[hit] <= zero_speed(&sim->configuration), NULL, problem);
     }
     ok = ok && choose_restitutions(sim, q, v, rates, &hits, counted, problem) &&
+         join_touching(sim, q, rates, &hits, problem) &&
          impact_impulses(sim, q, v, &hits, problem);
     if (ok) {
         book_energies(sim, &hits, q, v, &account);

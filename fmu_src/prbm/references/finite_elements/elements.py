@@ -47,6 +47,8 @@ class FiniteElements:
         or a moving base or wall.
     ParameterError
         If a name is unknown or a value out of bounds.
+    MechanismError
+        If no flexures or joints connect a body to the ground.
     """
 
     def __init__(
@@ -56,6 +58,7 @@ class FiniteElements:
         *,
         elements: int = 16,
     ) -> None:
+        mechanism.check_connected("a model of finite elements")
         self.model = ElementModel(mechanism, values, elements)
         self.equations = Equations(self.model)
         self.mechanism, self.values = mechanism, self.model.values

@@ -262,10 +262,12 @@ class ElementModel:
 def _check_supported(
     mechanism: Mechanism, values: Mapping[str, float], given: Mapping[str, float]
 ) -> None:
-    """Reject friction, damping in proportion to mass, and moving walls or bases."""
+    """Reject friction, damping in proportion to mass, torsion springs, moving walls or bases."""
     unsupported = [f"{f.name}.coefficient" for f in mechanism.frictions
                    if value(f, "coefficient", values)]  # fmt: skip
     unsupported += [f"{s.name}.friction" for s in mechanism.stops if value(s, "friction", values)]
+    unsupported += [f"{j.name}.stiffness" for j in mechanism.joints
+                    if j.stiffness is not None and value(j, "stiffness", values)]  # fmt: skip
     if values["damping.zeta"]:
         unsupported.append("damping.zeta")
     forces = {f.name for f in mechanism.forces}
@@ -278,6 +280,6 @@ def _check_supported(
             )
     for name in unsupported:
         raise FiniteElementError(
-            f"{name} is not 0: the finite elements have no friction, no damping in proportion to "
-            "mass, no moving walls and no moving base; set it to 0"
+            f"{name} is not 0: the finite elements have no friction, no torsion springs, no "
+            "damping in proportion to mass, no moving walls and no moving base; set it to 0"
         )
