@@ -33,6 +33,11 @@ def frequencies(options: argparse.Namespace) -> None:
     loads = given_loads(mechanism, options.load)
     shape = equilibrium(system, at, loads)
     found = modes(system, shape)
+    if not len(found.frequency):
+        raise UserMistake(
+            f"{mechanism.name} has no modes: all bodies fly freely; connect them to the ground by "
+            "flexures or joints, or simulate the motion"
+        )
     count = min(options.count, len(found.frequency))
     motions = [(body.name, m) for body in mechanism.bodies for m in ("x", "y", "turning")]
     e = system.directions(shape.q)
@@ -66,6 +71,9 @@ def frequencies(options: argparse.Namespace) -> None:
         print(
             f"{len(found.frequency) - count} higher modes are not shown; show more with --count N"
         )
+    if mechanism.free_bodies:
+        names = ", ".join(mechanism.free_bodies)
+        print(f"bodies that fly freely are fixed in these modes: {names}")
     _print_notes(mechanism, values, at, loads)
     output.table(
         f"{mechanism.name}-modes.csv",

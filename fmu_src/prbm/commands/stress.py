@@ -30,6 +30,11 @@ HEAD = ("flexure", "peak [MPa]", "at t", "from start", "yield/peak", "damage", "
 def print_stress(options: argparse.Namespace) -> None:
     """Print the stress of all flexures in held shapes, or in the motion after the release."""
     mechanism = with_stress(load(options.mechanism))
+    if not mechanism.flexures:
+        raise UserMistake(
+            f"{mechanism.name} has no flexures, whose stress is computed; prbm simulate prints its "
+            "impacts"
+        )
     if options.held:
         _held(options, mechanism)
     else:

@@ -227,7 +227,8 @@ def _settled(columns: Columns, span: float, rests: bool, last: float) -> str:
     for name in (KINETIC, FREQUENCY):
         column(columns, name)  # Raises an error if it is missing.
     when = settling(columns)
-    expected = _expected(settling_estimate(columns, last))
+    vibrates = bool(column(columns, FREQUENCY).any())
+    expected = _expected(settling_estimate(columns, last), vibrates)
     if math.isnan(when) and rests:
         return (
             "settled              not yet: a body rests on its stop, but the mechanism still "
@@ -242,16 +243,16 @@ def _settled(columns: Columns, span: float, rests: bool, last: float) -> str:
     )
 
 
-def _expected(when: float) -> str:
-    """Return the phrase about an estimated settling time [s].
+def _expected(when: float, vibrates: bool) -> str:
+    """Return the phrase about an estimated settling time [s], if the mechanism vibrates or not.
 
     Examples
     --------
-    >>> print(_expected(3.456))
+    >>> print(_expected(3.456, True))
     by its present decay at about t = 3.5 s: simulate longer than that
     """
     if math.isnan(when):
-        return "simulate longer; prbm modes prints decay times"
+        return "simulate longer" + "; prbm modes prints decay times" * vibrates
     if math.isinf(when):
         return "the energy does not fall: the damping is too small, or inputs drive the motion"
     factor, unit = (1.0, "s") if when >= SECONDS_MIN else time_unit(when)
