@@ -225,8 +225,8 @@ def test_a_double_curved_beam_buckles_at_the_force_of_shallow_arches(Q, tmp_path
 def test_a_double_curved_beam_has_a_second_stable_position_beyond_its_buckled_branch(tmp_path):
     """The symmetric shapes turn back in force and displacement many times on the way.
 
-    The branch from the first bifurcation carries no larger force than that of the bifurcation until
-    it returns, and none of its shapes under a smaller force is stable.
+    The branch from the first bifurcation returns near it.  On the way it carries at most 2 % more
+    than the force of the bifurcation, and none of its shapes under a smaller force is stable.
     """
     system, unit = double_beam(tmp_path, 10, 5)
     held = curve(system, np.linspace(0.0, 0.13e-3, 14), branches=1)
@@ -238,7 +238,7 @@ def test_a_double_curved_beam_has_a_second_stable_position_beyond_its_buckled_br
     assert {"limit point", "displacement limit"} <= {event.kind for event in held.events}
     branch, first = held.branches[0], held.events[0]
     assert branch.displacements[0] == first.displacement
-    assert branch.forces.max() < 1.01 * first.force
+    assert branch.forces.max() < 1.02 * first.force
     ahead = branch.displacements > 1.1 * first.displacement
     assert ahead.any()
     assert np.all(branch.unstable[ahead] > 0)
