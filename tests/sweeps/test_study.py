@@ -286,7 +286,10 @@ MISTAKES = [
     ({"vary": {}}, "0 parameters are varied; vary at least one"),
     ({"vary": {"stop.position": np.arange(200_000)}}, "the study has 200000 simulations"),
     ({"outputs": []}, "no output is selected; name one, for instance settling"),
-    ({"outputs": ["setling"]}, "output setling: unknown variable 'setling'; did you mean settling"),
+    (
+        {"outputs": ["setling"]},
+        "output setling: the mechanism has no variable 'setling'; did you mean settling",
+    ),
     ({"outputs": ["first(shuttle.x > a)"]}, "bound 'a' must be a number"),
     ({"minimise": "impacts", "maximise": "impacts"}, "minimise and maximise are both given"),
     ({"values": {"stop.position": 0.0}}, "is varied and has a fixed value"),
@@ -330,7 +333,7 @@ def test_mistakes_in_all_simulations_are_reported_before_the_first_one(
 
 
 def test_quantities_that_a_mechanism_does_not_have_are_rejected(mechanisms):
-    with pytest.raises(ParameterError, match=r"unknown variable .stop\.x."):
+    with pytest.raises(ParameterError, match=r"has no variable .stop\.x."):
         study(mechanisms["PRBDM"], {"stop.position": [0.0, 1e-3]}, ["max(stop.x)"])
 
 

@@ -22,7 +22,7 @@ from concurrent.futures import (
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from statistics import median
-from typing import Any
+from typing import Any, Self
 
 from ..base.errors import ParameterError, PrbmError
 from ..base.processes import process_count
@@ -62,6 +62,23 @@ class Pool:
     closing: Callable[[str], object] = release
 
 
+def check_limits(workers: int | None, timeout: float | None, retries: int = 0) -> None:
+    """Reject limits of a study that are not positive.
+
+    Raises
+    ------
+    ParameterError
+        If the number of workers or the longest duration of a run [s] is not positive, or the number
+        of repetitions is negative.
+    """
+    if workers is not None and workers < 1:
+        raise ParameterError(f"workers = {workers} must be 1 or more")
+    if timeout is not None and not timeout > 0.0:
+        raise ParameterError(f"timeout = {timeout:g} s must be positive")
+    if retries < 0:
+        raise ParameterError(f"retries = {retries} must be 0 or more")
+
+
 @contextmanager
 def pool(
     workers: int | None, runs: int, *, serial: bool = False, executor: Executor | str | None = None
@@ -82,13 +99,9 @@ def pool(
 
     Raises
     ------
-    ParameterError
-        If the number of workers is not positive.
     StudyError
         If the scheduler does not respond or has no workers.
     """
-    if workers is not None and workers < 1:
-        raise ParameterError(f"workers = {workers} must be 1 or more")
     if isinstance(executor, str):
         with _client(executor) as client:
             yield Pool(
@@ -146,6 +159,9 @@ def _client(address: str) -> Iterator[Any]:
 class Runner:
     """Computes rows and keeps their outcomes in a journal.
 
+    It is used in a ``with`` block, at whose end the processes of the study end.  A
+    KeyboardInterrupt then has a message about the completed rows.
+
     Parameters
     ----------
     job : Job
@@ -189,10 +205,14 @@ class Runner:
             report(done / total)
         return [known[point] for point in points]
 
-    def close(self) -> None:
-        """End the processes of the study."""
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         with suppress(OSError, CancelledError):  # The scheduler may have ended.
             self.pool.closing(self.study)
+        if kind is KeyboardInterrupt and self.journal.kept:
+            raise KeyboardInterrupt(f"interrupted; {self.journal.kept}") from None
 
     def _row(self, point: Point) -> Row:
         return dict(zip(self.parameters, point, strict=True))

@@ -33,7 +33,6 @@ from ..mechanism.description import Mechanism
 from ..runs.engine import PYTHON, check_engine, kernel_available
 from ..runs.experiment import experiment
 from ..runs.inputs import Source, filled, placeholders, signals
-from ..runs.quantities import QUANTITIES
 from ..runs.run import communication_points, in_si, in_unit
 from ..runs.signals import Signal
 from .design import (
@@ -51,18 +50,14 @@ from .design import (
 from .journal import Journal
 from .mechanism import MechanismJob
 from .optimum import REFINEMENTS_EXPECTED, Constraint, Optimum, Samples, Search
-from .outputs import MODE, QUANTITY, REST, Outcome, Output, SpecificationError
-from .outputs import parse_output as parse
-from .runner import Runner, pool
+from .outputs import Outcome, Output, parse_output
+from .runner import Runner, check_limits, pool
 
 STEPS = 4000  # Communication steps of a simulation, which resolve the vibration after impacts.
 RUNS_MAX = 100_000  # More simulations are a mistake in the number of samples.
 LAST_FRACTION = 0.99  # Reported progress while a refinement takes more simulations than usual.
-NAMES_LISTED_MAX = 12  # Messages about unknown outputs do not list more names.
-TIMES = ("first", "since")  # Reductions whose value is a time.
 YIELD_RUNS = 256  # Simulations around an optimum that give its yield.
 YIELD_SEED = 1
-PLACES = {"x": "m", "y": "m", "angle": "rad"}  # Outputs of a rest position, and their units.
 Vary = Mapping[str, Any] | str | Path
 
 
@@ -219,8 +214,7 @@ def study(
     spread = _around(plan, tolerances or {})
     if table is not None:
         check_file(Path(table))
-    if timeout is not None and not timeout > 0.0:
-        raise ParameterError(f"timeout = {timeout:g} s must be positive")
+    check_limits(workers, timeout)
     with pool(workers, len(plan.points), serial=timeout is None, executor=executor) as where:
         if where.executor is not None:
             _check_sources(plan.job.inputs)
@@ -228,15 +222,8 @@ def study(
             None if table is None else Path(table), plan.settings, plan.names, plan.texts
         )
         with journal.opened(overwrite):
-            runner = Runner(plan.job, plan.names, journal, where, timeout=timeout)
-            try:
+            with Runner(plan.job, plan.names, journal, where, timeout=timeout) as runner:
                 found = _run(plan, runner, spread, progress or (lambda fraction: None))
-            except KeyboardInterrupt:
-                raise KeyboardInterrupt(
-                    f"interrupted; {journal.kept}" * bool(journal.kept)
-                ) from None
-            finally:
-                runner.close()
             if table is not None:
                 write(table, csv_text(*found.table()).encode())
             journal.remove()
@@ -365,7 +352,9 @@ def _plan(
         points = grid(varied) if runs is None else drawn(varied, runs, drawing[1], drawing[0])
     constraints = tuple(_constraint(text, known) for text in subject_to)
     wanted = [*outputs, *([goal[0]] if goal else []), *(c.output for c in constraints)]
-    kept = _outputs(list(dict.fromkeys(wanted)), known)
+    if not wanted:
+        raise ParameterError("no output is selected; name one, for instance settling")
+    kept = tuple(_output(text, known) for text in dict.fromkeys(wanted))
     for name in given.keys() & varied.keys():
         raise ParameterError(f"{name} is varied and has a fixed value; remove one of them")
     sources = dict(inputs or {})
@@ -373,7 +362,7 @@ def _plan(
     signals(mechanism, filled(sources, first), {**given, **first})  # Report mistakes.
     job = MechanismJob(mechanism, kept, given, sources, *_options(mechanism, given, *options),
                        tuple(known))  # fmt: skip
-    shown = {**{n: known.get(n, "") for n in varied}, **_output_units(kept, known)}
+    shown = {n: known.get(n, "") for n in varied} | {o.column: o.unit(known) for o in kept}
     return Plan(
         job, varied, points, goal, constraints, (runs is None and listed is None, *drawing), shown
     )
@@ -506,55 +495,10 @@ def _units(mechanism: Mechanism) -> dict[str, str]:
     return {variable.name: variable.unit for variable in every}
 
 
-def _outputs(texts: Sequence[str], known: Mapping[str, str]) -> tuple[Output, ...]:
-    """Return checked outputs."""
-    if not texts:
-        raise ParameterError("no output is selected; name one, for instance settling")
-    return tuple(_output(text, known) for text in texts)
-
-
 def _output(text: str, known: Mapping[str, str]) -> Output:
-    try:
-        output = parse(text, known)
-        output.check_extreme(known)
-    except SpecificationError as error:
-        raise ParameterError(f"output {error}") from None
-    if output.reduction == REST:
-        if output.variable.rpartition(".")[2] not in PLACES or output.variable not in known:
-            raise ParameterError(
-                f"output {text}: write rest(BODY.x), rest(BODY.y) or rest(BODY.angle)"
-            )
-        return output
-    if output.reduction == MODE:
-        return output
-    lacking = output.lacking(known)
-    if lacking:
-        remedy = QUANTITIES[output.variable].remedy
-        raise ParameterError(
-            f"output {text}: the mechanism has no {lacking}, from which it is computed"
-            + (f"; {remedy}" if remedy else "")
-        )
-    if output.reduction != QUANTITY and output.variable not in known:
-        hint = proposal(output.variable, dict.fromkeys([*known, *QUANTITIES]))
-        if hint.startswith("known") and len(known) > NAMES_LISTED_MAX:
-            hint = f"named quantities are {', '.join(QUANTITIES)}"
-        raise ParameterError(f"output {text}: unknown variable {output.variable!r}; {hint}")
+    output = parse_output(text, known)
+    output.check(known, "the mechanism")
     return output
-
-
-def _output_units(outputs: Sequence[Output], known: Mapping[str, str]) -> dict[str, str]:
-    """Return the units of outputs by their texts."""
-    found = {}
-    for output in outputs:
-        if output.reduction == QUANTITY:
-            found[output.column] = QUANTITIES[output.variable].unit
-        elif output.reduction == MODE:
-            found[output.column] = "Hz"
-        elif output.reduction == REST:
-            found[output.column] = PLACES[output.variable.rpartition(".")[2]]
-        else:
-            found[output.column] = "s" if output.reduction in TIMES else known[output.variable]
-    return found
 
 
 def _constraint(text: str, known: Mapping[str, str]) -> Constraint:
@@ -568,7 +512,7 @@ def _constraint(text: str, known: Mapping[str, str]) -> Constraint:
         raise ParameterError(f'constraint {text}: write it as in "fundamental > 40 Hz"')
     relation = text[at : at + 2] if text[at + 1 : at + 2] == "=" else text[at]
     output, bound = text[:at].strip(), text[at + len(relation) :].strip()
-    unit = _output_units([_output(output, known)], known)[output]
+    unit = _output(output, known).unit(known)
     return Constraint(text.strip(), output, relation, in_unit(f"constraint {output}", bound, unit))
 
 
