@@ -115,7 +115,7 @@ def test_constraints_are_active_at_the_optimum_of_a_plane():
     assert best.value == pytest.approx(2.0, rel=2e-3)
     assert [*best.point.values()] == pytest.approx([1.0, 1.0], abs=0.06)
     assert best.active == ("g > 1",)
-    assert best.constraints["g > 1"] >= 1.0
+    assert best.others["g"] >= 1.0
 
 
 def test_samples_that_violate_the_constraints_lead_to_those_that_do_not():
@@ -124,7 +124,7 @@ def test_samples_that_violate_the_constraints_lead_to_those_that_do_not():
         lambda x, y: (y * y + x, x * (1.0 + 0.1 * y)), np.linspace(0.0, 3.0, 3),
         np.linspace(-1.0, 1.0, 3), constraints=[Constraint("g > 3.1", "g", ">", 3.1)],
     )  # fmt: skip
-    assert best.constraints["g > 3.1"] > 3.1
+    assert best.others["g"] > 3.1
 
 
 # --- simulations ----------------------------------------------------------------------------------

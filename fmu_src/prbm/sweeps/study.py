@@ -102,6 +102,11 @@ class Study:
     share: Yield | None = None
     sensitivities: Mapping[str, Sensitivity] = field(default_factory=dict)
 
+    @property
+    def parameters(self) -> dict[str, Real]:
+        """The parameter of each simulation (n,) by name."""
+        return dict(zip(self.varied, self.points.T, strict=True))
+
     def __repr__(self) -> str:
         failed = sum(map(bool, self.messages))
         best = "" if self.optimum is None else f", {self.optimum!r}"
