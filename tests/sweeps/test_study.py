@@ -229,6 +229,14 @@ def test_flexures_have_the_outputs_of_a_stress_that_is_asked_for(mechanisms):
     assert large == pytest.approx(2.0 * small, rel=0.05)
 
 
+def test_flexures_have_the_stress_of_a_condition(mechanisms):
+    found = study(
+        mechanisms["PRBDM"], {"release.displacement": [-0.01, -0.005]},
+        subject_to=["peak_stress < 100 GPa"], stop_time=1e-3, step=1e-3, workers=1,
+    )  # fmt: skip
+    assert found.good.all()
+
+
 @pytest.mark.slow
 def test_processes_and_a_single_process_give_the_same_bits():
     """The second parameter varies fastest."""

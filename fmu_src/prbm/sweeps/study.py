@@ -8,6 +8,7 @@ The simulations run in processes on all cores of this machine, or in another exe
 
 import hashlib
 import math
+import re
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
@@ -50,7 +51,7 @@ from .design import (
 from .journal import Journal
 from .mechanism import MechanismJob
 from .optimum import REFINEMENTS_EXPECTED, Constraint, Optimum, Samples, Search
-from .outputs import Outcome, Output, parse_output
+from .outputs import Outcome, parse_output
 from .runner import Runner, check_limits, pool
 
 STEPS = 4000  # Communication steps of a simulation, which resolve the vibration after impacts.
@@ -58,6 +59,7 @@ RUNS_MAX = 100_000  # More simulations are a mistake in the number of samples.
 LAST_FRACTION = 0.99  # Reported progress while a refinement takes more simulations than usual.
 YIELD_RUNS = 256  # Simulations around an optimum that give its yield.
 YIELD_SEED = 1
+CONDITION = re.compile(r"(.*[^<>=])(<=|>=|<|>)([^<>=()]*)", re.DOTALL)  # "fundamental > 40 Hz".
 Vary = Mapping[str, Any] | str | Path
 
 
@@ -324,8 +326,11 @@ def _plan(
     options: tuple[Any, Any, Any, Any],
 ) -> Plan:
     """Return the checked study."""
-    if any("stress" in text for text in (*outputs, *([goal[0]] if goal else []), *subject_to)):
-        mechanism = with_stress(mechanism)
+    conditions = [_condition(text) for text in subject_to]
+    wanted = [*outputs, *([goal[0]] if goal else []), *(output for _, output, _, _ in conditions)]
+    if not wanted:
+        raise ParameterError("no output is selected; name one, for instance settling")
+    mechanism = _with_stress(mechanism, wanted)
     known = _units(mechanism)
     within = placeholders(inputs or {})
     listed = None
@@ -355,11 +360,14 @@ def _plan(
         points = listed
     else:
         points = grid(varied) if runs is None else drawn(varied, runs, drawing[1], drawing[0])
-    constraints = tuple(_constraint(text, known) for text in subject_to)
-    wanted = [*outputs, *([goal[0]] if goal else []), *(c.output for c in constraints)]
-    if not wanted:
-        raise ParameterError("no output is selected; name one, for instance settling")
-    kept = tuple(_output(text, known) for text in dict.fromkeys(wanted))
+    kept = tuple(parse_output(text, known) for text in dict.fromkeys(wanted))
+    for output in kept:
+        output.check(known, "the mechanism")
+    shown = {n: known.get(n, "") for n in varied} | {o.column: o.unit(known) for o in kept}
+    constraints = tuple(
+        Constraint(text, name, relation, in_unit(f"constraint {name}", bound, shown[name]))
+        for text, name, relation, bound in conditions
+    )
     for name in given.keys() & varied.keys():
         raise ParameterError(f"{name} is varied and has a fixed value; remove one of them")
     sources = dict(inputs or {})
@@ -367,7 +375,6 @@ def _plan(
     signals(mechanism, filled(sources, first), {**given, **first})  # Report mistakes.
     job = MechanismJob(mechanism, kept, given, sources, *_options(mechanism, given, *options),
                        tuple(known))  # fmt: skip
-    shown = {n: known.get(n, "") for n in varied} | {o.column: o.unit(known) for o in kept}
     return Plan(
         job, varied, points, goal, constraints, (runs is None and listed is None, *drawing), shown
     )
@@ -500,25 +507,20 @@ def _units(mechanism: Mechanism) -> dict[str, str]:
     return {variable.name: variable.unit for variable in every}
 
 
-def _output(text: str, known: Mapping[str, str]) -> Output:
-    output = parse_output(text, known)
-    output.check(known, "the mechanism")
-    return output
+def _with_stress(mechanism: Mechanism, outputs: Sequence[str]) -> Mechanism:
+    """Return the mechanism with the stress outputs of all flexures if outputs need one of them."""
+    stressed = with_stress(mechanism)
+    known, every = _units(mechanism), _units(stressed)
+    needed = {name for text in outputs for name in parse_output(text, every).variables(every)}
+    return stressed if needed & (every.keys() - known.keys()) else mechanism
 
 
-def _constraint(text: str, known: Mapping[str, str]) -> Constraint:
-    """Return the constraint of a text such as ``fundamental > 40 Hz``."""
-    depth, at = 0, -1
-    for k, sign in enumerate(text):
-        depth += (sign == "(") - (sign == ")")
-        if depth == 0 and sign in "<>":
-            at = k
-    if at < 0:
+def _condition(text: str) -> tuple[str, str, str, str]:
+    """Return the text, output, relation and bound of a text such as ``fundamental > 40 Hz``."""
+    found = CONDITION.fullmatch(text)
+    if found is None:
         raise ParameterError(f'constraint {text}: write it as in "fundamental > 40 Hz"')
-    relation = text[at : at + 2] if text[at + 1 : at + 2] == "=" else text[at]
-    output, bound = text[:at].strip(), text[at + len(relation) :].strip()
-    unit = _output(output, known).unit(known)
-    return Constraint(text.strip(), output, relation, in_unit(f"constraint {output}", bound, unit))
+    return text.strip(), found[1].strip(), found[2], found[3].strip()
 
 
 # --- simulations ----------------------------------------------------------------------------------
