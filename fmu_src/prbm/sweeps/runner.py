@@ -1,11 +1,15 @@
 """The runner of studies: rows of parameters, a simulation and an executor give rows of outcomes.
 
-The rows run in the threads of a ``concurrent.futures`` executor, for which other processes work
-(:mod:`.children`), or on the workers of a Dask cluster through ``Client.get_executor()``.  Each
-completed row is in the journal, so that an interrupted study continues from there.
+The rows run in the threads of a ``concurrent.futures`` executor, or on the workers of a Dask
+cluster through ``Client.get_executor()``.  The threads simulate themselves if the simulation lets
+others work meanwhile, as the kernel does; few short runs then need not wait for the start of
+processes.  Otherwise other processes work for them (:mod:`.children`).  Each completed row is in
+the journal, so that an interrupted study continues from there.
 """
 
+import ctypes
 import math
+import threading
 import time
 import uuid
 from collections import deque
@@ -43,6 +47,10 @@ class StudyError(PrbmError, RuntimeError):
     """The study cannot run, for a reason that does not depend on its parameters."""
 
 
+class Stopped(BaseException):
+    """Raised in a thread that simulates when the study ends before the simulation."""
+
+
 @dataclass
 class Pool:
     """An executor and the number of simulations that it runs at a time.
@@ -50,15 +58,18 @@ class Pool:
     Parameters
     ----------
     executor : Executor or None
-        None: this process runs the simulations.
+        None: this thread runs the simulations.
     threads : callable
         Returns the present number of parallel runs.
+    here : bool
+        Whether the threads of the executor simulate themselves, in this process.
     closing : callable
         Called with the name of the study at its end.
     """
 
     executor: Executor | None
     threads: Callable[[], int]
+    here: bool = False
     closing: Callable[[str], object] = release
 
 
@@ -81,7 +92,12 @@ def check_limits(workers: int | None, timeout: float | None, retries: int = 0) -
 
 @contextmanager
 def pool(
-    workers: int | None, runs: int, *, serial: bool = False, executor: Executor | str | None = None
+    workers: int | None,
+    runs: int,
+    *,
+    here: bool = False,
+    parallel: bool = False,
+    executor: Executor | str | None = None,
 ) -> Iterator[Pool]:
     """Yield where the simulations of a study run.
 
@@ -91,8 +107,10 @@ def pool(
         Number of parallel runs; None: one per core, or those of the executor.
     runs : int
         Number of runs.
-    serial : bool
-        With one worker the simulations may run in this process.
+    here : bool
+        The simulations may run in this process, where they cannot be ended: one at a time,
+    parallel : bool
+        or in parallel, since they release the lock of the interpreter.
     executor : Executor, str or None
         A ``concurrent.futures`` executor, or the address of a Dask scheduler.  None: threads of
         this process, each with a process that simulates.
@@ -107,7 +125,7 @@ def pool(
             yield Pool(
                 client.get_executor(pure=False),
                 lambda: max(1, sum(client.nthreads().values())),
-                lambda study: client.run(release, study),
+                closing=lambda study: client.run(release, study),
             )
         return
     if executor is not None:
@@ -115,18 +133,18 @@ def pool(
         client = getattr(known, "_client", None)  # Of Dask's ClientExecutor.
         if workers is None and client is not None:
             yield Pool(executor, lambda: max(1, sum(client.nthreads().values())),
-                       lambda study: client.run(release, study))  # fmt: skip
+                       closing=lambda study: client.run(release, study))  # fmt: skip
         else:
             count = workers or getattr(known, "_max_workers", None) or process_count(runs)
             yield Pool(executor, lambda: count)
         return
     count = process_count(max(runs, 1), workers)
-    if serial and count == 1:
+    if here and count == 1:
         yield Pool(None, lambda: 1)
         return
     threads = ThreadPoolExecutor(count)
     try:
-        yield Pool(threads, lambda: count)
+        yield Pool(threads, lambda: count, here and parallel)
     finally:
         threads.shutdown(cancel_futures=True)
 
@@ -185,6 +203,8 @@ class Runner:
     retries: int = 1
     timeout: float | None = None
     study: str = field(default_factory=lambda: uuid.uuid4().hex)
+    stopped: bool = False
+    busy: set[int] = field(default_factory=set)  # Threads that simulate themselves.
 
     def outcomes(self, points: Sequence[Point], progress: Progress | None = None) -> list[Outcome]:
         """Return the outcomes of points in their order; only those not in the journal are computed.
@@ -209,6 +229,11 @@ class Runner:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self.stopped = True
+        for thread in [*self.busy]:  # After an error or Ctrl-C.
+            ctypes.pythonapi.PyThreadState_SetAsyncExc(
+                ctypes.c_ulong(thread), ctypes.py_object(Stopped)
+            )
         with suppress(OSError, CancelledError):  # The scheduler may have ended.
             self.pool.closing(self.study)
         if kind is KeyboardInterrupt and self.journal.kept:
@@ -217,10 +242,22 @@ class Runner:
     def _row(self, point: Point) -> Row:
         return dict(zip(self.parameters, point, strict=True))
 
+    def run(self, rows: Sequence[Row]) -> list[Outcome]:
+        """Simulate in this thread, until the study ends."""
+        run: Callable[[Row], Outcome] = self.job.run  # type: ignore[attr-defined]
+        thread = threading.get_ident()
+        self.busy.add(thread)
+        try:
+            return [run(row) for row in rows if not self.stopped]
+        except Stopped:
+            return []
+        finally:
+            self.busy.discard(thread)
+
     def _computed(self, points: Sequence[Point]) -> Iterator[tuple[Point, Outcome]]:
         if self.pool.executor is None:
-            run = self.job.run  # type: ignore[attr-defined]
-            yield from ((point, run(self._row(point))) for point in points)
+            for point in points:
+                yield point, self.run([self._row(point)])[0]
         elif points:
             yield from _Batches(self, self.pool.executor).computed(points)
 
@@ -268,7 +305,8 @@ class _Batches:
         runner = self.runner
         job = (runner.job, runner.retries, runner.timeout) if given else None
         rows = [runner._row(point) for point in batch]
-        self.running[self.executor.submit(run_batch, runner.study, rows, job)] = batch
+        call = (runner.run, rows) if runner.pool.here else (run_batch, runner.study, rows, job)
+        self.running[self.executor.submit(*call)] = batch
 
     def _outcomes(self, future: "Future[Any]", batch: list[Point]) -> list[Outcome]:
         """Return the outcomes of a batch; none if it has to be repeated."""

@@ -2,7 +2,7 @@
 
     prbm study PRBDM2R --vary "stop.position=-8:8 mm:17" --of settling --minimise settling
 
-The simulations run in processes on all cores of this machine, or in another executor
+The simulations run on all cores of this machine, or in another executor
 (:mod:`.runner`).  A simulation that fails is a row with its message.
 """
 
@@ -191,8 +191,9 @@ def study(
     step : float, str or None
         Communication step, the resolution of the outputs in time [s]; None: 1/4000 of the duration.
     workers : int or None
-        Number of processes; None: one per core.  With one, the simulations run in this process,
-        unless they have a timeout.
+        Number of parallel simulations; None: one per core.  They run in threads of this process if
+        the kernel computes them.  With a timeout, or with the Python engine and more than one
+        worker, they run in other processes, and a crash costs only its simulation.
     executor : Executor, str or None
         A ``concurrent.futures`` executor, such as that of Dask's ``Client.get_executor()``, or the
         address of a Dask scheduler; None: this machine.
@@ -222,7 +223,10 @@ def study(
     if table is not None:
         check_file(Path(table))
     check_limits(workers, timeout)
-    with pool(workers, len(plan.points), serial=timeout is None, executor=executor) as where:
+    with pool(
+        workers, len(plan.points), here=timeout is None, parallel=plan.job.engine != PYTHON,
+        executor=executor,
+    ) as where:  # fmt: skip
         if where.executor is not None:
             _check_sources(plan.job.inputs)
         journal = Journal(
@@ -496,8 +500,8 @@ def _check_sources(inputs: Mapping[str, Source]) -> None:
     for name, source in inputs.items():
         if callable(source) and not isinstance(source, Signal):
             raise ParameterError(
-                f"{name}: a function cannot be sent to other processes; give a text or arrays, or "
-                "workers=1"
+                f"{name}: a function cannot be called by several workers; give a text or arrays, "
+                "or workers=1"
             )
 
 
