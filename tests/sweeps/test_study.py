@@ -13,7 +13,7 @@ from prbm.base import processes as base_processes
 from prbm.base.errors import ParameterError
 from prbm.files.settings import UserMistake
 from prbm.mechanics.stress import stressed, with_stress
-from prbm.plots.study import curves, maps
+from prbm.plots.study import behaviour_map, curves, maps
 from prbm.runs.run import simulate
 from prbm.sweeps import mechanism as simulations
 from prbm.sweeps import runner
@@ -405,3 +405,16 @@ def test_figures_show_all_outputs_and_the_optimum():
     assert mesh.shape == (3, 5)
     assert mesh[1, 2] == grid[2 * 3 + 1]
     drawn.draw_without_rendering()
+
+
+def test_a_map_of_behaviour_shows_both_ways():
+    """Their marks differ also without colours."""
+    x, strobe = np.array([1.0, 2.0]), np.array([[1e-3, 1e-3], [1e-3, -1e-3]])
+    ways = {name: (x, strobe, np.ones((2, 2))) for name in ("upwards", "downwards")}
+    figure = behaviour_map("Map", ("frequency", "Hz"), ("b.vx", "m/s"), ways)
+    upper, lower = figure.axes
+    assert [line.get_label() for line in upper.lines] == ["upwards", "downwards"]
+    assert len({line.get_marker() for line in upper.lines}) == 2
+    np.testing.assert_allclose(upper.lines[0].get_ydata(), [1.0, 1.0, 1.0, -1.0])  # mm/s
+    np.testing.assert_allclose(lower.lines[1].get_ydata(), 1.0)
+    assert lower.get_xlabel() == "frequency [Hz]"

@@ -1,6 +1,7 @@
-"""Figures of studies: outputs over one parameter, maps over two, scatter over more."""
+"""Figures of studies: outputs over one parameter, maps over two, scatter over more, behaviour."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,6 +18,10 @@ PANEL_HEIGHT, WIDTH = 2.2, 7.0  # Of an output over one parameter [inch].
 MAP = (4.6, 3.6)  # Width and height of a map [inch].
 MAP_COLUMNS = 2
 SCATTER = (2.6, 2.2)  # Width and height of a panel [inch].
+WAYS: tuple[dict[str, Any], ...] = (
+    {"color": BODY, "marker": ".", "markersize": 4.0},
+    {"color": IMPACT, "marker": "o", "markersize": 5.0, "markerfacecolor": "none"},
+)  # Of ways of a map of behaviour, which differ in black and white, too.
 
 
 class Scaled:
@@ -182,4 +187,40 @@ def scatter(
             handles, labels, loc="outside upper right", ncols=3, frameon=False, fontsize=9
         )
     figure.suptitle(title, fontsize=11, x=0.01, ha="left")
+    return figure
+
+
+@own_style()
+def behaviour_map(
+    title: str,
+    varied: tuple[str, str],
+    output: tuple[str, str],
+    ways: Mapping[str, tuple[Real, Real, Real]],
+) -> Figure:
+    """Draw a map of behaviour: an output once per driving period, and the impacts per period.
+
+    Parameters
+    ----------
+    title : str
+        Title of the figure.
+    varied, output : (str, str)
+        Name and SI unit of the varied number and of the output.
+    ways : mapping
+        For each way of the number, ``"upwards"``, its values (n,), and at each value the output
+        (n, m) and the number of impacts (n, m) in m driving periods.
+    """
+    every = [np.concatenate([np.ravel(way[k]) for way in ways.values()]) for k in (0, 1)]
+    x, y = Scaled(*varied, every[0]), Scaled(*output, every[1])
+    figure, (upper, lower) = panels(2, 1, (WIDTH, 0.6 + 2.0 * PANEL_HEIGHT))
+    for (label, (values, strobe, impacts)), style in zip(ways.items(), WAYS, strict=False):
+        at = np.repeat(x.factor * values, strobe.shape[1])
+        upper.plot(at, y.factor * strobe.ravel(), **style, linestyle="none", label=label)
+        lower.plot(x.factor * values, impacts.mean(axis=1), **style, linewidth=0.8)
+    upper.set_title(title, fontsize=11, loc="left")
+    upper.set_ylabel(y.label.replace(" [", "\n["))
+    lower.set_ylabel("impacts\nper period")
+    lower.set_xlabel(x.label)
+    if len(ways) > 1:
+        upper.legend(loc="best", fontsize=9, frameon=False)
+    figure.align_ylabels([upper, lower])
     return figure
