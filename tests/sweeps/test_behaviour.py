@@ -1,9 +1,11 @@
-"""Maps of behaviour: the bouncing ball on a table, whose thresholds are known in closed form."""
+"""Maps of behaviour against closed forms: the bouncing ball, and the linear impact oscillator."""
 
 import math
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
+from scipy.optimize import brentq
 
 from prbm.base.errors import ParameterError
 from prbm.references.scalar_guide import ScalarGuide
@@ -55,6 +57,83 @@ def test_the_bouncing_ball_hits_the_table_once_a_period(mechanisms):
     assert found.period(0) == 1
     speed = GRAVITY / FREQUENCY / (1 + RESTITUTION)
     np.testing.assert_allclose(found.speeds[0], speed, rtol=1e-3)
+
+
+# --- the linear impact oscillator -----------------------------------------------------------------
+
+LINEAR = {"gravity.x": 0.0, "gravity.y": 0.0, "damping.beta": 0.0, "stop.rest_speed": 1e-5}
+ZETA, BOUNCE = 0.05, 0.5
+
+
+def closed_orbit(ratio: float) -> tuple[float, np.ndarray]:
+    """Return closing speed and multipliers of the motion with one impact per period.
+
+    The wall is in the middle, and x'' + 2 zeta x' + x = sin(ratio t + phase) (Shaw, Holmes 1983).
+    Between impacts x = p + Phi(t) (x_0 - p_0) with the periodic response p of the linear oscillator
+    and Phi = exp(A t).  From x(0) = (0, v) to x(T) = (0, -v/eps),
+
+        p_0 = (I - Phi)^-1 ((0, -v/eps) - Phi (0, v)),
+
+    and the amplitude of p gives v.  The multipliers are the eigenvalues of S Phi with the saltation
+    matrix S of the impact.
+    """
+    phi = expm(np.array([[0.0, 1.0], [-1.0, -2.0 * ZETA]]) * 2.0 * math.pi / ratio)
+    p = np.linalg.solve(np.eye(2) - phi, [0.0, -1.0 / BOUNCE] - phi @ [0.0, 1.0])
+    v = 1.0 / abs(1.0 - ratio**2 + 2j * ZETA * ratio) / math.hypot(p[0], p[1] / ratio)
+    force = v * (p[0] * (1.0 - ratio**2) + 2.0 * ZETA * p[1])
+    before, after = force + 2.0 * ZETA * v / BOUNCE, force - 2.0 * ZETA * v
+    saltation = [[-BOUNCE, 0.0], [-(after + BOUNCE * before) / (v / BOUNCE), -BOUNCE]]
+    return v / BOUNCE, np.linalg.eigvals(np.array(saltation) @ phi)
+
+
+@pytest.mark.slow
+def test_the_impact_oscillator_of_shaw_and_holmes_doubles_its_period(mechanisms):
+    """The speeds are those of the closed form; the period doubles where a multiplier is -1."""
+    guide, size = mechanisms["PRBDM"], 2e-4  # m; angles of 0.006 rad are linear.
+    values = {**LINEAR, "damping.zeta": ZETA, "stop.position": 0.0, "stop.restitution": BOUNCE,
+              "release.displacement": -0.5 * size}  # fmt: skip
+    scalar = ScalarGuide.of({**guide.values(), **values})
+    omega = 2.0 * math.pi * scalar.frequency
+    threshold = brentq(lambda ratio: closed_orbit(ratio)[1].real.min() + 1.0, 2.5, 3.0)
+    ratios = np.array([2.2, 2.45, threshold - 0.03, threshold + 0.03])
+    frequencies = ratios * scalar.frequency
+    force = f"sine({size * scalar.mass * omega**2} N, {{frequency}} Hz, {{start}} s)"
+    found = behaviour(
+        guide, "frequency", frequencies, ["shuttle.vx"], {"force.x": force}, 1.0 / frequencies,
+        values=values, transient=100, periods=8,
+    )  # fmt: skip
+    assert [found.period(k) for k in range(4)] == [1, 1, 1, 2]
+    assert (found.impacts == 1).all()
+    for ratio, speeds in zip(ratios[:3], found.speeds, strict=False):
+        np.testing.assert_allclose(speeds, size * omega * closed_orbit(ratio)[0], rtol=2e-4)
+
+
+def test_grazing_impacts_follow_the_square_root_of_nordmark(mechanisms):
+    """From the linear response of amplitude A, the first impact at a gap d has w sqrt(A^2 - d^2).
+
+    Below A = d there is none (Nordmark 1991).
+    """
+    guide, gap, ratio = mechanisms["PRBDM"], 2e-4, 0.7
+    values = {**LINEAR, "damping.zeta": ZETA, "stop.position": gap, "stop.restitution": BOUNCE}
+    scalar = ScalarGuide.of({**guide.values(), **values})
+    omega = 2.0 * math.pi * scalar.frequency
+    response = 1.0 / (1.0 - ratio**2 + 2j * ZETA * ratio) / (scalar.mass * omega**2)
+    for above in (-0.01, 0.01, 0.04):
+        force = (1.0 + above) * gap / abs(response)
+        start = {
+            "release.displacement": force * response.imag,
+            "release.velocity": ratio * omega * force * response.real,
+        }
+        found = behaviour(
+            guide, "size", [force], ["shuttle.x"],
+            {"force.x": f"sine({{size}} N, {ratio * scalar.frequency} Hz)"},
+            1.0 / (ratio * scalar.frequency), values=values | start, transient=0, periods=3,
+        )  # fmt: skip
+        if above < 0.0:
+            assert found.impacts.sum() == 0
+        else:
+            speed = ratio * omega * gap * math.sqrt((1.0 + above) ** 2 - 1.0)
+            assert found.speeds[0][0] == pytest.approx(speed, rel=2e-3)
 
 
 @pytest.mark.parametrize(

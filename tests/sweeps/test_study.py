@@ -13,7 +13,7 @@ from prbm.base import processes as base_processes
 from prbm.base.errors import ParameterError
 from prbm.files.settings import UserMistake
 from prbm.mechanics.stress import stressed, with_stress
-from prbm.plots.study import curves, maps
+from prbm.plots.study import behaviour_map, curves, maps
 from prbm.runs.run import simulate
 from prbm.sweeps import mechanism as simulations
 from prbm.sweeps import runner
@@ -115,7 +115,7 @@ def test_constraints_are_active_at_the_optimum_of_a_plane():
     assert best.value == pytest.approx(2.0, rel=2e-3)
     assert [*best.point.values()] == pytest.approx([1.0, 1.0], abs=0.06)
     assert best.active == ("g > 1",)
-    assert best.constraints["g > 1"] >= 1.0
+    assert best.others["g"] >= 1.0
 
 
 def test_samples_that_violate_the_constraints_lead_to_those_that_do_not():
@@ -124,7 +124,7 @@ def test_samples_that_violate_the_constraints_lead_to_those_that_do_not():
         lambda x, y: (y * y + x, x * (1.0 + 0.1 * y)), np.linspace(0.0, 3.0, 3),
         np.linspace(-1.0, 1.0, 3), constraints=[Constraint("g > 3.1", "g", ">", 3.1)],
     )  # fmt: skip
-    assert best.constraints["g > 3.1"] > 3.1
+    assert best.others["g"] > 3.1
 
 
 # --- simulations ----------------------------------------------------------------------------------
@@ -229,17 +229,25 @@ def test_flexures_have_the_outputs_of_a_stress_that_is_asked_for(mechanisms):
     assert large == pytest.approx(2.0 * small, rel=0.05)
 
 
+def test_flexures_have_the_stress_of_a_condition(mechanisms):
+    found = study(
+        mechanisms["PRBDM"], {"release.displacement": [-0.01, -0.005]},
+        subject_to=["peak_stress < 100 GPa"], stop_time=1e-3, step=1e-3, workers=1,
+    )  # fmt: skip
+    assert found.good.all()
+
+
 @pytest.mark.slow
-def test_processes_and_a_single_process_give_the_same_bits():
-    """The second parameter varies fastest."""
+def test_processes_and_threads_give_the_same_bits():
+    """With a timeout, each worker has a process.  The second parameter varies fastest."""
     script = """
 import numpy as np, prbm
 from prbm.sweeps.study import study
 if __name__ == "__main__":
     vary = {"stop.position": [0.0, 1e-3], "stop.restitution": [0.2, 0.3, 0.4]}
     guide = prbm.load("PRBDM")
-    one, two = (study(guide, vary, ["impacts", "shuttle.vx"], stop_time=0.08, step=1e-3, workers=n)
-                for n in (1, 2))
+    one, two = (study(guide, vary, ["impacts", "shuttle.vx"], stop_time=0.08, step=1e-3, workers=2,
+                      timeout=limit) for limit in (None, 100.0))
     assert one.points[:, 1].tolist() == [0.2, 0.3, 0.4] * 2
     for name, x in one.outputs.items():
         assert x.tolist() == two.outputs[name].tolist()
@@ -286,13 +294,16 @@ MISTAKES = [
     ({"vary": {}}, "0 parameters are varied; vary at least one"),
     ({"vary": {"stop.position": np.arange(200_000)}}, "the study has 200000 simulations"),
     ({"outputs": []}, "no output is selected; name one, for instance settling"),
-    ({"outputs": ["setling"]}, "output setling: unknown variable 'setling'; did you mean settling"),
+    (
+        {"outputs": ["setling"]},
+        "output setling: the mechanism has no variable 'setling'; did you mean settling",
+    ),
     ({"outputs": ["first(shuttle.x > a)"]}, "bound 'a' must be a number"),
     ({"minimise": "impacts", "maximise": "impacts"}, "minimise and maximise are both given"),
     ({"values": {"stop.position": 0.0}}, "is varied and has a fixed value"),
     ({"minimise": "settling"}, "no simulation has a value of settling; simulate longer"),
     ({"workers": 0}, "workers = 0 must be 1 or more"),
-    ({"workers": 2, "inputs": {"force.x": math.sin}}, "a function cannot be sent to other proc"),
+    ({"workers": 2, "inputs": {"force.x": math.sin}}, "a function cannot be called by several"),
 ]
 EVERYWHERE = [  # Mistakes at which every simulation would fail.
     ({"stop_time": "1 m"}, "another dimension"),
@@ -330,7 +341,7 @@ def test_mistakes_in_all_simulations_are_reported_before_the_first_one(
 
 
 def test_quantities_that_a_mechanism_does_not_have_are_rejected(mechanisms):
-    with pytest.raises(ParameterError, match=r"unknown variable .stop\.x."):
+    with pytest.raises(ParameterError, match=r"has no variable .stop\.x."):
         study(mechanisms["PRBDM"], {"stop.position": [0.0, 1e-3]}, ["max(stop.x)"])
 
 
@@ -394,3 +405,16 @@ def test_figures_show_all_outputs_and_the_optimum():
     assert mesh.shape == (3, 5)
     assert mesh[1, 2] == grid[2 * 3 + 1]
     drawn.draw_without_rendering()
+
+
+def test_a_map_of_behaviour_shows_both_ways():
+    """Their marks differ also without colours."""
+    x, strobe = np.array([1.0, 2.0]), np.array([[1e-3, 1e-3], [1e-3, -1e-3]])
+    ways = {name: (x, strobe, np.ones((2, 2))) for name in ("upwards", "downwards")}
+    figure = behaviour_map("Map", ("frequency", "Hz"), ("b.vx", "m/s"), ways)
+    upper, lower = figure.axes
+    assert [line.get_label() for line in upper.lines] == ["upwards", "downwards"]
+    assert len({line.get_marker() for line in upper.lines}) == 2
+    np.testing.assert_allclose(upper.lines[0].get_ydata(), [1.0, 1.0, 1.0, -1.0])  # mm/s
+    np.testing.assert_allclose(lower.lines[1].get_ydata(), 1.0)
+    assert lower.get_xlabel() == "frequency [Hz]"

@@ -246,7 +246,7 @@ def study_arguments(parser: ArgumentParser) -> None:
         "--tolerance", metavar="X",
         help="relative tolerance of the integration (default: solver.tolerance)",
     )  # fmt: skip
-    add("--workers", type=int, metavar="N", help="number of processes (default: one per core)")
+    add("--workers", type=int, metavar="N", help="number of parallel runs (default: one per core)")
     add(
         "--scheduler", metavar="ADDRESS",
         help="Dask scheduler that runs the simulations, e.g. tcp://host:8786",

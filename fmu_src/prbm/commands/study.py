@@ -65,8 +65,7 @@ def run_study(options: argparse.Namespace) -> None:
         table=None if options.out is None else options.out / table,
         overwrite=options.overwrite, progress=reporter(),
     )  # fmt: skip
-    columns = dict(zip(found.varied, found.points.T, strict=True)) | dict(found.outputs)
-    _print_table(columns, found.units)
+    _print_table({**found.parameters, **found.outputs}, found.units)
     failed = [message for message in found.messages if message]
     print(f"{len(found.points)} simulations, {len(failed)} failed")
     for message in dict.fromkeys(failed[:3]):
@@ -166,10 +165,9 @@ def _optimum_lines(optimum: Optimum, units: Mapping[str, str], verb: str) -> lis
     ]
     if optimum.constraints:
         reached = [
-            f"{text} ({_text(x, units[name])}{', active' * (text in optimum.active)})"
-            for (text, x), name in zip(
-                optimum.constraints.items(), optimum.constrained, strict=True
-            )
+            f"{c.text} ({_text(optimum.others[c.output], units[c.output])}"
+            f"{', active' * (c.text in optimum.active)})"
+            for c in optimum.constraints
         ]
         lines.append(f"constraints: {'; '.join(reached)}")
     if "impacts" in optimum.others:
@@ -232,9 +230,10 @@ def _figure(mechanism: Mechanism, found: Study) -> "Figure":
 
     best = found.optimum
     if not found.whole_grid or len(found.varied) > 2:
-        columns = dict(zip(found.varied, found.points.T, strict=True))
         point = None if best is None else (best.point, best.others)
-        return scatter(mechanism.title, columns, found.outputs, found.units, found.good, point)
+        return scatter(
+            mechanism.title, found.parameters, found.outputs, found.units, found.good, point
+        )
     if len(found.varied) == 2:
         marked = None if best is None else (best.output, [*best.point.values()], best.value)
         return maps(mechanism.title, found.varied, found.outputs, found.units, marked)

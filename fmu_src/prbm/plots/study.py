@@ -1,6 +1,8 @@
-"""Figures of studies: outputs over one parameter, maps over two, scatter over more."""
+"""Figures of studies: outputs over one parameter, maps over two, scatter over more, behaviour."""
 
 from collections.abc import Mapping, Sequence
+from textwrap import fill
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,6 +19,11 @@ PANEL_HEIGHT, WIDTH = 2.2, 7.0  # Of an output over one parameter [inch].
 MAP = (4.6, 3.6)  # Width and height of a map [inch].
 MAP_COLUMNS = 2
 SCATTER = (2.6, 2.2)  # Width and height of a panel [inch].
+LETTERS = 11.0  # Of a title in an inch, at most.
+WAYS: tuple[dict[str, Any], ...] = (
+    {"color": BODY, "marker": ".", "markersize": 4.0},
+    {"color": IMPACT, "marker": "o", "markersize": 5.0, "markerfacecolor": "none"},
+)  # Of ways of a map of behaviour, which differ in black and white, too.
 
 
 class Scaled:
@@ -33,7 +40,8 @@ class Scaled:
     def __init__(self, name: str, unit: str, x: Real) -> None:
         known = np.abs(x[np.isfinite(x)])
         largest = float(known.max()) if len(known) else 0.0
-        self.factor, shown = prefixed_unit(largest, unit) if unit else (1.0, "-")
+        plain_number = unit in ("", "1")
+        self.factor, shown = (1.0, "-") if plain_number else prefixed_unit(largest, unit)
         self.label, self.x = f"{name} [{shown}]", self.factor * x
 
 
@@ -165,9 +173,9 @@ def scatter(
         for j, (name, samples) in enumerate(parameters.items()):
             x, axes = Scaled(name, units[name], samples), table[i, j]
             if not held.all():
-                axes.plot(x.x[~held], y.x[~held], "o", markerfacecolor="none", color=PAST,
+                axes.plot(x.x[~held], y.x[~held], "o", markerfacecolor="none", color=BODY,
                           markersize=3.5, label="violated")  # fmt: skip
-            axes.plot(x.x[held], y.x[held], "o", color=BODY, markersize=3.0, label="simulations")
+            axes.plot(x.x[held], y.x[held], "o", color=PAST, markersize=3.0, label="simulations")
             if best is not None:
                 axes.plot(x.factor * best[0][name], y.factor * best[1][output], "v", color=IMPACT,
                           markersize=7.0, label="optimum")  # fmt: skip
@@ -179,7 +187,44 @@ def scatter(
     if best is not None or not held.all():
         handles, labels = table[0, 0].get_legend_handles_labels()
         figure.legend(
-            handles, labels, loc="outside upper right", ncols=3, frameon=False, fontsize=9
+            handles, labels, loc="outside lower center", ncols=3, frameon=False, fontsize=9
         )
-    figure.suptitle(title, fontsize=11, x=0.01, ha="left")
+    lines = fill(title, int(size[0] * LETTERS))
+    figure.suptitle(lines, fontsize=11, x=0.01, ha="left")
+    return figure
+
+
+@own_style()
+def behaviour_map(
+    title: str,
+    varied: tuple[str, str],
+    output: tuple[str, str],
+    ways: Mapping[str, tuple[Real, Real, Real]],
+) -> Figure:
+    """Draw a map of behaviour: an output once per driving period, and the impacts per period.
+
+    Parameters
+    ----------
+    title : str
+        Title of the figure.
+    varied, output : (str, str)
+        Name and SI unit of the varied number and of the output.
+    ways : mapping
+        For each way of the number, ``"upwards"``, its values (n,), and at each value the output
+        (n, m) and the number of impacts (n, m) in m driving periods.
+    """
+    every = [np.concatenate([np.ravel(way[k]) for way in ways.values()]) for k in (0, 1)]
+    x, y = Scaled(*varied, every[0]), Scaled(*output, every[1])
+    figure, (upper, lower) = panels(2, 1, (WIDTH, 0.6 + 2.0 * PANEL_HEIGHT))
+    for (label, (values, strobe, impacts)), style in zip(ways.items(), WAYS, strict=False):
+        at = np.repeat(x.factor * values, strobe.shape[1])
+        upper.plot(at, y.factor * strobe.ravel(), **style, linestyle="none", label=label)
+        lower.plot(x.factor * values, impacts.mean(axis=1), **style, linewidth=0.8)
+    upper.set_title(title, fontsize=11, loc="left")
+    upper.set_ylabel(y.label.replace(" [", "\n["))
+    lower.set_ylabel("impacts\nper period")
+    lower.set_xlabel(x.label)
+    if len(ways) > 1:
+        upper.legend(loc="best", fontsize=9, frameon=False)
+    figure.align_ylabels([upper, lower])
     return figure

@@ -15,14 +15,14 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
+from itertools import chain
 from typing import Any, BinaryIO, Protocol
 
 from ..base.threads import THREAD_LIMITS
 from .outputs import CRASHED, TIMEOUT, Outcome
 
-IDLE_MAX = 600.0  # Time without a run after which a process ends [s]: its parent was killed.
 EXIT_TIMEOUT = 5.0  # Longest wait for the exit of a process before it is killed [s].
 STOPPED = "the study was stopped"
 COMMAND = "from prbm.sweeps.children import main; main()"
@@ -63,22 +63,11 @@ def main() -> None:
         _reply(replies, f"{error}" or type(error).__name__)
         return
     _reply(replies, "")
-    for values in _queued(batches):
+    for values in chain.from_iterable(iter(batches.get, None)):
         outcome = run(values)
         _reply(replies, outcome)
         if outcome.spent:
-            break
-    replies.flush()
-    os._exit(0)  # An FMU may hang after an error when its library is unloaded.
-
-
-def _queued(batches: "queue.Queue[Any]") -> Iterator[Row]:
-    """Yield start values of runs until none arrive for :data:`IDLE_MAX`."""
-    while True:
-        try:
-            yield from batches.get(timeout=IDLE_MAX)
-        except queue.Empty:
-            return
+            os._exit(0)  # An FMU may hang after an error when its library is unloaded.
 
 
 def _read(stream: BinaryIO, batches: "queue.Queue[Any]") -> None:
@@ -255,7 +244,7 @@ class Processes:
         if child is not None and child.process.poll() is None:
             child.stderr.truncate(0)
             return child
-        if child is not None:  # It ended itself after IDLE_MAX without work.
+        if child is not None:  # It was killed while it had no work.
             self._drop(child)
         child = Child(self.task)
         with self.lock:

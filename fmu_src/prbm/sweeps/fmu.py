@@ -9,21 +9,7 @@ import io
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from ctypes import (
-    c_bool,
-    c_double,
-    c_float,
-    c_int,
-    c_int8,
-    c_int16,
-    c_int32,
-    c_int64,
-    c_uint,
-    c_uint8,
-    c_uint16,
-    c_uint32,
-    c_uint64,
-)
+from ctypes import c_uint
 from dataclasses import dataclass, field
 from itertools import pairwise
 from math import isclose
@@ -50,12 +36,8 @@ if TYPE_CHECKING:
 SAMPLING_TOLERANCE = 1e-6  # Of inputs over time, if the FMU proposes no tolerance.
 DISCARD, FATAL = 2, 4  # Values of fmi2Status and fmi3Status.
 LAST_TIME, TERMINATED = 2, 3  # Values of fmi2StatusKind.
-C_TYPES_2: dict[str, Any] = {"Real": c_double, "Integer": c_int, "Boolean": c_int}
-C_TYPES_3: dict[str, Any] = {
-    "Float64": c_double, "Float32": c_float, "Boolean": c_bool,
-    "Int8": c_int8, "Int16": c_int16, "Int32": c_int32, "Int64": c_int64,
-    "UInt8": c_uint8, "UInt16": c_uint16, "UInt32": c_uint32, "UInt64": c_uint64,
-}  # fmt: skip
+TYPES_2 = {"Real": np.double, "Integer": np.intc, "Boolean": np.intc}
+"""Types of the numbers of FMI 2.0; those of FMI 3.0 have the names of NumPy, or are Boolean."""
 MESSAGES_MAX = 5  # Most messages of the FMU in the message of a failed run.
 LOGGED_MAX = 100  # More messages in a run switch logging off for the next runs.
 
@@ -429,7 +411,8 @@ class _Recorder:
         self.names = [variable.name for group in groups.values() for variable in group]
         for kind, group in groups.items():
             n = len(group)
-            values = ((C_TYPES_2 if two else C_TYPES_3)[kind] * n)()
+            kept = TYPES_2[kind] if two else np.dtype(kind.lower().replace("boolean", "bool"))
+            values = np.ctypeslib.as_ctypes(np.zeros(n, kept))
             references = (c_uint * n)(*(variable.valueReference for variable in group))
             function = getattr(fmu, f"fmi{2 if two else 3}Get{kind}")
             self.calls.append((function, (references, n, values) + (() if two else (n,)), values))

@@ -100,12 +100,8 @@ class Optimum:
         First and last of the five neighbouring samples of one parameter whose worst output is best,
         and this output.  None with more parameters, with fewer samples, or if all ranges have
         failed simulations.
-    constraints : mapping
-        For each constraint the value of its output at the optimum.
-    active : tuple of str
-        The constraints whose output is within 1 % of the bound.
-    constrained : tuple of str
-        The outputs of the constraints.
+    constraints : tuple of Constraint
+        The conditions, which hold.
     best : (b, p)
         The ten best of all points that differ from each other, the best one first.
     best_values : (b,)
@@ -122,12 +118,15 @@ class Optimum:
     points: Real
     values: Real
     robust: tuple[float, float, float] | None = None
-    constraints: Mapping[str, float] = field(default_factory=dict)
-    active: tuple[str, ...] = ()
-    constrained: tuple[str, ...] = ()
+    constraints: Sequence[Constraint] = ()
     best: Real = field(default_factory=lambda: np.empty((0, 0)))
     best_values: Real = field(default_factory=lambda: np.empty(0))
     others: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def active(self) -> tuple[str, ...]:
+        """Texts of the constraints whose output is within 1 % of the bound."""
+        return tuple(c.text for c in self.constraints if c.active(self.others[c.output]))
 
     def __repr__(self) -> str:
         place = ", ".join(f"{name} = {x:.6g}" for name, x in self.point.items())
@@ -249,7 +248,6 @@ class Search:
         k, names = int(order[0]), self.samples.names
         points, found = np.array(self.points), self.found[k]
         costs = np.array(self.costs[self.count :])
-        reached = {c.text: float(found[self.index[c.output]]) for c in self.constraints}
         best = self._distinct(order)
         return Optimum(
             self.output,
@@ -260,9 +258,7 @@ class Search:
             points[self.count :],
             np.where(np.isfinite(costs), self.sign * costs, math.nan),
             self._robust() if len(names) == 1 else None,
-            reached,
-            tuple(c.text for c in self.constraints if c.active(reached[c.text])),
-            tuple(c.output for c in self.constraints),
+            self.constraints,
             points[best],
             self.sign * np.array(self.costs)[best],
             dict(zip(self.samples.outputs, map(float, found), strict=True)),

@@ -4,7 +4,7 @@ The module imports NumPy only, and so starts quickly.
 """
 
 import re
-from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import nan
 from typing import Any
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import ParameterError
+from ..base.names import proposal
 from ..hybrid.records import Impact
 from ..runs.quantities import QUANTITIES
 
@@ -38,9 +39,9 @@ OF_IMPACTS = (
 )  # fmt: skip
 """Outputs of stops that each impact replaces."""
 
-
-class SpecificationError(ValueError):
-    """The text of an output is invalid; the message names the reason."""
+TIMES = ("first", "since")  # Reductions whose value is a time.
+PLACES = {"x": "m", "y": "m", "angle": "rad"}  # Outputs of a rest position, and their units.
+NAMES_LISTED_MAX = 12  # Messages about unknown variables do not list more names.
 
 
 # --- outputs ------------------------------------------------------------------------------------
@@ -93,7 +94,17 @@ class Output:
     @property
     def at_impacts(self) -> bool:
         """Whether values directly before and after each impact are needed."""
-        return self.history and self.reduction not in ("first", "since")
+        return self.history and self.reduction not in TIMES
+
+    def unit(self, units: Mapping[str, str]) -> str:
+        """Return the unit of the value, from those of the variables."""
+        if self.reduction == QUANTITY:
+            return QUANTITIES[self.variable].unit
+        if self.reduction == MODE:
+            return "Hz"
+        if self.reduction == REST:
+            return PLACES[self.variable.rpartition(".")[2]]
+        return "s" if self.reduction in TIMES else units[self.variable]
 
     def at_rest(self, shape: Any) -> float:
         """Return the value of a static output for a static shape.
@@ -117,31 +128,51 @@ class Output:
             return QUANTITIES[self.variable].variables(names)
         return [self.variable]
 
-    def lacking(self, names: Iterable[str]) -> str:
-        """Return a variable that a named quantity needs and that is not among names, or ``""``."""
-        return QUANTITIES[self.variable].lacking(names) if self.reduction == QUANTITY else ""
+    def check(self, names: Collection[str], owner: str) -> None:
+        """Reject an output that cannot be computed from the variables of a mechanism or an FMU.
 
-    def check_extreme(self, names: Container[str]) -> None:
-        """Reject an extreme of samples that can miss a short pulse, if its peak is known.
+        Parameters
+        ----------
+        names : collection of str
+            The variables.
+        owner : str
+            What has them, for messages: ``the mechanism``.
 
         Raises
         ------
-        SpecificationError
-            If the output is the maximum or minimum of the force of a compliant stop, or of a stress
-            whose peak is a variable among names.
+        ParameterError
+            If a variable is unknown; or if the output is the extreme of a pulse that samples can
+            miss, the force of a compliant stop or a stress, and its peak is a variable.
 
         Examples
         --------
-        >>> Output("max(s.force)", "s.force", "max").check_extreme(["s.force"])
+        >>> Output("max(s.force)", "s.force", "max").check(["s.force"], "the mechanism")
         """
         part, dot, last = self.variable.rpartition(".")
-        peak = PULSES.get(dot + last, "")
-        if self.reduction not in ("max", "min") or not peak or f"{part}.{peak}" not in names:
+        if self.reduction == REST and (last not in PLACES or self.variable not in names):
+            raise self._error("write rest(BODY.x), rest(BODY.y) or rest(BODY.angle)")
+        if self.static:
             return
-        raise SpecificationError(
-            f"{self.column}: {self.variable} is a pulse that may pass between two samples; use "
-            f"{peak}, the largest of the whole motion, or max({part}.{peak})"
-        )
+        peak = PULSES.get(dot + last, "")
+        if self.reduction in ("max", "min") and peak and f"{part}.{peak}" in names:
+            raise self._error(
+                f"{self.variable} is a pulse that may pass between two samples; use {peak}, the "
+                f"largest of the whole motion, or max({part}.{peak})"
+            )
+        quantity = QUANTITIES[self.variable] if self.reduction == QUANTITY else None
+        if quantity is not None and (lacking := quantity.lacking(names)):
+            remedy = f"; {quantity.remedy}" * bool(quantity.remedy)
+            raise self._error(
+                f"{owner} has no variable {lacking}, from which it is computed{remedy}"
+            )
+        if quantity is None and self.variable not in names:
+            hint = proposal(self.variable, dict.fromkeys([*names, *QUANTITIES]))
+            if hint.startswith("known") and len(names) > NAMES_LISTED_MAX:
+                hint = f"named quantities are {', '.join(QUANTITIES)}"
+            raise self._error(f"{owner} has no variable {self.variable!r}; {hint}")
+
+    def _error(self, reason: str) -> ParameterError:
+        return ParameterError(f"output {self.column}: {reason}")
 
 
 RELATIONS: dict[str, Callable[[Real, float], NDArray[np.bool_]]] = {
@@ -160,7 +191,7 @@ def parse_output(text: str, known: Container[str], column: str | None = None) ->
 
     Raises
     ------
-    SpecificationError
+    ParameterError
         If the bound of a condition is not a number.
 
     Examples
@@ -185,14 +216,14 @@ def parse_output(text: str, known: Container[str], column: str | None = None) ->
         return _absolute(Output(name, text), known)
     reduction, inner = call[1], call[2].strip()
     condition = _CONDITION.fullmatch(inner)
-    if reduction not in ("first", "since") or inner in known or condition is None:
+    if reduction not in TIMES or inner in known or condition is None:
         return _absolute(Output(name, inner, reduction), known)
     limit = condition[3].strip()
     try:
         bound = float(limit)
     except ValueError:
-        raise SpecificationError(
-            f"{text}: bound {limit!r} must be a number, as in first(shuttle.x > 0.001)"
+        raise ParameterError(
+            f"output {text}: bound {limit!r} must be a number, as in first(shuttle.x > 0.001)"
         ) from None
     return _absolute(Output(name, condition[1].rstrip(), reduction, condition[2], bound), known)
 

@@ -1,11 +1,15 @@
 """The runner of studies: rows of parameters, a simulation and an executor give rows of outcomes.
 
-The rows run in the threads of a ``concurrent.futures`` executor, for which other processes work
-(:mod:`.children`), or on the workers of a Dask cluster through ``Client.get_executor()``.  Each
-completed row is in the journal, so that an interrupted study continues from there.
+The rows run in the threads of a ``concurrent.futures`` executor, or on the workers of a Dask
+cluster through ``Client.get_executor()``.  The threads simulate themselves if the simulation lets
+others work meanwhile, as the kernel does; few short runs then need not wait for the start of
+processes.  Otherwise other processes work for them (:mod:`.children`).  Each completed row is in
+the journal, so that an interrupted study continues from there.
 """
 
+import ctypes
 import math
+import threading
 import time
 import uuid
 from collections import deque
@@ -22,7 +26,7 @@ from concurrent.futures import (
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from statistics import median
-from typing import Any
+from typing import Any, Self
 
 from ..base.errors import ParameterError, PrbmError
 from ..base.processes import process_count
@@ -43,6 +47,10 @@ class StudyError(PrbmError, RuntimeError):
     """The study cannot run, for a reason that does not depend on its parameters."""
 
 
+class Stopped(BaseException):
+    """Raised in a thread that simulates when the study ends before the simulation."""
+
+
 @dataclass
 class Pool:
     """An executor and the number of simulations that it runs at a time.
@@ -50,21 +58,46 @@ class Pool:
     Parameters
     ----------
     executor : Executor or None
-        None: this process runs the simulations.
+        None: this thread runs the simulations.
     threads : callable
         Returns the present number of parallel runs.
+    here : bool
+        Whether the threads of the executor simulate themselves, in this process.
     closing : callable
         Called with the name of the study at its end.
     """
 
     executor: Executor | None
     threads: Callable[[], int]
+    here: bool = False
     closing: Callable[[str], object] = release
+
+
+def check_limits(workers: int | None, timeout: float | None, retries: int = 0) -> None:
+    """Reject limits of a study that are not positive.
+
+    Raises
+    ------
+    ParameterError
+        If the number of workers or the longest duration of a run [s] is not positive, or the number
+        of repetitions is negative.
+    """
+    if workers is not None and workers < 1:
+        raise ParameterError(f"workers = {workers} must be 1 or more")
+    if timeout is not None and not timeout > 0.0:
+        raise ParameterError(f"timeout = {timeout:g} s must be positive")
+    if retries < 0:
+        raise ParameterError(f"retries = {retries} must be 0 or more")
 
 
 @contextmanager
 def pool(
-    workers: int | None, runs: int, *, serial: bool = False, executor: Executor | str | None = None
+    workers: int | None,
+    runs: int,
+    *,
+    here: bool = False,
+    parallel: bool = False,
+    executor: Executor | str | None = None,
 ) -> Iterator[Pool]:
     """Yield where the simulations of a study run.
 
@@ -74,27 +107,25 @@ def pool(
         Number of parallel runs; None: one per core, or those of the executor.
     runs : int
         Number of runs.
-    serial : bool
-        With one worker the simulations may run in this process.
+    here : bool
+        The simulations may run in this process, where they cannot be ended: one at a time,
+    parallel : bool
+        or in parallel, since they release the lock of the interpreter.
     executor : Executor, str or None
         A ``concurrent.futures`` executor, or the address of a Dask scheduler.  None: threads of
         this process, each with a process that simulates.
 
     Raises
     ------
-    ParameterError
-        If the number of workers is not positive.
     StudyError
         If the scheduler does not respond or has no workers.
     """
-    if workers is not None and workers < 1:
-        raise ParameterError(f"workers = {workers} must be 1 or more")
     if isinstance(executor, str):
         with _client(executor) as client:
             yield Pool(
                 client.get_executor(pure=False),
                 lambda: max(1, sum(client.nthreads().values())),
-                lambda study: client.run(release, study),
+                closing=lambda study: client.run(release, study),
             )
         return
     if executor is not None:
@@ -102,18 +133,18 @@ def pool(
         client = getattr(known, "_client", None)  # Of Dask's ClientExecutor.
         if workers is None and client is not None:
             yield Pool(executor, lambda: max(1, sum(client.nthreads().values())),
-                       lambda study: client.run(release, study))  # fmt: skip
+                       closing=lambda study: client.run(release, study))  # fmt: skip
         else:
             count = workers or getattr(known, "_max_workers", None) or process_count(runs)
             yield Pool(executor, lambda: count)
         return
     count = process_count(max(runs, 1), workers)
-    if serial and count == 1:
+    if here and count == 1:
         yield Pool(None, lambda: 1)
         return
     threads = ThreadPoolExecutor(count)
     try:
-        yield Pool(threads, lambda: count)
+        yield Pool(threads, lambda: count, here and parallel)
     finally:
         threads.shutdown(cancel_futures=True)
 
@@ -146,6 +177,9 @@ def _client(address: str) -> Iterator[Any]:
 class Runner:
     """Computes rows and keeps their outcomes in a journal.
 
+    It is used in a ``with`` block, at whose end the processes of the study end.  A
+    KeyboardInterrupt then has a message about the completed rows.
+
     Parameters
     ----------
     job : Job
@@ -169,6 +203,8 @@ class Runner:
     retries: int = 1
     timeout: float | None = None
     study: str = field(default_factory=lambda: uuid.uuid4().hex)
+    stopped: bool = False
+    busy: set[int] = field(default_factory=set)  # Threads that simulate themselves.
 
     def outcomes(self, points: Sequence[Point], progress: Progress | None = None) -> list[Outcome]:
         """Return the outcomes of points in their order; only those not in the journal are computed.
@@ -189,18 +225,39 @@ class Runner:
             report(done / total)
         return [known[point] for point in points]
 
-    def close(self) -> None:
-        """End the processes of the study."""
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self.stopped = True
+        for thread in [*self.busy]:  # After an error or Ctrl-C.
+            ctypes.pythonapi.PyThreadState_SetAsyncExc(
+                ctypes.c_ulong(thread), ctypes.py_object(Stopped)
+            )
         with suppress(OSError, CancelledError):  # The scheduler may have ended.
             self.pool.closing(self.study)
+        if kind is KeyboardInterrupt and self.journal.kept:
+            raise KeyboardInterrupt(f"interrupted; {self.journal.kept}") from None
 
     def _row(self, point: Point) -> Row:
         return dict(zip(self.parameters, point, strict=True))
 
+    def run(self, rows: Sequence[Row]) -> list[Outcome]:
+        """Simulate in this thread, until the study ends."""
+        run: Callable[[Row], Outcome] = self.job.run  # type: ignore[attr-defined]
+        thread = threading.get_ident()
+        self.busy.add(thread)
+        try:
+            return [run(row) for row in rows if not self.stopped]
+        except Stopped:
+            return []
+        finally:
+            self.busy.discard(thread)
+
     def _computed(self, points: Sequence[Point]) -> Iterator[tuple[Point, Outcome]]:
         if self.pool.executor is None:
-            run = self.job.run  # type: ignore[attr-defined]
-            yield from ((point, run(self._row(point))) for point in points)
+            for point in points:
+                yield point, self.run([self._row(point)])[0]
         elif points:
             yield from _Batches(self, self.pool.executor).computed(points)
 
@@ -248,7 +305,8 @@ class _Batches:
         runner = self.runner
         job = (runner.job, runner.retries, runner.timeout) if given else None
         rows = [runner._row(point) for point in batch]
-        self.running[self.executor.submit(run_batch, runner.study, rows, job)] = batch
+        call = (runner.run, rows) if runner.pool.here else (run_batch, runner.study, rows, job)
+        self.running[self.executor.submit(*call)] = batch
 
     def _outcomes(self, future: "Future[Any]", batch: list[Point]) -> list[Outcome]:
         """Return the outcomes of a batch; none if it has to be repeated."""

@@ -2,12 +2,13 @@
 
     prbm study PRBDM2R --vary "stop.position=-8:8 mm:17" --of settling --minimise settling
 
-The simulations run in processes on all cores of this machine, or in another executor
+The simulations run on all cores of this machine, or in another executor
 (:mod:`.runner`).  A simulation that fails is a row with its message.
 """
 
 import hashlib
 import math
+import re
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
@@ -33,7 +34,6 @@ from ..mechanism.description import Mechanism
 from ..runs.engine import PYTHON, check_engine, kernel_available
 from ..runs.experiment import experiment
 from ..runs.inputs import Source, filled, placeholders, signals
-from ..runs.quantities import QUANTITIES
 from ..runs.run import communication_points, in_si, in_unit
 from ..runs.signals import Signal
 from .design import (
@@ -51,18 +51,15 @@ from .design import (
 from .journal import Journal
 from .mechanism import MechanismJob
 from .optimum import REFINEMENTS_EXPECTED, Constraint, Optimum, Samples, Search
-from .outputs import MODE, QUANTITY, REST, Outcome, Output, SpecificationError
-from .outputs import parse_output as parse
-from .runner import Runner, pool
+from .outputs import Outcome, parse_output
+from .runner import Runner, check_limits, pool
 
 STEPS = 4000  # Communication steps of a simulation, which resolve the vibration after impacts.
 RUNS_MAX = 100_000  # More simulations are a mistake in the number of samples.
 LAST_FRACTION = 0.99  # Reported progress while a refinement takes more simulations than usual.
-NAMES_LISTED_MAX = 12  # Messages about unknown outputs do not list more names.
-TIMES = ("first", "since")  # Reductions whose value is a time.
 YIELD_RUNS = 256  # Simulations around an optimum that give its yield.
 YIELD_SEED = 1
-PLACES = {"x": "m", "y": "m", "angle": "rad"}  # Outputs of a rest position, and their units.
+CONDITION = re.compile(r"(.*[^<>=])(<=|>=|<|>)([^<>=()]*)", re.DOTALL)  # "fundamental > 40 Hz".
 Vary = Mapping[str, Any] | str | Path
 
 
@@ -106,6 +103,11 @@ class Study:
     good: Any = True
     share: Yield | None = None
     sensitivities: Mapping[str, Sensitivity] = field(default_factory=dict)
+
+    @property
+    def parameters(self) -> dict[str, Real]:
+        """The parameter of each simulation (n,) by name."""
+        return dict(zip(self.varied, self.points.T, strict=True))
 
     def __repr__(self) -> str:
         failed = sum(map(bool, self.messages))
@@ -189,8 +191,9 @@ def study(
     step : float, str or None
         Communication step, the resolution of the outputs in time [s]; None: 1/4000 of the duration.
     workers : int or None
-        Number of processes; None: one per core.  With one, the simulations run in this process,
-        unless they have a timeout.
+        Number of parallel simulations; None: one per core.  They run in threads of this process if
+        the kernel computes them.  With a timeout, or with the Python engine and more than one
+        worker, they run in other processes, and a crash costs only its simulation.
     executor : Executor, str or None
         A ``concurrent.futures`` executor, such as that of Dask's ``Client.get_executor()``, or the
         address of a Dask scheduler; None: this machine.
@@ -219,24 +222,19 @@ def study(
     spread = _around(plan, tolerances or {})
     if table is not None:
         check_file(Path(table))
-    if timeout is not None and not timeout > 0.0:
-        raise ParameterError(f"timeout = {timeout:g} s must be positive")
-    with pool(workers, len(plan.points), serial=timeout is None, executor=executor) as where:
+    check_limits(workers, timeout)
+    with pool(
+        workers, len(plan.points), here=timeout is None, parallel=plan.job.engine != PYTHON,
+        executor=executor,
+    ) as where:  # fmt: skip
         if where.executor is not None:
             _check_sources(plan.job.inputs)
         journal = Journal(
             None if table is None else Path(table), plan.settings, plan.names, plan.texts
         )
         with journal.opened(overwrite):
-            runner = Runner(plan.job, plan.names, journal, where, timeout=timeout)
-            try:
+            with Runner(plan.job, plan.names, journal, where, timeout=timeout) as runner:
                 found = _run(plan, runner, spread, progress or (lambda fraction: None))
-            except KeyboardInterrupt:
-                raise KeyboardInterrupt(
-                    f"interrupted; {journal.kept}" * bool(journal.kept)
-                ) from None
-            finally:
-                runner.close()
             if table is not None:
                 write(table, csv_text(*found.table()).encode())
             journal.remove()
@@ -332,8 +330,11 @@ def _plan(
     options: tuple[Any, Any, Any, Any],
 ) -> Plan:
     """Return the checked study."""
-    if any("stress" in text for text in (*outputs, *([goal[0]] if goal else []), *subject_to)):
-        mechanism = with_stress(mechanism)
+    conditions = [_condition(text) for text in subject_to]
+    wanted = [*outputs, *([goal[0]] if goal else []), *(output for _, output, _, _ in conditions)]
+    if not wanted:
+        raise ParameterError("no output is selected; name one, for instance settling")
+    mechanism = _with_stress(mechanism, wanted)
     known = _units(mechanism)
     within = placeholders(inputs or {})
     listed = None
@@ -363,9 +364,14 @@ def _plan(
         points = listed
     else:
         points = grid(varied) if runs is None else drawn(varied, runs, drawing[1], drawing[0])
-    constraints = tuple(_constraint(text, known) for text in subject_to)
-    wanted = [*outputs, *([goal[0]] if goal else []), *(c.output for c in constraints)]
-    kept = _outputs(list(dict.fromkeys(wanted)), known)
+    kept = tuple(parse_output(text, known) for text in dict.fromkeys(wanted))
+    for output in kept:
+        output.check(known, "the mechanism")
+    shown = {n: known.get(n, "") for n in varied} | {o.column: o.unit(known) for o in kept}
+    constraints = tuple(
+        Constraint(text, name, relation, in_unit(f"constraint {name}", bound, shown[name]))
+        for text, name, relation, bound in conditions
+    )
     for name in given.keys() & varied.keys():
         raise ParameterError(f"{name} is varied and has a fixed value; remove one of them")
     sources = dict(inputs or {})
@@ -373,7 +379,6 @@ def _plan(
     signals(mechanism, filled(sources, first), {**given, **first})  # Report mistakes.
     job = MechanismJob(mechanism, kept, given, sources, *_options(mechanism, given, *options),
                        tuple(known))  # fmt: skip
-    shown = {**{n: known.get(n, "") for n in varied}, **_output_units(kept, known)}
     return Plan(
         job, varied, points, goal, constraints, (runs is None and listed is None, *drawing), shown
     )
@@ -495,8 +500,8 @@ def _check_sources(inputs: Mapping[str, Source]) -> None:
     for name, source in inputs.items():
         if callable(source) and not isinstance(source, Signal):
             raise ParameterError(
-                f"{name}: a function cannot be sent to other processes; give a text or arrays, or "
-                "workers=1"
+                f"{name}: a function cannot be called by several workers; give a text or arrays, "
+                "or workers=1"
             )
 
 
@@ -506,70 +511,20 @@ def _units(mechanism: Mechanism) -> dict[str, str]:
     return {variable.name: variable.unit for variable in every}
 
 
-def _outputs(texts: Sequence[str], known: Mapping[str, str]) -> tuple[Output, ...]:
-    """Return checked outputs."""
-    if not texts:
-        raise ParameterError("no output is selected; name one, for instance settling")
-    return tuple(_output(text, known) for text in texts)
+def _with_stress(mechanism: Mechanism, outputs: Sequence[str]) -> Mechanism:
+    """Return the mechanism with the stress outputs of all flexures if outputs need one of them."""
+    stressed = with_stress(mechanism)
+    known, every = _units(mechanism), _units(stressed)
+    needed = {name for text in outputs for name in parse_output(text, every).variables(every)}
+    return stressed if needed & (every.keys() - known.keys()) else mechanism
 
 
-def _output(text: str, known: Mapping[str, str]) -> Output:
-    try:
-        output = parse(text, known)
-        output.check_extreme(known)
-    except SpecificationError as error:
-        raise ParameterError(f"output {error}") from None
-    if output.reduction == REST:
-        if output.variable.rpartition(".")[2] not in PLACES or output.variable not in known:
-            raise ParameterError(
-                f"output {text}: write rest(BODY.x), rest(BODY.y) or rest(BODY.angle)"
-            )
-        return output
-    if output.reduction == MODE:
-        return output
-    lacking = output.lacking(known)
-    if lacking:
-        remedy = QUANTITIES[output.variable].remedy
-        raise ParameterError(
-            f"output {text}: the mechanism has no {lacking}, from which it is computed"
-            + (f"; {remedy}" if remedy else "")
-        )
-    if output.reduction != QUANTITY and output.variable not in known:
-        hint = proposal(output.variable, dict.fromkeys([*known, *QUANTITIES]))
-        if hint.startswith("known") and len(known) > NAMES_LISTED_MAX:
-            hint = f"named quantities are {', '.join(QUANTITIES)}"
-        raise ParameterError(f"output {text}: unknown variable {output.variable!r}; {hint}")
-    return output
-
-
-def _output_units(outputs: Sequence[Output], known: Mapping[str, str]) -> dict[str, str]:
-    """Return the units of outputs by their texts."""
-    found = {}
-    for output in outputs:
-        if output.reduction == QUANTITY:
-            found[output.column] = QUANTITIES[output.variable].unit
-        elif output.reduction == MODE:
-            found[output.column] = "Hz"
-        elif output.reduction == REST:
-            found[output.column] = PLACES[output.variable.rpartition(".")[2]]
-        else:
-            found[output.column] = "s" if output.reduction in TIMES else known[output.variable]
-    return found
-
-
-def _constraint(text: str, known: Mapping[str, str]) -> Constraint:
-    """Return the constraint of a text such as ``fundamental > 40 Hz``."""
-    depth, at = 0, -1
-    for k, sign in enumerate(text):
-        depth += (sign == "(") - (sign == ")")
-        if depth == 0 and sign in "<>":
-            at = k
-    if at < 0:
+def _condition(text: str) -> tuple[str, str, str, str]:
+    """Return the text, output, relation and bound of a text such as ``fundamental > 40 Hz``."""
+    found = CONDITION.fullmatch(text)
+    if found is None:
         raise ParameterError(f'constraint {text}: write it as in "fundamental > 40 Hz"')
-    relation = text[at : at + 2] if text[at + 1 : at + 2] == "=" else text[at]
-    output, bound = text[:at].strip(), text[at + len(relation) :].strip()
-    unit = _output_units([_output(output, known)], known)[output]
-    return Constraint(text.strip(), output, relation, in_unit(f"constraint {output}", bound, unit))
+    return text.strip(), found[1].strip(), found[2], found[3].strip()
 
 
 # --- simulations ----------------------------------------------------------------------------------

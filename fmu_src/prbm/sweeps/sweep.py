@@ -12,9 +12,8 @@ import io
 import json
 import math
 import os
-from collections.abc import Collection, Container, Iterator, Mapping, Sequence
+from collections.abc import Collection, Container, Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import contextmanager
 from dataclasses import astuple, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,10 +28,11 @@ from ..base.names import proposal
 from ..base.progress import Progress
 from ..runs.inputs import filled, placeholders, read_signal
 from ..runs.run import ROWS_MAX
+from .design import drawn
 from .fmu import Job, PackedFmu
 from .journal import Journal, Point, compare
-from .outputs import GOOD, Outcome, Output, SpecificationError, parse_output
-from .runner import Runner, StudyError, pool
+from .outputs import GOOD, Outcome, Output, parse_output
+from .runner import Runner, StudyError, check_limits, pool
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,7 +47,6 @@ FILES = (".csv", ".feather", ".h5", ".json", ".mat", ".ods", ".tsv", ".txt", ".x
 ROW, STATUS, MESSAGE = OWN = ("row", "status", "message")
 """Columns of every table; no parameter or output may have these names."""
 SETTINGS = b"prbm.settings"  # Key of the settings in the metadata of the Parquet file.
-SweepError = StudyError
 Outputs = Sequence[str] | Mapping[str, str]
 
 
@@ -144,48 +143,54 @@ def sweep(
     out = Path(out)
     _check_name(out)
     plan = _make_plan(fmu, table, outputs, values, inputs or {}, stop_time, step, tolerance)
-    _check_counts(retries, timeout)
+    check_limits(workers, timeout, retries)
     journal = Journal(out, plan.settings, plan.parameters, plan.outputs)
-    journal.known |= _earlier(plan, out, overwrite)
+    journal.known |= _earlier(plan, journal, out, overwrite)
     with journal.opened(overwrite, retry_failed):
         rest = [point for point in plan.points if point not in journal.known]
         with pool(workers, len(rest), executor=scheduler) as where:
             # The check of a reset doubles the duration of a run, which may exceed a timeout.
             reuse = timeout is None and len(rest) >= RESET_RUNS_MIN * where.threads()
             fmu_job = PackedFmu(plan.fmu, replace(plan.job, reuse=reuse))
-            runner = Runner(fmu_job, plan.parameters, journal, where, retries, timeout)
-            with _stopping(runner, len(plan.points)):
-                outcomes = runner.outcomes(plan.points, progress)
-        found = _frame(plan, outcomes)
-        if rest or not out.exists() or len(plan.points) != _count(out):
-            write(out, _parquet(found, plan.settings))
+            with Runner(fmu_job, plan.parameters, journal, where, retries, timeout) as runner:
+                found = _frame(plan, runner.outcomes(plan.points, progress))
+        write(out, _parquet(found, journal.settings))
         journal.remove()
     return found
-
-
-@contextmanager
-def _stopping(runner: Runner, total: int) -> Iterator[None]:
-    """End the processes of a runner at the end of a block; report the rows after Ctrl-C."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        journal = runner.journal
-        raise KeyboardInterrupt(
-            f"the sweep was stopped: {len(journal.known)} of {total} runs are stored in "
-            f"{journal.path}; repeat the call to compute the others"
-        ) from None
-    finally:
-        runner.close()
 
 
 def samples(
     distributions: Mapping[str, Any], n: int, seed: int = 0, method: str = "random"
 ) -> "pd.DataFrame":
-    """Draw a table of parameters at random: see :func:`prbm.sweeps.table.samples`."""
-    _check_packages("pandas")
-    from . import table as sweep_table
+    """Draw a table of parameters, a column for each, with :func:`prbm.sweeps.design.drawn`.
 
-    return sweep_table.samples(distributions, n, seed, method)
+    Parameters
+    ----------
+    distributions : mapping
+        For each parameter a frozen distribution of ``scipy.stats`` (any object with ``ppf``), or
+        (low, high) for a uniform distribution; in SI units.
+    n : int
+        Number of rows; a power of two with ``sobol``.
+    seed : int
+        Seed (default: 0).  The same seed gives the same table.
+    method : str
+        ``random`` (default), ``latin`` or ``sobol``.
+
+    Raises
+    ------
+    ParameterError
+        If n or the number of parameters is zero, or a distribution or a method is invalid.
+
+    Examples
+    --------
+    >>> table = samples({"stop.restitution": (0.4, 0.6)}, 4, method="latin")
+    >>> sorted((table["stop.restitution"] * 20).astype(int).tolist())
+    [8, 9, 10, 11]
+    """
+    _check_packages("pandas")
+    import pandas as pd
+
+    return pd.DataFrame(drawn(distributions, n, seed, method), columns=[*distributions])
 
 
 # --- plan -------------------------------------------------------------------------
@@ -266,7 +271,7 @@ def _make_plan(
         "tolerance": job.tolerance,
     }
     points = [tuple(row) for row in frame.to_numpy(float).tolist()]
-    return Plan(data, job, json.loads(json.dumps(settings)), tuple(frame.columns), points)
+    return Plan(data, job, settings, tuple(frame.columns), points)
 
 
 def _inputs(
@@ -308,18 +313,18 @@ def read_fmu(path: Path) -> tuple[bytes, Any]:
 
     Raises
     ------
-    SweepError
+    StudyError
         If it cannot be read, or has no co-simulation of FMI 2.0 or 3.0.
     """
-    data = reading.content(path, UNPACKED_SIZE_MAX, SweepError)
+    data = reading.content(path, UNPACKED_SIZE_MAX, StudyError)
     try:
         check_unpacked_size(io.BytesIO(data))
         description = fmpy.read_model_description(io.BytesIO(data), validate=False)
     except Exception as error:  # FMPy raises plain exceptions.
         reason = " ".join(str(error).split())
-        raise SweepError(f"{path} is not a readable FMU: {reason}") from None
+        raise StudyError(f"{path} is not a readable FMU: {reason}") from None
     if not description.fmiVersion.startswith(("2", "3")) or description.coSimulation is None:
-        raise SweepError(
+        raise StudyError(
             f"{path} (FMI {description.fmiVersion}): must have co-simulation of FMI 2.0 or 3.0; "
             "export such an FMU"
         )
@@ -335,12 +340,7 @@ def _outputs(outputs: Outputs | None, variables: Mapping[str, Any]) -> tuple[Out
     if isinstance(outputs, str):
         outputs = [outputs]
     pairs = outputs.items() if isinstance(outputs, Mapping) else ((text, text) for text in outputs)
-    try:
-        kept = tuple(parse_output(text, variables, column) for column, text in pairs)
-        for output in kept:
-            output.check_extreme(variables)
-    except SpecificationError as error:
-        raise ParameterError(f"output {error}") from None
+    kept = tuple(parse_output(text, variables, column) for column, text in pairs)
     if not kept:
         raise ParameterError("no output is selected; name one, as in outputs=['shuttle.x']")
     check_outputs(kept, variables)
@@ -404,13 +404,6 @@ def _check_name(out: Path) -> None:
     check_file(out)
 
 
-def _check_counts(retries: int, timeout: float | None) -> None:
-    if retries < 0:
-        raise ParameterError(f"retries = {retries} must be 0 or more")
-    if timeout is not None and not timeout > 0.0:
-        raise ParameterError(f"timeout = {timeout:g} s must be positive")
-
-
 # --- results --------------------------------------------------------------------------------------
 
 
@@ -438,14 +431,7 @@ def _parquet(found: "pd.DataFrame", settings: Mapping[str, Any]) -> bytes:
     return content.getvalue()
 
 
-def _count(out: Path) -> int:
-    """Return the number of rows of a Parquet file."""
-    import pyarrow.parquet as pq
-
-    return int(pq.read_metadata(out).num_rows)
-
-
-def _earlier(plan: Plan, out: Path, overwrite: bool) -> dict[Point, Outcome]:
+def _earlier(plan: Plan, journal: Journal, out: Path, overwrite: bool) -> dict[Point, Outcome]:
     """Return the rows of a complete table of the same sweep, if there is one.
 
     Raises
@@ -474,7 +460,7 @@ def _earlier(plan: Plan, out: Path, overwrite: bool) -> dict[Point, Outcome]:
         ) from None
     if overwrite:
         return {}
-    compare(f"{out} contains a sweep", settings, plan.settings)
+    compare(f"{out} contains a sweep", settings, journal.settings)
     found = {}
     for k, row in enumerate(table.to_pylist()):
         point = tuple(row[name] for name in plan.parameters)

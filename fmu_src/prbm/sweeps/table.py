@@ -1,4 +1,4 @@
-"""Tables of parameters: read from files, drawn at random, compared with the variables of an FMU."""
+"""Tables of parameters: read from files, compared with the variables of an FMU."""
 
 import math
 from collections import Counter
@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 from ..base import reading
 from ..base.errors import ParameterError
 from ..base.names import proposal
-from ..runs.quantities import QUANTITIES
-from .design import drawn
 from .outputs import Output
 
 Table = pd.DataFrame | str | Path
@@ -26,48 +24,9 @@ SEPARATORS = {";": "semicolons", "\t": "tabs"}  # separators of CSV dialects tha
 WORDS = {"true": 1.0, "false": 0.0}
 FILE_SIZE_MAX = 1 << 30  # bytes of a table in CSV; a million rows of 50 columns have 900 MB.
 NAMES_LISTED_MAX = 10  # Messages with more settable variables refer to "fmpy info" instead.
-HINT_LENGTH_MAX = 200  # characters
 RANGES = {"Int8": 7, "Int16": 15, "Int32": 31, "Integer": 31, "Enumeration": 31, "Int64": 53,
           "UInt8": 8, "UInt16": 16, "UInt32": 32, "UInt64": 53}  # fmt: skip
 """Bits of FMI's integer types; a float represents 53 bits exactly."""
-
-
-def samples(
-    distributions: Mapping[str, Any], n: int, seed: int = 0, method: str = "random"
-) -> pd.DataFrame:
-    """Draw a table of parameters.
-
-    A column is x = F^-1(u) with the distribution F and a sequence u in (0, 1): pseudo-random, a
-    Latin hypercube or the scrambled sequence of Sobol.  The columns are independent of each other.
-
-    Parameters
-    ----------
-    distributions : mapping
-        For each parameter a frozen distribution of ``scipy.stats`` (any object with ``ppf``), or
-        (low, high) for a uniform distribution; in SI units.
-    n : int
-        Number of rows; a power of two with ``sobol``, whose sequence is balanced only then.
-    seed : int
-        Seed (default: 0).  The same seed gives the same table.
-    method : str
-        ``random`` (default), ``latin`` or ``sobol``.
-
-    Returns
-    -------
-    DataFrame, shape (n, len(distributions))
-
-    Raises
-    ------
-    ParameterError
-        If n or the number of parameters is zero, or a distribution or a method is invalid.
-
-    Examples
-    --------
-    >>> table = samples({"stop.restitution": (0.4, 0.6)}, 4, method="latin")
-    >>> sorted((table["stop.restitution"] * 20).astype(int).tolist())
-    [8, 9, 10, 11]
-    """
-    return pd.DataFrame(drawn(distributions, n, seed, method), columns=[*distributions])
 
 
 def read_table(table: Table) -> pd.DataFrame:
@@ -219,35 +178,21 @@ def _reject(name: str, x: NDArray[np.float64], wrong: NDArray[np.bool_], require
 
 
 def check_outputs(outputs: Iterable[Output], variables: Mapping[str, Any]) -> None:
-    """Reject outputs whose variables are not scalar numbers.
+    """Reject outputs that cannot be computed from the variables of an FMU.
 
     Raises
     ------
     ParameterError
-        If a variable is unknown, an array, or not a number.
+        If a variable is unknown, an array, or not a number; or the output is that of a mechanism.
     """
     for output in outputs:
-        lacking = output.lacking(variables)
-        if lacking:
-            remedy = QUANTITIES[output.variable].remedy
-            raise ParameterError(
-                f"output {output.column}: the FMU has no variable {lacking}, from which "
-                f"{output.variable} is computed" + (f"; {remedy}" if remedy else "")
-            )
-        for name in output.variables(variables):
-            _check_output(output.column, name, variables)
-
-
-def _check_output(text: str, name: str, variables: Mapping[str, Any]) -> None:
-    """Reject a variable that is unknown, an array, or not a number."""
-    variable = variables.get(name)
-    if variable is None:
-        hint = proposal(name, variables)
-        hint = "fmpy info lists the variables" if len(hint) > HINT_LENGTH_MAX else hint
-        raise ParameterError(f"output {text}: the FMU has no variable {name!r}; {hint}")
-    if variable.type in ("String", "Binary", "Clock") or variable.shape:
-        raise ParameterError(
-            f"output {text}: {name} is of type {variable.type}"
-            + (f" and shape {variable.shape}" if variable.shape else "")
-            + ", not one number; leave it out"
-        )
+        if output.static:
+            raise ParameterError(f"output {output.column}: needs a mechanism; use prbm study")
+        output.check(variables, "the FMU")
+        for variable in map(variables.__getitem__, output.variables(variables)):
+            if variable.type in ("String", "Binary", "Clock") or variable.shape:
+                raise ParameterError(
+                    f"output {output.column}: {variable.name} is of type {variable.type}"
+                    + (f" and shape {variable.shape}" if variable.shape else "")
+                    + ", not one number; leave it out"
+                )

@@ -1,0 +1,52 @@
+"""The runner of studies in threads of one process."""
+
+import threading
+import time
+
+import pytest
+
+from prbm.sweeps.journal import Journal
+from prbm.sweeps.outputs import OK, Outcome
+from prbm.sweeps.runner import Runner, pool
+from prbm.sweeps.study import study
+
+
+class Endless:
+    """A simulation that ends for the parameter 0 only."""
+
+    def run(self, row):
+        while row["a"]:
+            time.sleep(1e-3)
+        return Outcome(OK, values=(0.0,))
+
+
+def test_an_error_ends_simulations_in_threads():
+    """As Ctrl-C does; completed rows are kept."""
+    journal, threads = Journal(None, {}, ["a"], ["f"]), threading.active_count()
+
+    def stop(fraction):
+        if fraction > 0.0:
+            raise InterruptedError
+
+    def compute():
+        with pool(2, 2, here=True, parallel=True) as where:
+            assert where.here
+            with Runner(Endless(), ["a"], journal, where) as runner:
+                runner.outcomes([(0.0,), (1.0,)], stop)
+
+    with pytest.raises(InterruptedError):
+        compute()
+    assert threading.active_count() == threads
+    assert [*journal.known] == [(0.0,)]
+
+
+def test_threads_give_the_same_bits(mechanisms):
+    found = [
+        study(
+            mechanisms["PRBDM"], {"stop.position": [-1e-3, 0.0, 1e-3]}, ["impacts", "shuttle.vx"],
+            stop_time=0.1, step=1e-3, workers=workers,
+        ).table()
+        for workers in (1, 2)
+    ]  # fmt: skip
+    assert found[0] == found[1]
+    assert found[0][1][0][1] > 0
