@@ -109,13 +109,12 @@ def test_tall_beams_need_the_order_5():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("order", [3, 5])
-def test_a_force_that_grows_snaps_the_mechanism_where_its_shape_becomes_unstable(order):
+def test_a_force_that_grows_snaps_the_mechanism_where_its_shape_becomes_unstable():
     """Under 0.5 % less than the force the shuttle stays, under 0.5 % more it snaps.
 
     A moment breaks the symmetry: the beams buckle before the force has its largest value.
     """
-    kinds = tuple(replace(kind, order=order, nodes=None) for kind in BISTABLE.flexure_types)
+    kinds = tuple(replace(kind, order=3, nodes=None) for kind in BISTABLE.flexure_types)
     guide = replace(BISTABLE, flexure_types=kinds)
     held = curve(assemble(guide, guide.values({"gravity.y": 0.0})), np.linspace(-2e-4, 6.5e-3, 41))
     near, middle, far = (rest.displacement for rest in held.rests)
