@@ -31,32 +31,29 @@ from reference_check import (
     rows_of,
     start_values,
 )
-from support import COSTLY_MODELS, GUIDES, each_shipped, mechanism
+from support import COSTLY_MODELS, GUIDES, mechanism, selected
 
 SCHEMAS = Path(fmpy.__file__).parent / "schema"
 pytestmark = [pytest.mark.fmu, pytest.mark.native]
 
 
-@EXPERIMENTS
-@each_shipped
-@pytest.mark.parametrize("fmi", [2, 3])
-def test_the_fmu_reproduces_each_experiment(native, model, fmi, experiment, tmp_path):
-    """Event mode, where it exists, has both rows of each impact."""
-    if model in COSTLY_MODELS:
-        pytest.skip("built without reference results, because they take the engine minutes")
-    fmu = native[model, fmi]
+each_quick = pytest.mark.parametrize("model", selected(lambda name: name not in COSTLY_MODELS))
+
+
+def in_cosimulation(fmu: Path, model: str, experiment: str, folder: Path) -> None:
+    """Compare an experiment in co-simulation; event mode, where it exists, has all rows."""
     expected = rows_of(member(fmu, file_of(model, experiment)))
-    events = fmi == 3 and experiment == "validation"
+    version = read_model_description(str(fmu)).fmiVersion
+    events = version.startswith("3") and experiment == "validation"
     found = simulate_fmu(
         str(fmu), stop_time=expected["time"][-1], output_interval=expected["time"][1],
-        start_values=start_values(fmu, model, experiment, tmp_path),
+        start_values=start_values(fmu, model, experiment, folder),
         output=expected.dtype.names[1:], use_event_mode=events, early_return_allowed=events,
     )  # fmt: skip
-    number = compared(fmu, expected, found)
     doubled = int((np.diff(expected["time"]) == 0.0).sum())
     if model in GUIDES and experiment == "validation":
         assert doubled >= 3
-    assert number == len(expected) - (0 if events else 2 * doubled)
+    assert compared(fmu, expected, found) == len(expected) - (0 if events else 2 * doubled)
 
 
 def in_model_exchange(fmu: Path, model: str, experiment: str, folder: Path) -> int:
@@ -72,21 +69,28 @@ def in_model_exchange(fmu: Path, model: str, experiment: str, folder: Path) -> i
 
 
 @EXPERIMENTS
-@each_shipped
+@each_quick
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_cosimulation_reproduces_each_experiment(native, model, fmi, experiment, tmp_path):
+    in_cosimulation(native[model, fmi], model, experiment, tmp_path)
+
+
+@EXPERIMENTS
+@each_quick
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_model_exchange_reproduces_each_experiment(native, model, fmi, experiment, tmp_path):
-    if model in COSTLY_MODELS:
-        pytest.skip("built without reference results, because they take the engine minutes")
     assert in_model_exchange(native[model, fmi], model, experiment, tmp_path) > 10
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize("model", COSTLY_MODELS)
-def test_model_exchange_reproduces_the_experiments_of_costly_mechanisms(model, fmi, tmp_path):
+def test_costly_mechanisms_reproduce_each_experiment(model, fmi, tmp_path):
+    """The FMUs of other tests lack their reference results, which take the engine minutes."""
     fmu = tmp_path / f"{model}.fmu"
     fmu.write_bytes(native_fmu.build(mechanism(model), {}, fmi))
     for experiment in EXPERIMENT_NAMES:
+        in_cosimulation(fmu, model, experiment, tmp_path)
         assert in_model_exchange(fmu, model, experiment, tmp_path) > 10
 
 
@@ -112,14 +116,9 @@ def test_fmus_with_two_compliant_stops_reproduce_forces_and_stresses(
     if kind == "ModelExchange":
         assert in_model_exchange(fmu, "TwoCompliant", experiment, tmp_path) > 10
         return
-    expected = rows_of(member(fmu, file_of("TwoCompliant", experiment)))
-    names = expected.dtype.names[1:]
+    names = rows_of(member(fmu, file_of("TwoCompliant", experiment))).dtype.names
     assert {"upper.peak_force", "lower.indentation", "rising.peak_stress"} <= {*names}
-    found = simulate_fmu(
-        str(fmu), stop_time=expected["time"][-1], output_interval=expected["time"][1],
-        start_values=start_values(fmu, "TwoCompliant", experiment, tmp_path), output=names,
-    )  # fmt: skip
-    assert compared(fmu, expected, found) > 10
+    in_cosimulation(fmu, "TwoCompliant", experiment, tmp_path)
 
 
 @pytest.mark.slow
