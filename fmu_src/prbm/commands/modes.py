@@ -67,13 +67,7 @@ def frequencies(options: argparse.Namespace) -> None:
         "percentages: shares of the kinetic energy of the mode; decay time: the amplitude falls to "
         "37 %"
     )
-    if count < len(found.frequency):
-        print(
-            f"{len(found.frequency) - count} higher modes are not shown; show more with --count N"
-        )
-    if mechanism.free_bodies:
-        names = ", ".join(mechanism.free_bodies)
-        print(f"bodies that fly freely are fixed in these modes: {names}")
+    _print_omitted(mechanism, len(found.frequency) - count)
     _print_notes(mechanism, values, at, loads)
     output.table(
         f"{mechanism.name}-modes.csv",
@@ -92,6 +86,15 @@ def frequencies(options: argparse.Namespace) -> None:
         f"{mechanism.name}-modes.png", lambda: _figure(mechanism, values, count, at, loads)
     )
     output.write()
+
+
+def _print_omitted(mechanism: Mechanism, higher: int) -> None:
+    """Print how many higher modes are not shown, and which bodies take no part in modes."""
+    if higher:
+        print(f"{higher} higher modes are not shown; show more with --count N")
+    if mechanism.free_bodies:
+        names = ", ".join(mechanism.free_bodies)
+        print(f"bodies that fly freely are fixed in these modes: {names}")
 
 
 def _checked(options: argparse.Namespace, system: System) -> float | None:
