@@ -43,6 +43,7 @@ class Scaled:
         plain_number = unit in ("", "1")
         self.factor, shown = (1.0, "-") if plain_number else prefixed_unit(largest, unit)
         self.label, self.x = f"{name} [{shown}]", self.factor * x
+        self.label_in_two_lines = f"{name}\n[{shown}]"
 
 
 @own_style()
@@ -86,7 +87,7 @@ def curves(
                          label="within 5 %")  # fmt: skip
             axes.plot(x.factor * best, y.factor * value, "v", color=IMPACT, label="optimum")
             axes.legend(loc="best", fontsize=9, frameon=False)
-        axes.set_ylabel(y.label.replace(" [", "\n["))
+        axes.set_ylabel(y.label_in_two_lines)
     every[0].set_title(title, fontsize=11, loc="left")
     every[-1].set_xlabel(x.label)
     figure.align_ylabels(every)
@@ -168,10 +169,11 @@ def scatter(
     figure = Figure(size, dpi=120, layout="constrained")
     table = figure.subplots(rows, columns, squeeze=False, sharex="col", sharey="row")
     held = np.broadcast_to(np.asarray(good, bool), len(next(iter(outputs.values()))))
+    across = {name: Scaled(name, units[name], samples) for name, samples in parameters.items()}
     for i, (output, values) in enumerate(outputs.items()):
         y = Scaled(output, units[output], values)
-        for j, (name, samples) in enumerate(parameters.items()):
-            x, axes = Scaled(name, units[name], samples), table[i, j]
+        for j, (name, x) in enumerate(across.items()):
+            axes = table[i, j]
             if not held.all():
                 axes.plot(x.x[~held], y.x[~held], "o", markerfacecolor="none", color=BODY,
                           markersize=3.5, label="violated")  # fmt: skip
@@ -181,7 +183,7 @@ def scatter(
                           markersize=7.0, label="optimum")  # fmt: skip
             plain(axes)
             if j == 0:
-                axes.set_ylabel(y.label.replace(" [", "\n["))
+                axes.set_ylabel(y.label_in_two_lines)
             if i == rows - 1:
                 axes.set_xlabel(x.label)
     if best is not None or not held.all():
@@ -221,7 +223,7 @@ def behaviour_map(
         upper.plot(at, y.factor * strobe.ravel(), **style, linestyle="none", label=label)
         lower.plot(x.factor * values, impacts.mean(axis=1), **style, linewidth=0.8)
     upper.set_title(title, fontsize=11, loc="left")
-    upper.set_ylabel(y.label.replace(" [", "\n["))
+    upper.set_ylabel(y.label_in_two_lines)
     lower.set_ylabel("impacts\nper period")
     lower.set_xlabel(x.label)
     if len(ways) > 1:
