@@ -1,10 +1,13 @@
 """Fixtures for all tests: the shipped mechanisms and their FMUs, each built once per run."""
 
+import os
 import shutil
 import tempfile
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # Tests run beside each other.
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -36,20 +39,21 @@ class FmuCache(dict[Any, Path]):
         return self[key]
 
 
-def further_mechanisms() -> dict[str, set[str]]:
-    """Return the mechanisms with which a test is slow, by the name of the test."""
-    lines = (SUPPORT / "further_mechanisms.txt").read_text("utf-8").splitlines()
-    pairs = (line.rsplit(": ", 1) for line in lines if not line.startswith("#"))
-    return {name: {*mechanisms.split()} for name, mechanisms in pairs}
+def further_cases() -> dict[str, set[str]]:
+    """Return the parameters with which a test is slow, by the name of the test."""
+    lines = (SUPPORT / "further_cases.txt").read_text("utf-8").splitlines()
+    pairs = (line.split(": ", 1) for line in lines if not line.startswith("#"))
+    return {name: {*parameters.split(" | ")} for name, parameters in pairs}
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark tests with the further mechanisms of a function as slow; put the longest tests first."""
-    further = further_mechanisms()
+    """Mark the further cases of a test as slow; put the longest tests first."""
+    further = further_cases()
     for item in items:
-        name, _, parameters = item.nodeid.partition("[")
-        if further.get(name, set()) & {*parameters.rstrip("]").split("-")}:
+        name, _, case = item.nodeid.partition("[")
+        case = case.removesuffix("]")
+        if further.get(name, set()) & {case, *case.split("-")}:
             item.add_marker(pytest.mark.slow)
     items.sort(key=lambda item: not item.nodeid.startswith(LONGEST))
 

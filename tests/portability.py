@@ -160,6 +160,11 @@ KERNELS = (
     "sorted({library['architecture'] for library in threadpoolctl.threadpool_info() "
     "if library['internal_api'] == 'openblas'})",
 )
+THREADS = (
+    KERNELS[0],
+    "sorted({library['num_threads'] for library in threadpoolctl.threadpool_info() "
+    "if library['internal_api'] == 'openblas'})",
+)
 FEATURES = (
     "numpy._core._multiarray_umath as core",
     "[name for name in core.__cpu_dispatch__ if core.__cpu_features__[name]]",
@@ -216,6 +221,7 @@ VARIANTS = (
     blas("Haswell", "avx2", "fma"),
     blas("SkylakeX", "avx512f", "avx512bw", "avx512vl", "avx512dq"),
     blas("Zen", "avx2", "fma"),
+    Variant("BLAS threads", (("OPENBLAS_NUM_THREADS", "2"),), (), (Probe(*THREADS, "[2]"),)),
     Variant(
         "NumPy without AVX", (("NPY_DISABLE_CPU_FEATURES", "{features}"),), (),
         (Probe(*FEATURES, "[]"), Probe(*FEATURES, None)),

@@ -86,6 +86,7 @@ def test_the_speed_is_needed_for_other_exponents():
         compliant(replace(GUIDE, stops=stops), [0.0], [0.0])
 
 
+@pytest.mark.slow
 def test_the_command_prints_a_map_for_each_stiffness(tmp_path, capsys):
     line = "impact-map PRBDM2R --wall-positions 0 --offsets 0 4 mm "
     assert cli.main(shlex.split(line + "--stiffness 1e6 N/m")) == cli.MISTAKE

@@ -180,6 +180,7 @@ def test_the_frequency_is_constant_along_the_valley(ambiguous):
     assert changed(1e-3 * across) > 1e-4
 
 
+@pytest.mark.slow
 def test_every_point_of_the_valley_has_the_measured_frequency(ambiguous):
     """The valley can be printed and drawn."""
     found = valley(ambiguous, BOTH[0], (2.9, 6.0), 7)
@@ -253,6 +254,7 @@ def test_forces_of_the_1r_equal_those_of_the_scalar_equation():
     np.testing.assert_allclose(target.model(mechanism("PRBDM"), {}), held({}, x), rtol=1e-8)
 
 
+@pytest.mark.slow
 def test_a_fit_to_a_force_deflection_curve_recovers_stiffness_and_sensor_zero():
     """The noise is 1 mN; the slope of the curve separates the stiffness from the sensor's zero."""
     x = np.linspace(-0.01, 0.01, 60)
@@ -265,6 +267,7 @@ def test_a_fit_to_a_force_deflection_curve_recovers_stiffness_and_sensor_zero():
     assert abs(found.correlation[0, 1]) < 0.1, "a symmetric range decouples them"
 
 
+@pytest.mark.slow
 def test_uncertainties_are_widened_if_the_model_does_not_fit():
     """Forces of a cubic spring: the residuals exceed the stated uncertainty; a note reports it."""
     x = np.linspace(-0.01, 0.01, 40)
@@ -277,6 +280,7 @@ def test_uncertainties_are_widened_if_the_model_does_not_fit():
     assert close.notes == ()
 
 
+@pytest.mark.slow
 def test_a_parameter_at_its_bound_is_reported():
     found = fit(mechanism("PRBDM"), [Free(K, 2.6, 3.0)], Frequency(Estimate(4.7, 1e-3)))
     assert found[K].value == pytest.approx(2.6, rel=1e-6)
@@ -398,6 +402,7 @@ def test_a_fit_without_convergence_has_a_note(monkeypatch):
     assert fit(mechanism("PRBDM"), [K], F5).converged
 
 
+@pytest.mark.slow
 def test_record_parameters_can_be_given_or_fitted():
     """A sensor zero that is not fitted keeps its given value."""
     x = np.linspace(-0.01, 0.01, 20)
@@ -522,6 +527,7 @@ def test_a_displacement_response_is_the_projection_on_the_release_direction():
     assert along[0] == pytest.approx(-5e-3, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_valley_reports_its_progress():
     fractions = []
     both = fit(mechanism("PRBDM2R"), ["flexure.K_theta1", "flexure.K_theta2"], F5)

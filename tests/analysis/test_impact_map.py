@@ -248,6 +248,7 @@ def test_a_wall_that_no_held_shape_touches_is_an_error(gap, message):
         touching_shape(lambda x, _: x, gap, 2e-3, 0.1)
 
 
+@pytest.mark.slow
 def test_a_map_is_written_and_drawn(tmp_path):
     one = impact_map.algebraic(guide(), **CORNERS, values=WEIGHTLESS, label="2R")
     rows = list(

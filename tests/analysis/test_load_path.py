@@ -148,6 +148,7 @@ def test_the_branch_of_a_buckled_leaf_is_the_elastica():
     assert alpha > 1.5
 
 
+@pytest.mark.slow
 def test_a_bistable_mechanism_rests_again_where_the_load_has_gone():
     """The path of CurvedBistable passes its rest positions; those of a held path are the same."""
     system = pushed(mechanism("CurvedBistable"), **{"gravity.y": 0.0})

@@ -81,6 +81,7 @@ def test_a_mass_on_fibres_hangs_and_converges_to_its_boundary_value_problem():
     assert prbm.equilibrium(case("ligo_3R")).modes.frequency[0] == pytest.approx(0.64458, rel=0.06)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", [Simulation, KernelSimulation])
 def test_a_clock_pendulum_on_a_light_spring_has_the_frequency_of_its_boundary_value_problem(engine):
     """0.497125 Hz.  The inertia of the spring's inner motion is 5e-14 of that of the pendulum."""

@@ -100,6 +100,7 @@ def weak_springs():
     return replace(mechanism, flexure_types=kinds, stops=())
 
 
+@pytest.mark.slow
 def test_safety_factor_at_the_level_of_failure_is_one():
     weak, pulse = weak_springs(), Pulse("sawtooth", 1.0, 0.2e-3)
     peaks = [20 * 9.80665, 100 * 9.80665, 400 * 9.80665]
@@ -110,6 +111,7 @@ def test_safety_factor_at_the_level_of_failure_is_one():
     assert again.safety == pytest.approx(1.0, rel=3e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first", [60.0, 800.0])
 def test_search_for_the_level_of_failure_starts_on_either_side_of_it(first):
     """Without stops the stress is in proportion to the peak, up to the stiffening at 30 um."""

@@ -28,6 +28,7 @@ def found_shock():
     return shock(one, {PULSE.input: PULSE.signal}, duration=PULSE.duration, stop_time=1e-3)
 
 
+@pytest.mark.slow
 def test_hits_have_force_indentation_and_duration():
     """Truss, springs and pulse change those of the proof mass alone by less than 15 %."""
     found = found_shock()
@@ -59,6 +60,7 @@ def file(tmp_path):
     return path
 
 
+@pytest.mark.slow
 def test_the_command_prints_and_draws_the_forces(file, tmp_path, capsys):
     out = ["--out", str(tmp_path / "out")]
     line = '--peak "500 g" --duration 0.5ms --stop-time 1ms'
@@ -71,6 +73,7 @@ def test_the_command_prints_and_draws_the_forces(file, tmp_path, capsys):
     assert (tmp_path / "out" / "Accelerometer-shock.png").stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_the_sweep_over_the_peak_has_a_column_of_the_force(file, tmp_path, capsys):
     """The force grows with the peak; without hits it is zero."""
     line = "--duration 0.5ms --peaks 10 500 800 g --stop-time 0.6ms"

@@ -280,6 +280,7 @@ def test_the_name_of_a_drawing_may_have_any_letters(tmp_path):
     assert import_drawing(other, OPTIONS).mechanism.name.isidentifier()
 
 
+@pytest.mark.slow
 def test_crossing_leaves_of_two_plates_are_bolted_to_the_same_bodies(tmp_path):
     """A cross pivot: each plate has one leaf, and holes at the same places in both bodies."""
     along = np.exp(1j * np.pi / 4)

@@ -111,6 +111,7 @@ def test_a_leaf_that_ends_on_an_oblique_edge_ends_in_the_middle_of_its_walls(tmp
     assert length(only(imported(tmp_path, plate))) == pytest.approx(45.0, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_leaves_that_meet_in_a_small_hub_end_at_the_hub(tmp_path):
     """The hub is three leaves thick, the remote centre of a stage."""
     plate = disc(0, 1.5).union(disc(0, 40).difference(disc(0, 29)))
@@ -176,6 +177,7 @@ def test_leaves_curved_to_the_same_side_are_no_mirror_images(tmp_path):
     assert [mirror.axis for mirror in result.draft.lines] == ["x"] * len(result.draft.lines)
 
 
+@pytest.mark.slow
 def test_the_leg_between_two_notches_is_a_body(tmp_path):
     """The notches end with upright walls, a corner of the leg: it becomes thinner there."""
     result = imported(tmp_path, notch_guide())

@@ -139,6 +139,7 @@ def test_without_a_compiler_only_the_python_fmus_are_built(tmp_path, monkeypatch
     assert printed.err.count("\n") == 1
 
 
+@pytest.mark.slow
 @pytest.mark.native
 def test_the_reason_for_a_page_without_simulation_is_a_sentence(tmp_path, monkeypatch, capsys):
     found = compiler.importlib.util.find_spec
@@ -174,6 +175,7 @@ def test_fmus_for_another_platform_cannot_be_simulated(tmp_path, monkeypatch, ca
     assert [*tmp_path.iterdir()] == []
 
 
+@pytest.mark.slow
 @pytest.mark.native
 def test_an_installed_wheel_has_the_kernel(tmp_path):
     """FMUs are built in an isolated process, which imports installed packages only."""
@@ -253,6 +255,7 @@ def test_files_are_written_completely_or_not_at_all(tmp_path, monkeypatch, failu
     assert [*tmp_path.iterdir()] == [path]
 
 
+@pytest.mark.slow
 def test_no_file_is_written_if_one_mechanism_fails(tmp_path, monkeypatch, capfd):
     """The 2R guide, the second mechanism, has no equilibrium under a weight that buckles it."""
     monkeypatch.chdir(tmp_path)
@@ -559,6 +562,7 @@ def test_names_and_values_that_fmi_forbids_are_reported(tmp_path, old, new, sent
         python_fmu.build(read_mechanism(path))
 
 
+@pytest.mark.slow
 def test_a_mechanism_may_have_the_name_of_a_python_function(tmp_path):
     """The script runs twice, the second time beside a class of that name."""
     text = (ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml").read_text(encoding="utf-8")
@@ -569,6 +573,7 @@ def test_a_mechanism_may_have_the_name_of_a_python_function(tmp_path):
     assert len(simulate_fmu(str(fmu), stop_time=0.01)) > 1
 
 
+@pytest.mark.slow
 def test_titles_are_escaped_in_script_and_xml(tmp_path):
     """Quotes do not end the docstring of the script; control characters do not break the XML."""
     text = (ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml").read_text(encoding="utf-8")

@@ -21,6 +21,7 @@ def run(line: str) -> int:
     return cli.main(shlex.split(line))
 
 
+@pytest.mark.slow
 def test_import_writes_the_file_and_the_picture_and_prints_what_was_recognised(capsys):
     line = "import stage.dxf --thickness 8mm --ground -5,-5 --out out/a.toml --check out/a.png"
     assert run(line) == 0

@@ -21,7 +21,7 @@ BASES = {
     "study": "PRBDM --vary 'stop.position=0:1 mm:2' --stop-time 1ms --workers 1",
     "sweep": "PRBDM.fmu free.csv",
 }
-QUICK = ("fit", "modes")
+QUICK = ("modes",)
 DIGITS = "9" * 5000  # More than Python converts to an integer.
 TEXTS = (
     "1\n2", f"4 Hz +- 1 mode {DIGITS}", DIGITS, "4 Hz +- 1 mode ²", "x=0:1:²", "\udcff", "a\0b",

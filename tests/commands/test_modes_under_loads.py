@@ -15,6 +15,7 @@ def frequencies(options, folder):
         return [float(row["frequency [Hz]"]) for row in csv.DictReader(file)]
 
 
+@pytest.mark.slow
 def test_a_load_and_the_holding_force_of_its_shape_give_the_same_modes(tmp_path, capsys):
     """The holding force along -y and the load on the same point are one dead load."""
     shape = equilibrium(mechanism("CurvedBistable"), loads={"force.y": -5.0})

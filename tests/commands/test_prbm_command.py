@@ -276,6 +276,7 @@ def test_rest_positions_and_snap_through_of_the_bistable_mechanism_are_symmetric
     np.testing.assert_array_equal([places[5:], forces[5:]], [places[3:5], forces[3:5]])
 
 
+@pytest.mark.slow
 def test_a_held_curve_names_its_events_and_the_branches_at_them(capsys):
     """The curved beams buckle before the force has its extremum; all branches are unstable."""
     line = "equilibrium CurvedBistable --set gravity.y=0 --from 0 --to 2mm --points 9 --branches"
@@ -391,6 +392,7 @@ def test_a_fit_recovers_the_modulus_of_a_computed_force_curve(capsys):
     assert "these data cannot separate" not in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_two_coefficients_fitted_to_one_frequency_form_a_valley(capsys):
     line = "fit PRBDM2R --free flexure.K_theta1 --free flexure.K_theta2 --out . --frequency"
     assert run(f"{line} '4.82 Hz +- 0.06'") == cli.OK
@@ -401,6 +403,7 @@ def test_two_coefficients_fitted_to_one_frequency_form_a_valley(capsys):
     assert Path("PRBDM2R-valley.png").exists()
 
 
+@pytest.mark.slow
 def test_several_beams_give_a_table_with_their_mean(tmp_path, capsys):
     """The same record for a beam 1 % wider gives a modulus 1 % lower."""
     records(tmp_path)
@@ -445,6 +448,7 @@ def test_validate_compares_a_mechanism_with_elements_and_measurements(capsys):
     assert Path("Cantilever-comparison.png").exists()
 
 
+@pytest.mark.slow
 def test_maps_of_several_methods_share_a_table_and_a_figure(capsys):
     line = "impact-map PRBDM2R --wall-positions -5mm --offsets 2mm --method algebraic closed-form "
     line += "--out ."
@@ -484,6 +488,7 @@ def test_former_names_of_the_options_of_impact_maps_are_accepted_but_not_listed(
     assert not re.search("--heights|--way", capsys.readouterr().out)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("release", "expected"), [("-18 mm", 0.01), ("-1 mm", 4e-4)])
 def test_default_wall_positions_are_round_numbers(release, expected):
     assert run(f'impact-map PRBDM --set "release.displacement={release}" --offsets 0 --out .') == 0

@@ -168,6 +168,7 @@ def test_a_shock_with_rigid_impacts_has_the_caveat(guide, options, capsys):
         assert ("not reliable" in capsys.readouterr().out) == caveat
 
 
+@pytest.mark.slow
 def test_tables_of_held_shapes_and_of_motion_do_not_replace_each_other(guide):
     assert run(f"stress {guide} --stop-time 10ms --out out") == cli.OK
     moving = table()

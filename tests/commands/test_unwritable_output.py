@@ -39,6 +39,7 @@ def test_a_full_standard_output_is_reported(command):
     assert done.returncode == 1
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has other standard outputs")
 def test_a_closed_standard_output_is_no_error():
     done = run("list", stdout=subprocess.DEVNULL, preexec_fn=lambda: os.close(1))

@@ -167,6 +167,7 @@ def test_the_stiffening_coefficient_is_that_of_the_elastica():
         assert (alpha / 3 / r - 1) / r**2 == pytest.approx(STIFFENING, abs=1.3 * r**2)
 
 
+@pytest.mark.slow
 def test_large_deflections_are_noted_with_their_error():
     """The stated stiffening is the error of E from forces of the elastica."""
     alphas = np.linspace(0.0, 0.9, 30)[1:]

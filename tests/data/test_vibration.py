@@ -94,6 +94,7 @@ def test_uncertainties_cover_the_true_values():
         assert 0.585 < count / 200 < 0.781, name
 
 
+@pytest.mark.slow
 def test_confidence_intervals_of_no_damping_include_zero_at_the_stated_level():
     """Of 200 intervals 190 include zero, -+ 3 standard deviations of 3.1."""
     rng = np.random.default_rng(2)

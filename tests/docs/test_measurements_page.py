@@ -10,6 +10,7 @@ from support import ROOT
 PAGE = ROOT / "docs" / "measurements.md"
 
 
+@pytest.mark.slow
 def test_the_code_of_the_page_finds_the_parameters_of_the_records(tmp_path, monkeypatch, capsys):
     (block,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
     records(tmp_path)

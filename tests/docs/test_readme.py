@@ -43,6 +43,7 @@ def test_python_blocks_of_the_readme_run(capsys):
     assert len(re.findall(r"^0\.\d{6} s: \d\.\d{4} m/s$", printed, re.MULTILINE)) == 3
 
 
+@pytest.mark.slow
 @pytest.mark.fmu
 @pytest.mark.native
 @pytest.mark.usefixtures("_built")

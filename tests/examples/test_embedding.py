@@ -70,6 +70,7 @@ def test_voice_coil_impacts_and_rest_agree_with_one_solver(capsys):
     assert settled == pytest.approx(reference.rest_time, abs=2 * run.STEP)
 
 
+@pytest.mark.slow
 def test_energy_error_of_the_voice_coil_is_proportional_to_the_step():
     """Before any impact, the cause of the error is a velocity that is constant within a step."""
     run = example("voice_coil")
@@ -79,6 +80,7 @@ def test_energy_error_of_the_voice_coil_is_proportional_to_the_step():
     assert longer < 0.01 * records[0]["guide.energy.work"][-1]
 
 
+@pytest.mark.slow
 def test_voice_coil_prints_and_plots(capsys):
     example("voice_coil").main(["--stop-time", "0.04"])
     assert "not yet at rest: increase --stop-time" in capsys.readouterr().out
@@ -120,6 +122,7 @@ def test_error_of_the_harvester_without_impacts_halves_with_the_step():
     assert errors[1] == pytest.approx(errors[0] / 2, rel=0.15)
 
 
+@pytest.mark.slow
 def test_closed_form_of_the_harvester_agrees_with_one_solver():
     """There are no stops; the tolerance is the error of small amplitudes, (x / r)^2 = 4e-4."""
     run = example("energy_harvester")
@@ -136,6 +139,7 @@ def test_power_of_the_harvester_depends_on_the_direction_of_the_sweep():
     assert table["power"][6] == pytest.approx(run.linear(44.0), rel=0.05)
 
 
+@pytest.mark.slow
 def test_harvester_prints_and_plots(capsys, monkeypatch):
     run = example("energy_harvester")
     for name, value in (("SETTLING", 2), ("MEASURED", 1)):
@@ -157,6 +161,7 @@ def test_drop_test_speeds_agree_with_the_scalar_equation_and_beam_theory():
     assert (table["speed"] > 0).tolist() == [False, True, True]
 
 
+@pytest.mark.slow
 def test_impulse_of_the_drop_test_is_the_change_of_momentum():
     """P = (1 + eps) m v, where m = M/cos(phi)^2 for a mass M at an angle phi on a circle."""
     run = example("drop_test")
@@ -180,6 +185,7 @@ def test_short_shock_of_the_drop_test_is_an_initial_velocity(monkeypatch):
     assert body.mass == pytest.approx(mass, rel=0.02)
 
 
+@pytest.mark.slow
 def test_drop_test_prints_and_plots(capsys):
     example("drop_test").main(["--heights", "0.1", "0.01"])
     lines = capsys.readouterr().out.splitlines()

@@ -56,6 +56,7 @@ def test_quickstart_simulates_until_the_given_time(tmp_path: Path) -> None:
     assert {"shuttle.x", "link[6].angle", "mode.frequency"} < set(result.dtype.names)
 
 
+@pytest.mark.slow
 def test_folding_reduces_the_lateral_error_of_beam_theory(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -71,6 +72,7 @@ def test_folding_reduces_the_lateral_error_of_beam_theory(
     assert is_picture("straight_line.png")
 
 
+@pytest.mark.slow
 def test_an_imported_drawing_has_the_frequency_of_the_formula(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

@@ -488,6 +488,7 @@ def test_copies_join_the_same_body_if_two_bodies_may_be_the_image(tmp_path):
     assert [f.end for f in beads.flexures if f.name == "leg_2"] == ["bead_2.low_2"]
 
 
+@pytest.mark.slow
 def test_points_of_copies_can_be_used_by_other_parts(tmp_path: Path) -> None:
     stop = '\n[[stops]]\nname = "stop"\nbody = "right_arm"\npoint = "right_arm.left_end"\n'
     assert read(tmp_path, MIRRORED + stop).stops[0].point == ("0.5*span + 0.01", 0.05)

@@ -409,6 +409,7 @@ FRAGMENTS = (
 )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_random_edits_give_a_mechanism_or_a_message(tmp_path):
     """Only errors of the package are raised, with messages that begin with the path."""
     rng = random.Random(0)

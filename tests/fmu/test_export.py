@@ -2,6 +2,8 @@
 
 from unittest.mock import patch
 
+import pytest
+
 from prbm.fmu import native_fmu, python_fmu
 from prbm.fmu.export import Export
 from support import mechanism
@@ -9,6 +11,7 @@ from support import mechanism
 CHANGES = {"stop.restitution": 0.5}
 
 
+@pytest.mark.slow
 def test_fmus_that_share_an_export_are_those_built_alone():
     """No FMU depends on the ones before it."""
     guide = mechanism("PRBDM")

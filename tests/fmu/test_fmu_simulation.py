@@ -143,6 +143,7 @@ def test_a_retreating_wall_releases_and_recaptures_a_pressed_body(fmus):
     assert found["shuttle.x"] == pytest.approx(40 * speed * step, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_importers_tolerance_overrides_the_parameter(fmus):
     def last(tolerance: float | None, parameter: float) -> bytes:
         with Instance(fmus["PRBDM2R"]) as instance:

@@ -51,6 +51,7 @@ def test_the_module_needs_no_imports_and_has_all_functions_of_the_engine():
     assert set(exports) >= {*FUNCTIONS, "malloc", "free", "memory"}
 
 
+@pytest.mark.slow
 @each_shipped
 def test_impacts_and_outputs_equal_those_of_the_native_library_to_the_bit(model):
     chosen = mechanism(model)
@@ -187,6 +188,7 @@ def test_modes_equal_those_of_the_python_package():
         assert abs(cosine) == pytest.approx(1.0, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_repeated_runs_need_no_more_memory():
     found = simulated(mechanism("PRBDM"), ["stop.gap"], steps=100, repeat=50, drawing=True)
     first, last = found["memory"]

@@ -857,6 +857,7 @@ def alone(fmu, kind: str) -> list[bytes]:
         return instance.run(SHORT)
 
 
+@pytest.mark.slow
 def test_instances_of_all_fmus_in_one_process_do_not_disturb_each_other(native):
     everything = [(model, fmi, kind) for model in QUICK_MODELS for fmi, kind in INTERFACES]
     expected = {key: alone(native[key[:2]], key[2]) for key in everything}
@@ -903,6 +904,7 @@ def test_hundreds_of_consecutive_and_simultaneous_instances_run(native, fmi):
         instance.free()
 
 
+@pytest.mark.slow
 def test_two_builds_of_one_model_in_one_process_keep_their_own_content(native, tmp_path):
     other = tmp_path / "PRBDM.fmu"
     write(other, native_fmu.build(mechanism("PRBDM"), {"stop.restitution": 0.1}, fmi=3))

@@ -125,6 +125,7 @@ def test_a_title_with_markup_is_text(tmp_path):
     assert etree.fromstring(content).get("description") == title
 
 
+@pytest.mark.slow
 def test_commands_write_and_read_sets(tmp_path, capsys):
     """The motion with a set is that with its values; --set has priority over a set."""
     path = tmp_path / "sets" / "x.ssv"

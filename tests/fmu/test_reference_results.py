@@ -129,6 +129,7 @@ def test_the_text_says_that_model_exchange_samples_the_peak_of_the_stress(pivots
     assert "peak_stress" not in member(native["PRBDM", 3], "README.txt").decode()
 
 
+@pytest.mark.slow
 def test_the_python_fmu_reproduces_the_default_experiment_of_the_native_one(fmus, native):
     expected = rows_of(member(native["PRBDM", 2], "PRBDM_out.csv"))
     found = simulate_fmu(
@@ -174,6 +175,7 @@ def test_the_manifest_lists_the_files_of_the_layered_standard(native, fmus, kind
     assert checker.validate(root), checker.error_log
 
 
+@pytest.mark.slow
 def test_the_set_of_the_validation_contains_all_changed_inputs(tmp_path):
     """Changed inputs are start values of the validation, too."""
     small, changes = mechanism("PRBDM"), {"force.x": 0.02, "stop.restitution": 0.5}
@@ -186,6 +188,7 @@ def test_the_set_of_the_validation_contains_all_changed_inputs(tmp_path):
     assert values["base.acceleration.x"] > 0.0
 
 
+@pytest.mark.slow
 def test_a_validation_that_fails_is_left_out(monkeypatch):
     def fails(*_: object) -> None:
         raise SimulationError("too many impacts")

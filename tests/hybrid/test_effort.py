@@ -100,6 +100,7 @@ BURSTS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("model", "impulse"), BURSTS)
 def test_a_burst_of_steps_is_rejected_with_its_kinetic_energy(model, impulse):
     """The steps are bounded however long the communication step; the message has the energy.

@@ -166,6 +166,7 @@ def test_friction_at_the_stop_does_not_gain_energy(model, restitution):
         assert impact.latched.energy_lost >= -1e-15
 
 
+@pytest.mark.slow
 def test_a_sliding_contact_remains_closed():
     """The stop has friction, and is away from the straight shape."""
     values = {"stop.position": -0.01, "stop.friction": 0.2, "release.displacement": -0.0101}
@@ -282,6 +283,7 @@ def test_base_acceleration_acts_like_opposite_gravity():
     assert b["base.force.x"] == pytest.approx(a["base.force.x"], rel=1e-8)
 
 
+@pytest.mark.slow
 def test_impulse_of_the_base_force_equals_the_change_of_momentum():
     """Integral of (base force - loads) = - change of momentum, without impacts."""
     values = WEIGHTLESS_UNDAMPED | {"stop.position": 0.05, "release.displacement": -0.01}
@@ -423,6 +425,7 @@ def test_a_release_at_the_wall_with_a_velocity_starts_with_an_impact():
 # --- communication points ---------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_trajectory_does_not_depend_on_the_communication_points():
     coarse, fine = simulation("PRBDM2R"), simulation("PRBDM2R")
     coarse.advance(0.12)

@@ -74,6 +74,7 @@ def search(draws, seed, compared=True):
             assert motions[0] == pytest.approx(motions[1], rel=1e-5, abs=1e-9), values
 
 
+@pytest.mark.slow
 def test_a_random_mechanism_at_rest_obeys_all_laws():
     search(40, seed=0)
 

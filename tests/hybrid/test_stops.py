@@ -175,6 +175,7 @@ def test_a_sticking_body_does_not_follow_a_retreating_wall():
     assert out["stop.gap"] == pytest.approx(0.02 * 0.05, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_friction_of_a_contact_pulled_along_its_wall_is_within_the_cone():
     """2R guide at a bent shape: the friction force is mu N while the contact slides."""
     values = {"stop.position": -0.01, "stop.friction": 0.2, "release.displacement": -0.0101}
@@ -205,6 +206,7 @@ def test_friction_of_a_contact_pulled_along_its_wall_is_within_the_cone():
                 assert abs(tangential) == pytest.approx(0.2 * normal, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_impulse_of_base_reactions_includes_that_of_the_inputs():
     """Integral of base force and moment = impulse of all loads - change of momentum."""
     values = {"gravity.x": 2.0, "gravity.y": -3.0, "stop.position": 0.05}
@@ -298,6 +300,7 @@ def test_a_force_of_1e300_newtons_is_an_error():
         sim.advance(1e-3)
 
 
+@pytest.mark.slow
 def test_an_alternating_moment_moves_the_load_between_two_stops():
     """The straight 2R guide can hardly rotate: both gaps remain closed."""
     guide = two_stops("PRBDM2R")

@@ -147,6 +147,7 @@ def test_a_saved_state_continues_with_the_same_peaks(engine):
     assert simulation.outputs() == expected
 
 
+@pytest.mark.slow
 def test_engines_agree_on_peaks_of_driven_motion_with_impacts():
     mechanism = guide()
     one, other = Simulation(mechanism, THROWN), KernelSimulation(mechanism, THROWN)

@@ -62,6 +62,7 @@ def test_several_walls_that_push_where_friction_locks_are_rejected():
         kernel().several(2, W, u, np.ones(2), eps, 0.0, np.zeros(4))
 
 
+@pytest.mark.slow
 def test_walls_with_friction_that_close_in_are_rejected():
     """The gaps of opposite walls stay closed without friction too: the walls are the cause."""
     row = np.array([1.0, -1.0, 0.5, 0.5])
@@ -133,6 +134,7 @@ PRELOADED = pytest.mark.parametrize(
 )
 
 
+@pytest.mark.slow
 @PRELOADED
 def test_a_preload_whose_damping_is_too_fast_is_named(engine, monkeypatch):
     """Two stops are pressed at the start; changes of their phases are not counted as chatter."""

@@ -257,6 +257,7 @@ def test_an_impact_changes_the_velocity_of_the_reference_with_that_of_the_wall(t
     assert wall_of(sim) == pytest.approx((place, velocity), abs=1e-12)
 
 
+@pytest.mark.slow
 def test_the_force_of_a_moving_wall_does_its_work():
     """Energy is balanced while the wall accelerates below a body at rest on it."""
     for kind in ("1 ms", "random"):

@@ -328,6 +328,7 @@ def test_an_interrupted_compilation_leaves_no_file_in_the_cache(cache, monkeypat
     assert only(libraries([HOST]))  # The lock has been released.
 
 
+@pytest.mark.slow
 def test_simultaneous_exports_compile_once(cache, tmp_path):
     log = tmp_path / "log"
     note = f"echo one >> {shlex.quote(str(log))}; sleep 1"

@@ -153,6 +153,7 @@ def test_derivatives_equal_differences_of_co_simulation(model):
         assert exchange.get(f"der({name})") == pytest.approx(2 * first - second, rel=1e-3, abs=1.0)
 
 
+@pytest.mark.slow
 def test_indicators_are_positive_after_events_and_impacts_equal_those_of_co_simulation():
     guide, values = mechanism("PRBDM"), {"stop.restitution": 0.4}
     kernel, times = KernelSimulation(guide, values, exchange=True), []

@@ -42,6 +42,7 @@ def test_directional_derivatives_in_contact_equal_differences(exponent, phase, s
     assert_directional(own, FRICTION, INPUTS, (1, slides, 2), contact)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_hits_in_model_exchange_are_those_of_co_simulation(friction):
     """The body hits the stop several times; the indicators are positive after each event."""
@@ -160,6 +161,7 @@ def test_the_force_of_a_preload_is_a_maximum_from_the_start(exchange):
     assert out["stop.peak_force"] == out["stop.force"] == pytest.approx(force, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_resting_body_settles_and_is_pulled_off_in_model_exchange():
     """A settled contact is left when a force reduces its load by more than a per cent."""
     own = soft("PRBDM", 1e5)

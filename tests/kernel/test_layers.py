@@ -94,6 +94,7 @@ def test_files_include_headers_of_earlier_files_only():
     assert circles(KERNEL) == []
 
 
+@pytest.mark.slow
 def test_files_use_functions_of_earlier_files_only(tmp_path):
     assert upward_calls(KERNEL, tmp_path / "one.o") == []
 

@@ -86,6 +86,7 @@ def newton_with_coulomb(W, u, mu, eps):
     return np.linalg.solve(W, np.array([-(1 + eps) * u[0], -u[1]]))  # Sticking.
 
 
+@pytest.mark.slow
 def test_stronge_impact_does_not_gain_energy_where_newton_with_coulomb_does(rng):
     """Random search over mobilities and directions; some of them are cases of Kane's paradox."""
     worst_ours, worst_newton, coulomb = 0.0, 0.0, 0

@@ -145,6 +145,7 @@ def test_both_engines_start_and_move_with_an_initial_strain(model, tmp_path):
             assert found[1][name] == pytest.approx(value, rel=1e-4, abs=1e-7), name
 
 
+@pytest.mark.slow
 def test_the_energy_is_conserved_from_the_strained_start(tmp_path):
     sim = Simulation(bridge(tmp_path, -1e-4), {"release.displacement": 1e-3, "damping.beta": 0.0})
     start = sim.outputs()["energy.elastic"]

@@ -125,6 +125,7 @@ def ends_of(system, name, e):
     return (first, last) if free.forwards or model == BEAM else (last, first)
 
 
+@pytest.mark.slow
 @given(mechanisms(starting=True))
 @settings(
     phases=[Phase.generate], max_examples=15, deadline=None, derandomize=True,

@@ -145,6 +145,7 @@ def test_reported_velocities_equal_central_differences_of_the_reported_positions
             assert out[1][rate] == pytest.approx(difference, abs=1e-7), place
 
 
+@pytest.mark.slow
 def test_velocities_of_a_guide_equal_central_differences_of_its_displacements():
     """Differences over 2 us; their truncation is h^2 x'''/6 < 1e-5 m/s at modes of 12 kHz."""
     guide = mechanism("PRBDM2R")

@@ -247,6 +247,7 @@ def test_the_limit_of_axially_compliant_chains_is_that_of_finite_elements():
     assert rigid / axial - 1 == pytest.approx([0.0025, 0.0021], abs=1e-4)
 
 
+@pytest.mark.slow
 def test_the_finite_element_figures_of_the_page_are_reproduced():
     """The tolerance is 1e-4, because the Jacobians of the finite elements are differences."""
     values = mechanism("PRBDM2R").values()

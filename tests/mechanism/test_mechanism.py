@@ -167,6 +167,7 @@ def test_incomplete_values_are_rejected():
         assemble(GUIDE, {})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
 def test_a_parameter_at_its_bounds_is_simulated_or_rejected_with_a_reason(model):
     """At each bound, the simulation starts or a message gives the reason."""

@@ -281,6 +281,7 @@ def test_a_gif_has_a_frame_for_every_time(tmp_path: Path, short: Result) -> None
     assert [p.name for p in tmp_path.iterdir()] == ["motion.gif"]
 
 
+@pytest.mark.slow
 def test_an_mp4_has_a_frame_for_every_time(tmp_path: Path, short: Result) -> None:
     imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
     path = animate(short, tmp_path / "motion.mp4", slow=20.0, fps=10.0)
@@ -422,6 +423,7 @@ def test_a_missing_pillow_is_reported_with_a_remedy(
 # --- command ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_command_simulates_a_mechanism_and_writes_the_film(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -516,6 +518,7 @@ def test_an_unidentified_mechanism_must_be_named(
     assert re.search(r"--model \(.*PRBDM, PRBDM2R", capsys.readouterr().err)
 
 
+@pytest.mark.slow
 def test_the_folder_has_no_part_of_a_film(short: Result, tmp_path: Path) -> None:
     seen = []
 

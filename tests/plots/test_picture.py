@@ -173,6 +173,7 @@ def test_the_ground_and_the_pins_of_flexures_that_end_on_the_ground(name: str) -
     assert abs(found[0][0][:, :2].mean(axis=1) - found[0][1]).max() < 1e-12
 
 
+@pytest.mark.slow
 def test_stretches_follow_from_recorded_outputs() -> None:
     """Angles, loops and positions of the bodies determine the stretches of the engine."""
     for name, stop_time in (("FoldedSuspension", 0.02), ("Bistable", 0.03), ("PRBDM2RAxial", 0.01)):

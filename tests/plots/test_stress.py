@@ -56,6 +56,7 @@ def test_colour_along_a_held_flexure_is_its_stress(name, turned):
     )
 
 
+@pytest.mark.slow
 def test_film_has_the_colours_of_the_simulated_stress():
     recorder = StressRecorder()
     result = simulate(

@@ -50,6 +50,7 @@ def test_importing_the_package_imports_nothing_else():
     assert in_new_process(script).split() == []
 
 
+@pytest.mark.slow
 def test_simulation_from_python_imports_no_matplotlib_and_mechanisms_need_no_pydantic():
     script = "import prbm; prbm.Simulation; prbm.Mechanism; prbm.Result; prbm.simulate"
     script += "; print(*({*sys.modules} & {'matplotlib', 'pydantic', 'pint', 'fmpy'}))"

@@ -62,6 +62,7 @@ def test_the_loss_of_an_off_centre_hit_needs_a_contact_shorter_than_a_fifth_of_a
         assert loss < 0.05
 
 
+@pytest.mark.slow
 def test_damping_of_the_flexures_changes_restitution_as_the_page_states():
     damped = {"damping.beta": 8e-6}
     for offset, limit in ((CENTRED, 2e-4), (OFF, 4e-3)):

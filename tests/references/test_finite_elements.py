@@ -294,6 +294,7 @@ def test_the_steel_guide_has_the_reference_modal_restitution(offset):
     np.testing.assert_allclose(found, MODAL_RESTITUTION[offset], atol=3e-4)
 
 
+@pytest.mark.slow
 def test_the_free_pmma_guide_has_the_reference_frequency_and_amplitude():
     """The guide starts straight at 1 m/s; the frequency is measured between zero crossings."""
     response = guide(PMMA, elements=16).transient(0.4, 2e-4)
@@ -375,6 +376,7 @@ def test_a_held_stop_is_released_when_its_force_would_pull():
     assert response["shuttle.x"][-1] < 0.0
 
 
+@pytest.mark.slow
 def test_first_impact_converges_with_the_step():
     """The modal restitution of an off-centre impact changes by less than 1e-3."""
     found = [

@@ -132,6 +132,7 @@ def test_the_energy_error_with_the_convective_term_vanishes_with_the_step():
     assert coarse > 8 * fine
 
 
+@pytest.mark.slow
 def test_projection_closes_the_loop_after_every_step():
     """The loop equation, loop . e = distance, holds to the tolerance of the thesis."""
     chain = guide_2R()
@@ -140,6 +141,7 @@ def test_projection_closes_the_loop_after_every_step():
     assert np.abs(gap[1:]).max() <= PROJECTION_TOLERANCE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wall", [np.inf, 0.0], ids=["no wall", "wall"])
 def test_the_missing_term_cancels_in_the_1R_parallelogram(wall):
     """The equal links 1 and 3 have opposite directions e and equal rates v, and v_2 = 0.
@@ -155,6 +157,7 @@ def test_the_missing_term_cancels_in_the_1R_parallelogram(wall):
     np.testing.assert_allclose(printed.v, right.v, rtol=0, atol=1e-9)  # Rates are up to 20 rad/s.
 
 
+@pytest.mark.slow
 def test_the_missing_term_does_not_cancel_in_a_four_bar_linkage_with_unequal_links():
     """The links of 40 and 30 mm turn the shuttle; only the full equation conserves energy."""
     bars = Link(40e-3, 0.0, 40e-3, 0.0, np.pi / 2), Link(30e-3, 0.0, 0.0, 0.0, -np.pi / 2)

@@ -98,6 +98,7 @@ def test_results_of_both_engines_are_equal(model):
     assert len(kernel.impacts) == len(python.impacts)
 
 
+@pytest.mark.slow
 def test_a_source_of_inputs_acts_alike_in_both_engines():
     def source(t):
         return {"force.x": 0.2 * np.sin(40 * t), "stop.restitution": 0.5 + t}
@@ -159,6 +160,7 @@ def test_an_unknown_engine_on_the_command_line_is_one_sentence(capsys):
     assert "did you mean python?" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_importing_the_package_loads_no_library():
     script = (
         "import prbm, sys; guide = prbm.load('PRBDM'); prbm.simulate; "

@@ -124,6 +124,7 @@ def test_versions_of_fmi_share_the_reference_results_of_many_mechanisms(monkeypa
     assert computed == [one.name for one in chosen]
 
 
+@pytest.mark.slow
 def test_the_computation_of_reference_results_reports_its_progress(monkeypatch):
     """The clock advances by a second at each of the 1001 communication points."""
     clock = itertools.count()

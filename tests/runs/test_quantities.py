@@ -118,6 +118,7 @@ def test_the_headline_states_whether_the_motion_has_settled(mechanisms, stop_tim
     assert re.search(words, line)
 
 
+@pytest.mark.slow
 def test_a_vibration_beside_a_body_at_rest_is_explained(mechanisms):
     result = simulate(mechanisms["FoldedSuspension"], stop_time=1.0)
     lines = headline(result, result.mechanism, result.start_values)
@@ -131,6 +132,7 @@ def test_needed_variables_are_reported():
     assert QUANTITIES["impacts"].lacking(["stop.impact_count"]) == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("zeta", [0.01, 0.02])
 def test_the_settling_time_is_estimated_from_a_part_of_the_decay(zeta):
     """A longer run of the same vibration settles at the estimated time."""

@@ -245,6 +245,7 @@ def test_figures_do_not_depend_on_matplotlibrc(result: Result) -> None:
         assert png(response(result)) == plain
 
 
+@pytest.mark.slow
 def test_the_response_shows_all_impacts_and_a_constant_balance(
     tmp_path: Path, result: Result
 ) -> None:
@@ -260,6 +261,7 @@ def test_the_response_shows_all_impacts_and_a_constant_balance(
         assert image.format == "PNG"
 
 
+@pytest.mark.slow
 def test_legends_of_the_response_do_not_cover_the_curves() -> None:
     """The curves of the cantilever leave little room."""
     figure = response(simulate(read_mechanism(shipped()["Cantilever"]), stop_time=0.06, step=1e-4))
@@ -352,6 +354,7 @@ def test_the_panel_of_the_displacement_shows_the_wall(mechanisms: dict[str, Mech
     assert "wall" not in [line.get_label() for line in response(far).axes[0].lines]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speeds", [[0.5], [0.9, 0.3], [0.3, 0.04], [0.9, 0.2, 0.03], [2.0, 1e-4]])
 def test_axes_of_impact_speeds_have_several_labels(result: Result, speeds: list[float]) -> None:
     impacts = tuple(

@@ -94,6 +94,7 @@ def test_clamping_the_struts_to_the_ground_adds_their_bending_stiffness() -> Non
     assert additional == pytest.approx(across, rel=0.01)
 
 
+@pytest.mark.slow
 def test_the_shuttle_comes_to_rest_on_the_far_stop_after_the_snap() -> None:
     result = run(BISTABLE, stop_time=0.5)
     y = result.column("shuttle.y")
@@ -124,6 +125,7 @@ def test_without_damping_the_elastic_energy_becomes_kinetic() -> None:
         assert abs(row["shuttle.vx"]) < 1e-9
 
 
+@pytest.mark.slow
 def test_a_shuttle_released_before_the_unstable_equilibrium_returns_to_the_drawn_shape() -> None:
     result = run(BISTABLE, {"release.displacement": 0.0115, "damping.beta": 2e-3}, stop_time=0.5)
     assert abs(result.outputs[-1]["shuttle.y"]) < 1e-4

@@ -87,6 +87,7 @@ def test_static_deflection_is_that_of_a_beam() -> None:
     assert sag == pytest.approx(tip + own, rel=0.025)
 
 
+@pytest.mark.slow
 def test_force_at_rest_on_the_stop_is_weight_less_bending_force() -> None:
     """With the force P of the stop, the sag under M g - P and the weight of the beam is 3 mm.
 

@@ -92,6 +92,7 @@ def test_trusses_move_half_as_far_and_descend_as_a_guide() -> None:
         assert -sign * moved.imag == pytest.approx(0.6 * (x / 2) ** 2 / L, rel=0.015)
 
 
+@pytest.mark.slow
 def test_the_path_is_far_straighter_than_that_of_a_parallel_guide() -> None:
     """The strokes are up to 30 mm, with flexures of 0.2 m."""
     x, L = EXAMPLE["STROKES"], SYSTEM.values["flexure.length"]

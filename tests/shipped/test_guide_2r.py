@@ -87,6 +87,7 @@ def test_the_gap_is_never_negative(default_run):
     assert min(row["stop.gap"] for row in rows) > -1e-9
 
 
+@pytest.mark.slow
 def test_loops_stay_closed():
     """The loop errors are below 1e-12 m and 1e-9 m/s at every output."""
     sim = Simulation(GUIDE)

@@ -87,6 +87,7 @@ def test_first_hit_is_at_the_time_of_the_scalar_equation() -> None:
     assert impact.latched.approach_speed == pytest.approx(closing, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_impacts_with_restitution_one_conserve_energy() -> None:
     values = {"impact.restitution": 1.0, "damping.beta": 0.0, "damping.zeta": 0.0}
     result = run(NAME, values, stop_time=0.3, tolerance=1e-11)

@@ -19,6 +19,7 @@ SHORT = {"stop_time": 1e-3, "step": 1e-3, "workers": 1}
 # --- sensitivities --------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_indices_of_ishigamis_function_are_within_their_confidence(seed):
     """F = sin x + a sin^2 y + b z^4 sin x on [-pi, pi]^3 with a = 7, b = 0.1.
@@ -44,6 +45,7 @@ def test_indices_of_ishigamis_function_are_within_their_confidence(seed):
         assert (np.abs(got - exact) <= 2.0 * half + 1e-12).all()  # 4 standard deviations.
 
 
+@pytest.mark.slow
 def test_indices_of_a_power_law_are_its_exponents(mechanisms):
     """For small changes f ~ h^1.5 b^0.5 / L^1.5 has shares 1.5^2 : 0.5^2 of the variance."""
     vary = {"flexure.thickness": "+- 1 %", "flexure.width": "+- 1 %"}
@@ -82,6 +84,7 @@ def test_the_yield_of_a_linear_case_is_that_of_the_normal_distribution(mechanism
         assert found.share.low < exact < found.share.high
 
 
+@pytest.mark.slow
 def test_confidence_intervals_contain_the_probability_in_95_of_100_cases():
     rng, p = np.random.default_rng(5), 0.9
     found = [yield_of(rng.random(200) < p) for _ in range(1000)]

@@ -156,6 +156,7 @@ def test_rows_are_those_of_single_simulations(mechanisms):
     }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_peaks_of_short_contacts_do_not_depend_on_the_samples():
     """The last impact is the weakest one; fine samples of the force resolve each contact."""
     mass = with_stress(point_mass(young=1e10))

@@ -422,6 +422,7 @@ def test_a_path_with_other_contents_is_rejected_and_unchanged(mishap):
             sweep(mishap, table, "results", overwrite=overwrite)
 
 
+@pytest.mark.slow
 def test_damaged_results_are_reported(mishap, log):
     table = pd.DataFrame({"x": [1.0]})
     sweep(mishap, table, step=0.5, workers=1)

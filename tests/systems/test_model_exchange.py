@@ -71,6 +71,7 @@ def test_an_impact_has_two_rows_with_newtons_law_between_them():
     np.testing.assert_allclose(found["time"][rows], 1e-2 * np.arange(11), atol=1e-15)
 
 
+@pytest.mark.slow
 @pytest.mark.native
 @pytest.mark.fmu
 def test_one_solver_comes_to_rest_at_the_stop():

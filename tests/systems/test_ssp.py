@@ -199,6 +199,7 @@ def test_container_moves_as_in_our_master(outer, inner, ours, tmp_path):
     assert (found["follower.stop.impact_count"] == ours["follower.stop.impact_count"]).all()
 
 
+@pytest.mark.slow
 def test_a_start_value_of_the_container_reaches_the_inner_fmu(ours, tmp_path):
     path = tmp_path / "walls.fmu"
     container(path, fmus(), WIRES, STEP, VALUES, ["follower.stop.impact_count"])
