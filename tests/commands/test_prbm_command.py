@@ -593,7 +593,7 @@ MISTAKES = [
     ("simulate PRBDM --input force.x=1 --input force.x=2", "force.x is given twice"),
     ("simulate PRBDM --input force.x=1 --set force.x=1", "both as a constant and over time"),
     ("simulate PRBDM --input 'force.x=step(1 N)' --spectrum", "use --spectrum last"),
-    ("study PRBDM", "give the parameters with --vary, or a list"),
+    ("study PRBDM", "give the parameters with --vary, a list"),
     ("study PRBDM --vary stop.position=0:1mm", "write LOW:HIGH:COUNT with a count of at least 2"),
     ("study PRBDM --vary stop.position=0:1mm:1", "write LOW:HIGH:COUNT"),
     ("study PRBDM --vary stop.position=1:0mm:3", "the lower end must be below the upper one"),

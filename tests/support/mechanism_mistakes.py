@@ -751,6 +751,21 @@ CHANGES = {
         "a free end needs a clamp at the other",
     ),
     "free and pinned": ('ends = "clamp"', 'ends = ["pin", "free"]', "a free end needs a clamp"),
+    "tolerance of an unknown parameter": (
+        "[release]",
+        '[tolerances]\nhanger.widht = "2 %"\n[release]',
+        "tolerances.hanger.widht: unknown variable 'hanger.widht'; did you mean hanger.width",
+    ),
+    "tolerance without a width": (
+        "[release]",
+        '[tolerances]\nhanger.width = "0 mm"\n[release]',
+        "tolerances.hanger.width = 0 mm: a tolerance of +- 0 must be positive",
+    ),
+    "tolerance about a value": (
+        "[release]",
+        '[tolerances]\nhanger.width = "8 mm +- 2 %"\n[release]',
+        "write the distance of the limits from the value",
+    ),
     "flexure of one body": (
         '"anvil.top"',
         '"ground.foot"',

@@ -7,7 +7,9 @@ import pytest
 from scipy import stats
 
 from prbm.base.errors import ParameterError
+from prbm.files.mechanism_file import load, shipped
 from prbm.files.settings import UserMistake
+from prbm.mechanism.parameters import Tolerance
 from prbm.references.scalar_guide import ScalarGuide
 from prbm.sweeps.design import SENSITIVITY, drawn, sensitivity, yield_of
 from prbm.sweeps.study import study
@@ -107,6 +109,30 @@ def test_tolerances_are_three_standard_deviations(mechanisms, text, mean, spread
     assert found.points.std() == pytest.approx(spread, rel=0.02)
 
 
+def test_yield_with_the_tolerances_of_a_file_is_that_of_the_normal_distribution(
+    mechanisms, tmp_path
+):
+    """The frequency grows with the thickness: it is above that of 0.99 h with Phi(1.5)."""
+    text = shipped()["PRBDM"].read_text(encoding="utf-8")
+    path = tmp_path / "toleranced.toml"
+    path.write_text(f'{text}\n[tolerances]\nflexure.thickness = "2 %"\n', encoding="utf-8")
+    guide = load(path)
+    assert dict(guide.tolerances) == {"flexure.thickness": Tolerance(0.02, relative=True)}
+    h = guide.values()["flexure.thickness"]
+    (limit,) = study(
+        guide, {"flexure.thickness": [0.99 * h, h]}, ["fundamental"], **SHORT
+    ).outputs["fundamental"][:1]  # fmt: skip
+    found = study(
+        guide, None, ["fundamental"], runs=1024, subject_to=[f"fundamental > {limit} Hz"],
+        **SHORT,
+    )  # fmt: skip
+    assert found.share.share == pytest.approx(stats.norm.cdf(1.5), abs=2e-3)
+    named = study(guide, guide.tolerances, ["fundamental"], runs=8, **SHORT)
+    np.testing.assert_array_equal(named.points, found.points[:8])
+    with pytest.raises(ParameterError, match="no parameter is varied"):
+        study(mechanisms["PRBDM"], None, ["fundamental"], runs=8, **SHORT)
+
+
 def test_failed_simulations_are_not_good_ones(mechanisms):
     found = study(
         mechanisms["PRBDM"], {"stop.position": (-0.03, 0.0)}, ["fundamental", "impacts"], runs=16,
@@ -162,6 +188,7 @@ MISTAKES = [
     ({"runs": 4, "vary": {"stop.position": "1 mm"}}, 'write a tolerance, for instance "0.1 mm'),
     ({"runs": 4, "vary": {"stop.position": "+- 0 mm"}}, "tolerance of .- 0 must be positive"),
     ({"runs": 4, "vary": {"stop.position": "+- 2 kg"}}, "another dimension"),
+    ({"runs": 4, "vary": {"stop.position": "+- 2 %"}}, "the value 0 has no width"),
     ({"runs": 4, "vary": {"stop.position": [0.0, 1.0, 2.0]}}, r"give a range \(low, high\)"),
     ({"runs": 3}, "Sobol's sequence needs a power of two"),
     ({"runs": 4, "method": "halton"}, "unknown method 'halton'"),

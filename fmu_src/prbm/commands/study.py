@@ -15,6 +15,7 @@ from ..files.mechanism_file import load
 from ..files.settings import (
     UserMistake,
     has_unit,
+    is_tolerance,
     optional_quantity,
     pairs,
     quantity,
@@ -26,7 +27,7 @@ from ..fmu.start import interface
 from ..mechanics.arrays import Real
 from ..mechanism.description import Mechanism
 from ..runs.inputs import placeholders
-from ..sweeps.design import Yield, tolerance_parts
+from ..sweeps.design import Yield
 from ..sweeps.optimum import FLAT_RTOL, Optimum
 from ..sweeps.study import Study, study
 from .duration import given_inputs
@@ -52,7 +53,7 @@ def run_study(options: argparse.Namespace) -> None:
     table, figure, best = (f"{mechanism.name}-{end}" for end in FILES)
     output.check(table, figure, best)
     found = study(
-        mechanism, _vary(options, names), options.of or [], runs=options.runs,
+        mechanism, _vary(options, names, mechanism), options.of or [], runs=options.runs,
         method=options.method, seed=options.seed,
         minimise=options.minimise, maximise=options.maximise, subject_to=options.subject_to,
         tolerances=pairs(options.tolerance_of, "--tolerance-of", "stop.position=0.1mm"),
@@ -86,12 +87,19 @@ def run_study(options: argparse.Namespace) -> None:
     output.write()
 
 
-def _vary(options: argparse.Namespace, units: Mapping[str, str]) -> dict[str, Any] | Path:
+def _vary(
+    options: argparse.Namespace, units: Mapping[str, str], mechanism: Mechanism
+) -> dict[str, Any] | Path | None:
     """Return the parameters: samples, ranges, tolerances, or the path of a list."""
-    if (options.table is None) == (options.vary is None):
-        raise UserMistake("give the parameters with --vary, or a list of them with --table")
-    if options.table is not None:
+    if options.table is not None and options.vary is None:
         return Path(options.table)
+    if options.table is None and options.vary is None and options.runs and mechanism.tolerances:
+        return None  # Drawn within the tolerances of the mechanism.
+    if options.table is not None or options.vary is None:
+        raise UserMistake(
+            "give the parameters with --vary, a list of them with --table, or [tolerances] in the "
+            "mechanism file and --runs"
+        )
     return _varied(units, options.vary, options.runs is not None)
 
 
@@ -102,7 +110,7 @@ def _varied(units: Mapping[str, str], texts: Sequence[str], drawn: bool) -> dict
         option = f"--vary {name}="
         if name not in units:
             raise UserMistake(f"--vary {name}: {unknown(name, units)}")
-        if drawn and tolerance_parts(text):
+        if drawn and is_tolerance(text):
             found[name] = text
             continue
         parts = [part.strip() for part in text.split(":")]

@@ -256,6 +256,9 @@ def _place(message: str, data: Mapping[str, Any]) -> tuple[str | int, ...]:
     for word in _SUBJECT.findall(message):
         if word in parts:
             return _quoted(message, parts[word], data)
+        head, _, rest = word.partition(".")
+        if head == "tolerances" in parts:
+            return (head, *rest.split("."))
         name, _, key = word.rpartition(".")
         if name in parts:
             return (*parts[name], key)

@@ -7,6 +7,7 @@ quantities may have units.
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Annotated, Any
 
 from pydantic import (
@@ -20,6 +21,7 @@ from pydantic import (
 )
 
 from ..base.errors import MechanismError, PrbmError
+from ..base.names import unknown
 from ..hybrid.rest_speed import with_rest_speeds
 from ..mechanics.collection import Collection
 from ..mechanics.flexures import check_drawn
@@ -36,6 +38,7 @@ from ..mechanism.flexure import (
     ORDER_DEFAULT,
     ORDER_MAX,
 )
+from ..mechanism.parameters import Tolerance
 from ..mechanism.parts import FIELDS, GROUND, LENGTH_MAX, LENGTH_MIN
 from .copies import (
     Copied,
@@ -47,6 +50,7 @@ from .copies import (
     origins,
 )
 from .outlines import mean, plate
+from .settings import is_tolerance, tolerance
 from .tables import STRENGTHS, MaterialTable, Named, ParameterTable, RepeatTable, Table
 from .units import check_coherent, contact_stiffness
 from .values import (
@@ -350,6 +354,10 @@ class MechanismTable(Table):
         (), description="Points whose motion is an output of the FMU"
     )
     release: ReleaseTable = Field(description="Start of the motion")
+    tolerances: dict[str, Any] = Field(
+        default_factory=dict,
+        description='Tolerances of parameters by name, "2 %", "0.1 mm" or "0.1 mm uniform"',
+    )
 
 
 # --- conversion to a mechanism ----------------------------------------------------------------
@@ -377,6 +385,7 @@ def mechanism(file: MechanismTable, drawing: str = "") -> Mechanism:
     connected = mirrored_types(file.flexures, flexures, types)
     try:
         result = _assembled(file, drawn, connected, joints, drawing)
+        result = replace(result, tolerances=_tolerances(file.tolerances, result))
         if misshapen:  # Raised after an undefined name in an outline, which may be its cause.
             raise misshapen[0]
         _check_drawn(result)
@@ -429,6 +438,32 @@ def _parameters(file: MechanismTable) -> Iterator[parameters.Parameter]:
             about = f"{description} of {owner.name}"
             name = f"{owner.name}.{key}"
             yield parameters.Parameter(name, given, unit, about, least, most, nominal)
+
+
+def _tolerances(table: Mapping[str, Any], mechanism: Mechanism) -> dict[str, Tolerance]:
+    """Return the tolerances of parameters, whose names may be nested tables."""
+    units = {parameter.name: parameter.unit for parameter in mechanism.parameters}
+    found = {}
+    for name, text in _leaves(table, ""):
+        key = f"tolerances.{name}"
+        if name not in units:
+            raise MechanismError(f"{key}: {unknown(name, units)}")
+        if not isinstance(text, str) or is_tolerance(text):
+            raise MechanismError(
+                f"{key} = {text!r}: write the distance of the limits from the value, "
+                'for instance "2 %"' + f' or "1 {units[name]}"' * bool(units[name])
+            )
+        found[name] = tolerance(text, units[name], f"{key} =")[1]
+    return found
+
+
+def _leaves(table: Mapping[str, Any], before: str) -> Iterator[tuple[str, Any]]:
+    """Yield the values of nested tables, with their dotted names."""
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _leaves(value, f"{before}{key}.")
+        else:
+            yield before + key, value
 
 
 def _materials(file: MechanismTable) -> dict[str, dict[str, Any]]:

@@ -8,9 +8,11 @@ from ..base.errors import MechanismError, ParameterError, PrbmError
 from ..base.names import unknown
 from ..mechanics.inputs import input_units
 from ..mechanism.description import Mechanism
+from ..mechanism.parameters import Tolerance
 from .units import contact_stiffness, number
 
 PERCENT = re.compile(r"(.*\d)\s*%")
+TOLERANCE = re.compile(r"(.*?)(?:\+-|\+/-|±)(.*?)(uniform)?", re.DOTALL)
 UNIT_ALONE = re.compile(r"[A-Za-zµμ°][^=]*|1/.*")
 
 
@@ -54,6 +56,53 @@ def quantity(text: str, unit: str, option: str) -> float:
     if not math.isfinite(value):
         raise UserMistake(f"{option} {text}: write a finite number{f' in {unit}' if unit else ''}")
     return value
+
+
+def is_tolerance(text: str) -> bool:
+    """Return whether a text is a value with a tolerance, or a tolerance.
+
+    Examples
+    --------
+    >>> is_tolerance("0.1 mm +- 2 %"), is_tolerance("0.1 mm")
+    (True, False)
+    """
+    return TOLERANCE.fullmatch(text) is not None
+
+
+def tolerance(text: str, unit: str, option: str) -> tuple[float | None, Tolerance]:
+    """Read a tolerance, ``+- 2 %`` or ``5 um uniform``, which may follow a value and ``+-``.
+
+    Parameters
+    ----------
+    text, unit, option : str
+        As for :func:`quantity`.
+
+    Returns
+    -------
+    value, tolerance
+        The value before ``+-``, or None.
+
+    Raises
+    ------
+    UserMistake
+        If the value or the half-width is invalid.
+
+    Examples
+    --------
+    >>> tolerance("0.1 mm +- 2 %", "m", "--vary")
+    (0.0001, Tolerance(half_width=0.02, relative=True, uniform=False))
+    >>> tolerance("5 um uniform", "m", "--vary")
+    (None, Tolerance(half_width=5e-06, relative=False, uniform=True))
+    """
+    found = TOLERANCE.fullmatch(text.strip() if is_tolerance(text) else f"+- {text.strip()}")
+    assert found is not None
+    middle, half, relative = found[1].strip(), found[2].strip(), found[2].strip().endswith("%")
+    value = quantity(middle, unit, option) if middle else None
+    try:
+        width = quantity(half, "" if relative else unit, option)
+        return value, Tolerance(width, relative, found[3] is not None)
+    except ParameterError as error:
+        raise UserMistake(f"{option} {text.strip()}: {error}") from None
 
 
 def optional_quantity(text: str | None, unit: str, option: str) -> float | None:

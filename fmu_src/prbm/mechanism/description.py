@@ -12,7 +12,7 @@ and of FMI.
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from keyword import iskeyword
 
@@ -44,7 +44,7 @@ from .flexure import (
     THICK_NODES,
     FlexureModel,
 )
-from .parameters import Parameter, by_name
+from .parameters import Parameter, Tolerance, by_name
 from .parts import (
     GROUND,
     LAWS,
@@ -99,6 +99,8 @@ class Mechanism:
         proportion to stiffness [s].
     drawing : str
         Drawing of the mechanism in characters.
+    tolerances : mapping
+        Tolerances of parameters by name, which studies draw values from.
 
     Raises
     ------
@@ -126,6 +128,7 @@ class Mechanism:
     damping_beta: float = 0.0
     description: str = ""
     drawing: str = ""
+    tolerances: Mapping[str, Tolerance] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return f"<Mechanism {self.name}: {self.title}>"
@@ -299,6 +302,8 @@ class Mechanism:
                     f"the parameter {parameter.name!r} is defined twice: rename one"
                 )
             defined.add(parameter.name)
+        for name in self.tolerances.keys() - defined:
+            raise MechanismError(f"tolerances.{name}: {unknown(name, dict.fromkeys(defined))}")
 
     def _check_references(self) -> None:
         """Reject undefined references and inconsistent parts."""

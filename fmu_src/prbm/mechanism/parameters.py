@@ -72,6 +72,46 @@ class Parameter:
         return number
 
 
+@dataclass(frozen=True)
+class Tolerance:
+    """Limits of a parameter on either side of its value.
+
+    Parameters
+    ----------
+    half_width : float
+        Distance of the limits from the value, in the unit of the parameter, or as a share of it.
+    relative : bool
+        Whether the half-width is a share of the value.
+    uniform : bool
+        Whether values between the limits are equally likely; otherwise they have a normal
+        distribution, whose standard deviation is a third of the half-width.
+
+    Raises
+    ------
+    ParameterError
+        If the half-width is not positive and finite.
+
+    Examples
+    --------
+    >>> Tolerance(0.02, relative=True).at(-5.0)
+    0.1
+    """
+
+    half_width: float
+    relative: bool = False
+    uniform: bool = False
+
+    def __post_init__(self) -> None:
+        if not (self.half_width > 0.0 and math.isfinite(self.half_width)):
+            raise ParameterError(
+                f"a tolerance of +- {self.half_width:g} must be positive and finite"
+            )
+
+    def at(self, value: float) -> float:
+        """Return the distance of the limits from a value, in its unit."""
+        return self.half_width * (abs(value) if self.relative else 1.0)
+
+
 def by_name(argument: str, given: Mapping[str, T] | None) -> Mapping[str, T]:
     """Return the values of an argument by name, none of them for None.
 

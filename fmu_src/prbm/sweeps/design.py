@@ -21,6 +21,7 @@ from scipy.stats import binomtest, norm, qmc, sobol_indices
 from ..base import reading
 from ..base.errors import ParameterError
 from ..mechanics.arrays import Real
+from ..mechanism.parameters import Tolerance
 
 METHODS = ("random", "latin", "sobol")
 SENSITIVITY = "sensitivity"  # Method of Saltelli's design.
@@ -32,7 +33,6 @@ CONFIDENCE = 0.95
 RESAMPLES = 999  # Of the bootstrap that gives the confidence intervals of indices.
 FILE_SIZE_MAX = 1 << 28  # bytes of a list of parameters.
 HEAD = re.compile(r"([^\[\]]*)(?:\[([^\[\]]*)\])?")  # A name and a unit in brackets.
-TOLERANCE = re.compile(r"(.*?)(?:\+-|\+/-|±)(.*?)(uniform)?", re.DOTALL)
 
 
 def grid(samples: Mapping[str, Real]) -> Real:
@@ -167,22 +167,8 @@ def _quantiles(name: str, distribution: Any, u: Real) -> Real:
     return x
 
 
-def tolerance_parts(text: str) -> tuple[str, str, bool] | None:
-    """Return nominal value, half-width and whether the distribution is uniform; None otherwise.
-
-    Examples
-    --------
-    >>> tolerance_parts("0.1 mm +- 2 %"), tolerance_parts("+- 5 um uniform"), tolerance_parts("1")
-    (('0.1 mm', '2 %', False), ('', '5 um', True), None)
-    """
-    found = TOLERANCE.fullmatch(text.strip())
-    if found is None:
-        return None
-    return found[1].strip(), found[2].strip(), found[3] is not None
-
-
-def toleranced(nominal: float, half: float, uniform: bool) -> Any:
-    """Return the distribution of a value with a tolerance.
+def distribution(value: float, tolerance: Tolerance) -> Any:
+    """Return the distribution of a parameter with a tolerance, for :func:`drawn`.
 
     It is normal, and the half-width of the tolerance is three standard deviations: 0.27 % of the
     parts are outside.  Or it is uniform between the limits of the tolerance.
@@ -190,11 +176,17 @@ def toleranced(nominal: float, half: float, uniform: bool) -> Any:
     Raises
     ------
     ParameterError
-        If the half-width is not positive and finite.
+        If the half-width is a share of the value zero.
+
+    Examples
+    --------
+    >>> distribution(2.0, Tolerance(0.5, uniform=True))
+    (1.5, 2.5)
     """
-    if not (half > 0.0 and math.isfinite(half)):
-        raise ParameterError(f"a tolerance of +- {half:g} must be positive and finite")
-    return (nominal - half, nominal + half) if uniform else norm(nominal, half / SIGMAS)
+    half = tolerance.at(value)
+    if half == 0.0:
+        raise ParameterError("a tolerance in % of the value 0 has no width; give it in its unit")
+    return (value - half, value + half) if tolerance.uniform else norm(value, half / SIGMAS)
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,7 @@ from ..interface.variables import variables
 from ..mechanics.arrays import Real
 from ..mechanics.stress import with_stress
 from ..mechanism.description import Mechanism
+from ..mechanism.parameters import Tolerance
 from ..runs.engine import PYTHON, check_engine, kernel_available
 from ..runs.experiment import experiment
 from ..runs.inputs import Source, filled, placeholders, signals
@@ -40,12 +41,11 @@ from .design import (
     SENSITIVITY,
     Sensitivity,
     Yield,
+    distribution,
     drawn,
     grid,
     read_rows,
     sensitivity,
-    tolerance_parts,
-    toleranced,
     yield_of,
 )
 from .journal import Journal
@@ -60,7 +60,7 @@ LAST_FRACTION = 0.99  # Reported progress while a refinement takes more simulati
 YIELD_RUNS = 256  # Simulations around an optimum that give its yield.
 YIELD_SEED = 1
 CONDITION = re.compile(r"(.*[^<>=])(<=|>=|<|>)([^<>=()]*)", re.DOTALL)  # "fundamental > 40 Hz".
-Vary = Mapping[str, Any] | str | Path
+Vary = Mapping[str, Any] | str | Path | None
 
 
 @dataclass(frozen=True, repr=False)
@@ -138,7 +138,7 @@ def study(
     minimise: str | None = None,
     maximise: str | None = None,
     subject_to: Sequence[str] = (),
-    tolerances: Mapping[str, str] | None = None,
+    tolerances: Mapping[str, str | Tolerance] | None = None,
     values: Mapping[str, float | str] | None = None,
     inputs: Mapping[str, Source] | None = None,
     stop_time: float | str | None = None,
@@ -162,14 +162,15 @@ def study(
     ----------
     mechanism : Mechanism
         The mechanism.
-    vary : mapping
+    vary : mapping, str, Path or None
         Increasing samples of parameters or inputs by name, numbers in SI or texts with a unit,
         ``"-4 mm"``, whose combinations are simulated; or of numbers that are written as ``{name}``
         in the texts of inputs.  With ``runs``, for each name (low, high), a distribution of
         ``scipy.stats``, or a tolerance such as ``"0.1 mm +- 2 %"`` or ``"+- 2 %"`` of the value of
         the mechanism: a normal distribution with three standard deviations in the half-width, or a
-        uniform one, ``"+- 2 % uniform"``.  Or the path of a CSV file with a row for each simulation
-        and a column for each name, in SI or with a unit in the head, ``stop.position [mm]``.
+        uniform one, ``"+- 2 % uniform"``.  None: the tolerances of the mechanism.  Or the path of a
+        CSV file with a row for each simulation and a column for each name, in SI or with a unit in
+        the head, ``stop.position [mm]``.
     outputs : sequence of str
         Outputs as of :func:`prbm.sweeps.sweep.sweep`: ``settling``, ``max(abs(shuttle.vx))``; or,
         without a simulation, ``fundamental``, ``mode(2)`` and ``rest(shuttle.x)``.  If one of them
@@ -184,8 +185,8 @@ def study(
     subject_to : sequence of str
         Constraints on outputs, ``"fundamental > 40 Hz"``.
     tolerances : mapping or None
-        Tolerances of parameters, ``{"flexure.thickness": "2 %"}``, that give the yield around the
-        optimum.
+        Tolerances of varied parameters, ``{"flexure.thickness": "2 %"}``, that give the yield
+        around the optimum.
     values, inputs, stop_time, tolerance, engine
         As for :func:`prbm.simulate`.
     step : float, str or None
@@ -336,34 +337,15 @@ def _plan(
         raise ParameterError("no output is selected; name one, for instance settling")
     mechanism = _with_stress(mechanism, wanted)
     known = _units(mechanism)
-    within = placeholders(inputs or {})
-    listed = None
-    if not isinstance(vary, Mapping):
-        vary = {
-            name: x * (in_unit(name, f"1 {unit}", known.get(name, "")) if unit.strip("-") else 1.0)
-            for name, (x, unit) in read_rows(Path(vary)).items()
-        }
-        listed = np.column_stack([*vary.values()])
-        if runs is not None:
-            raise ParameterError("runs are drawn from ranges, not from a file; omit one of them")
-    _check_names(mechanism, vary, within)
+    listed = isinstance(vary, str | Path)
+    columns = _columns(vary, runs, mechanism, known)
+    _check_names(mechanism, columns, placeholders(inputs or {}))
     given = dict(in_si(mechanism, values))
-    if listed is not None:
-        varied: dict[str, Any] = dict(vary)
-        count = len(listed)
-    elif runs is None:
-        varied = {n: _samples(n, x, known) for n, x in vary.items()}
-        count = math.prod(map(len, varied.values()))
+    if listed:
+        varied, points = dict(columns), np.column_stack([*columns.values()])
+        _check_count(len(points))
     else:
-        base = {**mechanism.values(), **given}
-        varied = {n: _distribution(n, x, known, base) for n, x in vary.items()}
-        count = runs * (len(varied) + 2 if drawing[0] == SENSITIVITY else 1)
-    if count > RUNS_MAX:
-        raise ParameterError(f"the study has {count} simulations; reduce them to {RUNS_MAX}")
-    if listed is not None:
-        points = listed
-    else:
-        points = grid(varied) if runs is None else drawn(varied, runs, drawing[1], drawing[0])
+        varied, points = _points(columns, runs, drawing, known, {**mechanism.values(), **given})
     kept = tuple(parse_output(text, known) for text in dict.fromkeys(wanted))
     for output in kept:
         output.check(known, "the mechanism")
@@ -380,8 +362,51 @@ def _plan(
     job = MechanismJob(mechanism, kept, given, sources, *_options(mechanism, given, *options),
                        tuple(known))  # fmt: skip
     return Plan(
-        job, varied, points, goal, constraints, (runs is None and listed is None, *drawing), shown
+        job, varied, points, goal, constraints, (runs is None and not listed, *drawing), shown
     )
+
+
+def _columns(
+    vary: Vary, runs: int | None, mechanism: Mechanism, known: Mapping[str, str]
+) -> Mapping[str, Any]:
+    """Return what is given for each varied parameter; the columns of a file are in SI."""
+    if vary is None:
+        if runs is None or not mechanism.tolerances:
+            raise ParameterError(
+                "no parameter is varied; give vary, or runs for a mechanism with tolerances"
+            )
+        return mechanism.tolerances
+    if isinstance(vary, Mapping):
+        return vary
+    if runs is not None:
+        raise ParameterError("runs are drawn from ranges, not from a file; omit one of them")
+    return {
+        name: x * (in_unit(name, f"1 {unit}", known.get(name, "")) if unit.strip("-") else 1.0)
+        for name, (x, unit) in read_rows(Path(vary)).items()
+    }
+
+
+def _points(
+    vary: Mapping[str, Any],
+    runs: int | None,
+    drawing: tuple[str, int],
+    known: Mapping[str, str],
+    base: Mapping[str, float],
+) -> tuple[dict[str, Any], Real]:
+    """Return samples or distributions of the parameters, and the points of a grid or drawn ones."""
+    if runs is None:
+        varied = {n: _samples(n, x, known) for n, x in vary.items()}
+        count = math.prod(map(len, varied.values()))
+    else:
+        varied = {n: _distribution(n, x, known, base) for n, x in vary.items()}
+        count = runs * (len(varied) + 2 if drawing[0] == SENSITIVITY else 1)
+    _check_count(count)
+    return varied, grid(varied) if runs is None else drawn(varied, runs, drawing[1], drawing[0])
+
+
+def _check_count(count: int) -> None:
+    if count > RUNS_MAX:
+        raise ParameterError(f"the study has {count} simulations; reduce them to {RUNS_MAX}")
 
 
 def _options(
@@ -449,7 +474,22 @@ def _distribution(
     """Return the distribution of a parameter, from a pair, a tolerance or a distribution."""
     unit = known.get(name, "")
     if isinstance(given, str):
-        return _toleranced(name, given, unit, base.get(name))
+        from ..files.settings import is_tolerance, tolerance  # imported here: pint
+
+        if not is_tolerance(given):
+            raise ParameterError(
+                f'{name} = {given}: write a tolerance, for instance "0.1 mm +- 2 %"'
+            )
+        nominal, given = tolerance(given, unit, f"{name} =")
+        if nominal is not None:
+            base = {name: nominal}
+    if isinstance(given, Tolerance):
+        if name not in base:
+            raise ParameterError(f"{name} has a tolerance, but no value; write it before +-")
+        try:
+            return distribution(base[name], given)
+        except ParameterError as error:
+            raise ParameterError(f"{name}: {error}") from None
     if hasattr(given, "ppf"):
         return given
     ends = _samples(name, given, known)
@@ -458,36 +498,16 @@ def _distribution(
     return float(ends[0]), float(ends[1])
 
 
-def _toleranced(name: str, text: str, unit: str, nominal: float | None) -> Any:
-    """Return the distribution of a text such as ``0.1 mm +- 2 %``."""
-    parts = tolerance_parts(text)
-    if parts is None:
-        raise ParameterError(f'{name} = {text}: write a tolerance, for instance "0.1 mm +- 2 %"')
-    middle, half, uniform = parts
-    if middle:
-        nominal = in_unit(name, middle, unit)
-    if nominal is None:
-        raise ParameterError(f"{name} = {text}: has no nominal value; write it before +-")
-    if half.endswith("%"):
-        width = abs(nominal) * in_unit(name, half, "")
-    else:
-        width = in_unit(name, half, unit)
-    try:
-        return toleranced(nominal, width, uniform)
-    except ParameterError as error:
-        raise ParameterError(f"{name}: {error}") from None
+def _around(plan: Plan, tolerances: Mapping[str, str | Tolerance]) -> dict[str, Tolerance]:
+    """Return the checked tolerances around an optimum."""
+    from ..files.settings import tolerance  # imported here: pint
 
-
-def _around(plan: Plan, tolerances: Mapping[str, str]) -> dict[str, tuple[str, bool]]:
-    """Return the half-widths of tolerances around an optimum, as texts."""
     found = {}
-    for name, text in tolerances.items():
+    for name, given in tolerances.items():
         if name not in plan.names:
             raise ParameterError(f"the tolerance of {name}: {proposal(name, plan.varied)}")
-        parts = tolerance_parts(text if "+-" in text else f"+- {text}")
-        assert parts is not None
-        _toleranced(name, f"+- {parts[1]}", plan.units[name], 1.0)  # Report mistakes.
-        found[name] = f"+- {parts[1]}{' uniform' if parts[2] else ''}", parts[2]
+        unit = plan.units[name]
+        found[name] = tolerance(given, unit, f"{name} =")[1] if isinstance(given, str) else given
     if found and not (plan.goal and plan.constraints):
         raise ParameterError(
             "tolerances give the yield around an optimum; give an output to optimise and "
@@ -530,9 +550,7 @@ def _condition(text: str) -> tuple[str, str, str, str]:
 # --- simulations ----------------------------------------------------------------------------------
 
 
-def _run(
-    plan: Plan, runner: Runner, spread: Mapping[str, tuple[str, bool]], progress: Progress
-) -> Study:
+def _run(plan: Plan, runner: Runner, spread: Mapping[str, Tolerance], progress: Progress) -> Study:
     """Simulate, search the optimum and its yield."""
     points, count = plan.points, len(plan.points)
     extra = REFINEMENTS_EXPECTED * len(plan.names) if plan.goal else 0
@@ -590,13 +608,9 @@ def _run(
     return Study(**found, optimum=best)
 
 
-def _yield_at(
-    plan: Plan, best: Optimum, spread: Mapping[str, tuple[str, bool]], evaluate: Any
-) -> Yield:
+def _yield_at(plan: Plan, best: Optimum, spread: Mapping[str, Tolerance], evaluate: Any) -> Yield:
     """Return the share of good simulations with the tolerances around an optimum."""
-    laws = {
-        n: _toleranced(n, text, plan.units[n], best.point[n]) for n, (text, _) in spread.items()
-    }
+    laws = {name: distribution(best.point[name], given) for name, given in spread.items()}
     moved = drawn(laws, YIELD_RUNS, YIELD_SEED, "random")
     points = np.tile([best.point[name] for name in plan.names], (YIELD_RUNS, 1))
     points[:, [plan.names.index(name) for name in laws]] = moved
