@@ -1,6 +1,7 @@
 """Files of drawings: versions, units, layers, blocks, gaps, and files that are refused."""
 
 import contextlib
+import os
 import shutil
 from itertools import pairwise
 
@@ -14,6 +15,7 @@ from prbm.cad import curves, dxf
 from prbm.cad.curves import DrawingError
 from prbm.cad.importing import Options, import_drawing
 from prbm.cad.numbers import plain, roundest
+from support import possible
 
 OPTIONS = Options(8e-3)
 
@@ -275,8 +277,9 @@ def test_round_numbers_have_the_fewest_decimals_within_the_tolerance():
 
 
 def test_the_name_of_a_drawing_may_have_any_letters(tmp_path):
+    quote = "'" if os.name == "nt" else '"'
     path = write(tmp_path / "plate.dxf", framed_stage())
-    other = shutil.copy(path, tmp_path / '3 "plätze" {v2}.dxf')
+    other = shutil.copy(path, possible(tmp_path / f"3 {quote}plätze{quote} {{v2}}.dxf"))
     assert import_drawing(other, OPTIONS).mechanism.name.isidentifier()
 
 
