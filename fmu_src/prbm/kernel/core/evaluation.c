@@ -276,13 +276,10 @@ SHARED void rows_dispatch(int even, const Equations *eq, const Kinematics *at, d
 /* --- inertia ---------------------------------------------------------------------------------- */
 
 /* Subtract the damping c M v of the block M that begins at start from the loads. */
-SIZED void damp_block(const Equations *eq, int size, int start, const double *RESTRICT M,
-                      Evaluation *result) {
+NOINLINE void damp_block(const Equations *eq, int size, int start, const double *RESTRICT M,
+                         Evaluation *result) {
     const double c = eq->mass_damping, *v = result->at.speed + start;
     double *x = result->a + start;
-    if (c == 0.0) {
-        return;
-    }
     for (int i = 0; i < size; i++) {
         x[i] -= c * M[i * size + i] * v[i];
         for (int j = i + 1; j < size && j <= eq->system->last[start + i]; j++) {
@@ -358,7 +355,9 @@ static bool block_motion(const Equations *eq, Evaluation *result, const Block *b
     double *M = result->block;
     block_inertia(size, eq->system->last + start, H, own_inertia(eq->system, at) + start,
                   parts_from(at->e_parts, start), at->squares + start, M, result->a + start);
-    damp_block(eq, size, start, M, result);
+    if (eq->mass_damping != 0.0) {
+        damp_block(eq, size, start, M, result);
+    }
     return factor_block(eq, result, block, M, U);
 }
 
@@ -370,7 +369,9 @@ SIZED bool small_block_motion(const Equations *eq, Evaluation *result, int size,
     double M[SMALL * SMALL], D[SMALL];
     small_inertia(size, H, own_inertia(eq->system, at) + start, parts_from(at->e_parts, start),
                   at->squares + start, M, result->a + start);
-    damp_block(eq, size, start, M, result);
+    if (eq->mass_damping != 0.0) {
+        damp_block(eq, size, start, M, result);
+    }
     if (!small_factor(size, M, U, D)) {
         UNROLLED
         for (int i = 0; i < size * size; i++) {
@@ -407,7 +408,9 @@ NOINLINE bool mapped_blocks_motion(const Equations *eq, Evaluation *result) {
     for (int k = 0; k < result->factors.block_count; k++) {
         const Block *block = &result->factors.blocks[k];
         int start = block->start, size = block->size;
-        damp_block(eq, size, start, M, result);
+        if (eq->mass_damping != 0.0) {
+            damp_block(eq, size, start, M, result);
+        }
         regular = (block->split > 0 ? factor_guide_block(eq, result, start, M, U)
                                     : factor_block(eq, result, block, M, U)) &&
                   regular;
