@@ -85,6 +85,19 @@ def test_an_imported_drawing_has_the_frequency_of_the_formula(
     assert is_picture("stage.png")
 
 
+@pytest.mark.slow
+def test_the_period_of_the_impact_oscillator_doubles_where_the_closed_form_does(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    main = example("impact_oscillator.py").main
+    monkeypatch.setitem(main.__globals__, "RATIOS", np.arange(2.66, 2.705, 0.01))
+    main([])
+    words = capsys.readouterr().out.split()
+    found, closed = float(words[4]), float(words[8])
+    assert found == pytest.approx(closed, rel=1e-3)
+    assert is_picture("impact_oscillator.png")
+
+
 def test_quickstart_names_the_file_that_it_cannot_write() -> None:
     Path("PRBDM2R.fmu").mkdir()
     with pytest.raises(SystemExit, match=r"cannot write .*PRBDM2R\.fmu: Is a directory; run this"):

@@ -21,8 +21,14 @@ MAP_COLUMNS = 2
 SCATTER = (2.6, 2.2)  # Width and height of a panel [inch].
 LETTERS = 11.0  # Of a title in an inch, at most.
 WAYS: tuple[dict[str, Any], ...] = (
-    {"color": BODY, "marker": ".", "markersize": 4.0},
-    {"color": IMPACT, "marker": "o", "markersize": 5.0, "markerfacecolor": "none"},
+    {"color": BODY, "marker": ".", "markersize": 2.5, "zorder": 3},
+    {
+        "color": IMPACT,
+        "marker": "o",
+        "markersize": 4.5,
+        "markerfacecolor": "none",
+        "markeredgewidth": 0.4,
+    },
 )  # Of ways of a map of behaviour, which differ in black and white, too.
 
 

@@ -5,7 +5,7 @@ The module imports NumPy only, and so starts quickly.
 
 import re
 from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import nan
 from typing import Any
 
@@ -360,11 +360,12 @@ class Outcome:
     """The result of a run.
 
     ``values`` are the outputs in the order of the job, empty for a failed run.  ``seconds`` is the
-    duration of the computation.  ``spent``: the process must not be used for further runs.
+    duration of the computation, which does not count when outcomes are compared.  ``spent``: the
+    process must not be used for further runs.
     """
 
     status: str
     message: str = ""
-    seconds: float = nan
+    seconds: float = field(default=nan, compare=False)
     values: tuple[float, ...] = ()
     spent: bool = False
