@@ -18,6 +18,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
+from compliant_pivot import two_compliant_stops
 from fmu_host import simulate_fmu
 from prbm.base.errors import ParameterError
 from prbm.commands.command_line import main
@@ -249,6 +250,13 @@ def test_caption_and_trace_show_impacts_and_rest(
     scene.frame(0)
     assert "impacts  0" in scene.text.get_text()
     assert "rest" not in scene.text.get_text()
+
+
+def test_the_gaps_of_several_stops_have_names() -> None:
+    pivot = two_compliant_stops()
+    scene = scene_of(simulate(pivot, stop_time=0.01), slow=10.0, stop=0.01)
+    names = [text.get_text() for text in scene.trace.get_legend().get_texts()]
+    assert names == [stop.name for stop in pivot.stops]
 
 
 def test_a_film_ends_shortly_after_the_motion(mechanisms: dict[str, Mechanism]) -> None:

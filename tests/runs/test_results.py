@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from PIL import Image
 
+from compliant_pivot import two_compliant_stops
 from prbm.base.errors import PrbmError
 from prbm.base.progress import reporter
 from prbm.drawing.style import png
@@ -24,6 +25,7 @@ from prbm.plots.figures import response
 from prbm.runs.headline import headline
 from prbm.runs.result import Result, ResultError, UnknownColumnError, read_csv, rest_time
 from prbm.runs.run import simulate
+from support import SUPPORT
 
 
 @pytest.fixture(scope="module")
@@ -352,6 +354,37 @@ def test_the_panel_of_the_displacement_shows_the_wall(mechanisms: dict[str, Mech
     np.testing.assert_allclose(wall_of(response(pair)).get_ydata(), expected, atol=1e-6)
     far = simulate(mechanisms["PRBDM"], {"stop.position": 0.079}, stop_time=0.01)
     assert "wall" not in [line.get_label() for line in response(far).axes[0].lines]
+
+
+def test_forces_of_compliant_stops_have_marks_at_their_peaks() -> None:
+    """A hit between two rows has a mark at its peak."""
+    pivot = two_compliant_stops()
+    result = simulate(pivot, stop_time=0.1, step=1e-3)
+    figure = response(result)
+    (panel,) = [axes for axes in figure.axes if axes.get_ylabel() == "stop force [N]"]
+    names = [text.get_text() for text in panel.get_legend().get_texts()]
+    assert names == [stop.name for stop in pivot.stops]
+    drawn = np.concatenate([np.ravel(line.get_ydata()) for line in panel.lines])
+    largest = max(impact.latched.peak_force for impact in result.impacts)
+    rows = max(result[f"{name}.force"].max() for name in names)
+    assert drawn.max() == pytest.approx(max(largest, rows), rel=1e-12)
+
+
+def test_the_panel_of_the_rotation_shows_the_wall() -> None:
+    """The wheel is at the rotation of the wall when it hits it."""
+    pivot = read_mechanism(SUPPORT / "pivot.toml")
+    result = simulate(pivot, stop_time=0.2)
+    panel = response(result).axes[0]
+    assert panel.get_ylabel() == "rotation [deg]"
+    walls = {
+        line.get_label(): line.get_ydata()[0]
+        for line in panel.lines
+        if line.get_label() not in ("wheel", "impact")
+    }
+    hit = result.impacts[0]
+    angle = np.degrees(np.interp(hit.time, result["time"], result["wheel.angle"]))
+    name = hit.stop if len(pivot.stops) > 1 else "wall"
+    assert walls[name] == pytest.approx(angle, abs=0.1)
 
 
 @pytest.mark.slow

@@ -12,6 +12,7 @@ import matplotlib.style
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.path import Path
+from matplotlib.rcsetup import cycler
 
 from ..mechanics.arrays import Complex
 
@@ -19,7 +20,11 @@ LINK, FLEXURE, BODY, WALL = "#1f4e79", "#8fb4d8", "#9dc3e6", "#595959"
 STRAIGHT, GRID, PROBE = "#b4bcc6", "#eeeeee", "#cc79a7"
 PAST, FUTURE, IMPACT, REST = "#1f4e79", "#c8ced6", "#d55e00", "#009e73"
 
-own_style = partial(matplotlib.style.context, "default")  # Independent of the user's matplotlibrc.
+CYCLE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+"""Colours of curves beside each other, which colour-blind readers can distinguish (Okabe, Ito)."""
+
+# Independent of the user's matplotlibrc.
+own_style = partial(matplotlib.style.context, ["default", {"axes.prop_cycle": cycler(color=CYCLE)}])
 
 
 def area(rings: Sequence[Complex], scale: float = 1.0) -> Path:

@@ -10,12 +10,12 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from ..base.atomic import write
 from ..base.unit_text import length_unit, prefixed_unit, time_unit
-from ..drawing.style import IMPACT, PAST, REST, WALL, own_style, png
+from ..drawing.style import CYCLE, IMPACT, PAST, REST, WALL, own_style, png
 from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble
 from ..mechanics.system import unit
 from ..mechanism.description import Mechanism
-from ..mechanism.parts import GROUND
+from ..mechanism.parts import GROUND, Stop
 from ..runs.marks import Mark, marks
 from ..runs.released import (
     displacement_outputs,
@@ -36,20 +36,18 @@ from ..runs.result import (
 )
 from .scene import plain
 
-ENERGIES = {  # Colours that colour-blind readers can distinguish.
-    "kinetic": "#0072b2",
-    "elastic": "#d55e00",
-    "gravitational": "#009e73",
-    "dissipated": "#cc79a7",
-    "work": "#e69f00",
-}
+ENERGIES = dict(
+    zip(("kinetic", "elastic", "gravitational", "dissipated", "work"), CYCLE, strict=False)
+)
 PANEL_HEIGHT, WIDTH = 1.9, 8.0  # Inches.
 SETTLED_RTOL = 5e-3  # Deviation from the final position at which a motion has settled.
 SETTLED_MARGIN = 0.15  # Time shown after the settling, as a share of the settling time.
 SETTLED_SHARE_MAX = 0.7  # A motion that takes longer is shown up to the end of the result.
 WALL_MARGIN = 0.5  # Walls are drawn up to this distance from the motion, as a share of it.
 Y_MARGIN = 0.05  # Margin above and below the displacement, as a share of its range.
+TOUCH_RTOL = 0.02  # Smaller gaps, as a share of their range, are contacts between two rows.
 PARALLEL_ATOL = 1e-6  # Walls are drawn if their sine to the direction of release is smaller.
+SPEED_RTOL = 1e-9  # Smaller speeds, as a share of the largest one, are round-off.
 LOG_RATIO_MIN = 5.0  # Smaller ratios of impact speeds are drawn on a linear axis.
 LABELLED_RATIO_MAX = 300.0  # Up to this ratio, 2 and 5 are labelled on a logarithmic axis.
 
@@ -135,9 +133,10 @@ def response(
     Figure
         The figure of the axes.  One panel for each recorded quantity: displacement and velocity of
         the released point along the direction of its release, or rotation and rate of its body for
-        a release by an angle; closing and opening speeds of the impacts, energies.  The sum of the
-        energies less the work is constant.  Times at which a stop holds are shaded.  The time axis
-        ends shortly after the motion has settled.  If no body moves, the figure says so.
+        a release by an angle; closing and opening speeds of the impacts, forces of compliant stops,
+        energies.  The sum of the energies less the work is constant.  Times at which a stop holds
+        are shaded.  The time axis ends shortly after the motion has settled.  If no body moves, the
+        figure says so.
 
     Raises
     ------
@@ -211,6 +210,8 @@ def _panels(plot: _Plot) -> list[Panel]:
         drawn.append(_turning if turns else _velocity)
     if plot.marks:
         drawn.append(_speeds)
+    if any(stop.compliant and plot.has(f"{stop.name}.force") for stop in plot.mechanism.stops):
+        drawn.append(_forces)
     if plot.has(*(f"energy.{name}" for name in ENERGIES)):
         drawn.append(_energies)
     if not drawn:
@@ -284,8 +285,25 @@ def _rotation(axes: Axes, plot: _Plot) -> None:
         when = plot.factor * np.array([mark.time for mark in plot.marks])
         at_hit = np.interp(when, plot.time, angle)
         axes.plot(when, at_hit, "v", color=IMPACT, markersize=5, label="impact")
-        axes.legend(loc="best", fontsize=9, frameon=False, ncols=2)
+    _touched(axes, plot, angle)
+    if len(axes.lines) > 1:
+        axes.legend(loc="best", fontsize=9, frameon=False, ncols=3)
     axes.set_ylabel("rotation [deg]")
+
+
+def _touched(axes: Axes, plot: _Plot, angle: Real) -> None:
+    """Draw the rotations at which the body touches walls that are fixed to the ground."""
+    for stop in plot.mechanism.stops:
+        moving = f"{stop.name}.displacement"
+        if stop.body != plot.mechanism.release.body or stop.on != GROUND:
+            continue
+        if not plot.has(f"{stop.name}.gap") or (plot.has(moving) and np.ptp(plot.columns[moving])):
+            continue
+        gap = plot.columns[f"{stop.name}.gap"]
+        k = int(np.argmin(np.abs(gap)))
+        if abs(gap[k]) <= TOUCH_RTOL * np.ptp(gap):
+            name = stop.name if len(plot.mechanism.stops) > 1 else "wall"
+            axes.axhline(angle[k], color=WALL, linewidth=1.6, zorder=1.5, label=name)
 
 
 def _turning(axes: Axes, plot: _Plot) -> None:
@@ -332,16 +350,60 @@ def _speeds(axes: Axes, plot: _Plot) -> None:
         "closing": ("v", IMPACT, lambda mark: mark.speed),
         "opening": ("^", PAST, lambda mark: mark.rebound),
     }
-    speeds = [x for *_, speed in kinds.values() for x in map(speed, plot.marks) if x > 0.0]
+    every = [x for *_, speed in kinds.values() for x in map(speed, plot.marks)]
+    least = SPEED_RTOL * max(every, default=0.0)
+    speeds = [x for x in every if x > least]
     factor, unit_name = prefixed_unit(max(speeds, default=0.0), "m/s")
     for label, (marker, color, speed) in kinds.items():
-        seen = [(plot.factor * m.time, factor * speed(m)) for m in plot.marks if speed(m) > 0.0]
+        seen = [(plot.factor * m.time, factor * speed(m)) for m in plot.marks if speed(m) > least]
         if seen:
             axes.plot(*zip(*seen, strict=True), marker, color=color, markersize=5, label=label)
     if axes.lines:
         _set_scale(axes, max(speeds) / min(speeds))
         axes.legend(loc="best", fontsize=9, frameon=False)
     axes.set_ylabel(f"impact speed [{unit_name}]")
+
+
+def _forces(axes: Axes, plot: _Plot) -> None:
+    peaks = [(mark.stop, plot.factor * mark.time, mark.force) for mark in plot.marks]
+    stops = [stop for stop in plot.mechanism.stops if plot.has(f"{stop.name}.force")]
+    named = [(plot.mechanism.stops[i].name, time, force) for i, time, force in peaks]
+    stop_forces(axes, plot.time, plot.columns, stops, named)
+
+
+def stop_forces(
+    axes: Axes,
+    time: Real,
+    columns: Columns,
+    stops: Sequence[Stop],
+    peaks: Sequence[tuple[str, float, float]],
+) -> None:
+    """Draw the forces of stops.
+
+    Parameters
+    ----------
+    time : (n,)
+        Times of the columns, in the unit of the axes.
+    columns : mapping or structured array
+        Recorded outputs.
+    stops : sequence of Stop
+        The stops.
+    peaks : sequence of (str, float, float)
+        Stop, time and peak force [N] of each hit, which can be shorter than a step of the columns.
+        Hits of compliant stops get a mark.
+    """
+    hits = [peak for peak in peaks if np.isfinite(peak[2])]
+    forces = {stop.name: np.asarray(columns[f"{stop.name}.force"], float) for stop in stops}
+    sizes = [float(np.abs(force).max()) for force in forces.values()]
+    factor, shown = prefixed_unit(max([*sizes, *(force for *_, force in hits)]) or 1.0, "N")
+    for stop in stops:
+        (line,) = axes.plot(time, factor * forces[stop.name], linewidth=1.2, label=stop.name)
+        own = [(at, factor * force) for name, at, force in hits if name == stop.name]
+        if stop.compliant and own:
+            axes.plot(*zip(*own, strict=True), "v", markersize=4, color=line.get_color())
+    axes.set_ylabel(f"stop force [{shown}]")
+    if len(stops) > 1:
+        axes.legend(loc="best", fontsize=9, frameon=False)
 
 
 def _set_scale(axes: Axes, ratio: float) -> None:

@@ -312,6 +312,11 @@ class Scene:
             (line,) = trace.plot([], [], style, color=PAST, linewidth=1.5, zorder=3)
             self.past.append(line)
             self.moving.append(line)
+        if len(stops) > 1:
+            trace.legend(
+                self.past, [stop.name for stop in stops], loc="lower right", ncols=4, fontsize=8,
+                bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0, frameon=False,
+            )  # fmt: skip
         trace.set_xlim(span[0] * self.time_factor, span[1] * self.time_factor)
         low, high = (float(f(self.traced[shown])) for f in (np.min, np.max))
         room = 0.16 * ((high - low) or 1.0)

@@ -7,13 +7,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..analysis.shock import Shock, displacement, displacement_unit
-from ..base.unit_text import GRAVITY, prefixed_unit, time_unit
+from ..base.unit_text import GRAVITY, time_unit
 from ..drawing.style import IMPACT, PAST, REST, WALL, own_style
 from ..mechanics.arrays import Real
 from ..mechanics.system import unit
 from ..mechanism.parts import GROUND
 from ..runs.released import released_label
-from .figures import PANEL_HEIGHT, PARALLEL_ATOL, WALL_MARGIN, WIDTH
+from .figures import PANEL_HEIGHT, PARALLEL_ATOL, WALL_MARGIN, WIDTH, stop_forces
 from .scene import plain
 
 
@@ -38,9 +38,10 @@ def shock_figure(found: Shock, axis: str) -> Figure:
     for one in found.loadings:
         panels[2].plot(time, 1e-6 * columns[f"{one.flexure}.stress"], label=one.flexure)
     panels[2].set_ylabel("stress [MPa]")
-    panels[2].legend(fontsize=8)
+    panels[2].legend(fontsize=9, frameon=False)
     if mechanism.stops:
-        _draw_forces(panels[3], found, time)
+        hits = [(x.stop, factor * x.time, x.latched.peak_force) for x in result.impacts]
+        stop_forces(panels[3], time, columns, mechanism.stops, hits)
     panels[-1].set_xlabel(f"time [{shown}]")
     panels[-1].set_xlim(0.0, float(time[-1]))
     for axes in panels:
@@ -75,28 +76,6 @@ def _draw_displacement(axes: Axes, found: Shock, time: Real) -> None:
             axes.plot(time, wall, color=WALL, linewidth=1.6, label=stop.name)
 
 
-def _draw_forces(axes: Axes, found: Shock, time: Real) -> None:
-    """Draw the forces of the stops; marks are the peaks of hits on compliant stops."""
-    forces = {
-        stop.name: np.asarray(found.result.columns[f"{stop.name}.force"], float)
-        for stop in found.result.mechanism.stops
-    }
-    largest = max(float(np.abs(force).max()) for force in forces.values())
-    largest = max(largest, *(hits.force or 0.0 for hits in found.hits), 0.0)
-    seconds = float(found.result.columns["time"][-1])
-    factor, shown = prefixed_unit(largest or 1.0, "N")
-    for stop in found.result.mechanism.stops:
-        (line,) = axes.plot(time, factor * forces[stop.name], label=stop.name)
-        if stop.compliant:  # A contact can be shorter than a step of the table.
-            own = [x for x in found.result.impacts if x.stop == stop.name]
-            axes.plot(
-                [float(time[-1] / seconds) * x.time for x in own],
-                [factor * x.latched.peak_force for x in own], "v", ms=4, color=line.get_color(),
-            )  # fmt: skip
-    axes.set_ylabel(f"stop force [{shown}]")
-    axes.legend(fontsize=8)
-
-
 @own_style()
 def fragility_figure(peaks: Sequence[float], found: Sequence[Shock], level: float) -> Figure:
     """Return a figure of shocks over the peaks of their pulses.
@@ -128,7 +107,7 @@ def fragility_figure(peaks: Sequence[float], found: Sequence[Shock], level: floa
     strengths = {x.safety * x.peak for one in found for x in one.loadings if x.safety is not None}
     if strengths:
         panels[2].axhline(1e-6 * min(strengths), color=IMPACT, linestyle="--", label="yield")
-        panels[2].legend(fontsize=8)
+        panels[2].legend(fontsize=9, frameon=False)
     panels[-1].set_xlabel("peak [g]")
     for axes in panels:
         if np.isfinite(level):

@@ -1,5 +1,6 @@
 """The impacts in a result, from the engine or from recorded outputs."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -23,6 +24,8 @@ class Mark:
         Closing speed before and opening speed after it [m/s]; the latter is NaN if not recorded.
     count : int
         Number of impacts at the stop, including this one.
+    force : float
+        Peak force of the hit [N]; NaN if not recorded.
     """
 
     stop: int
@@ -30,6 +33,7 @@ class Mark:
     speed: float
     rebound: float
     count: int
+    force: float = math.nan
 
 
 LARGEST = ("peak_force", "indentation", "contact_duration")
@@ -66,6 +70,7 @@ def marks(result: Result | Columns, mechanism: Mechanism) -> tuple[Mark, ...]:
                 impact.latched.approach_speed,
                 impact.latched.rebound_speed,
                 impact.latched.impact_count,
+                impact.latched.peak_force,
             )
             for impact in result.impacts
         )
