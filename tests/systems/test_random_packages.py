@@ -2,6 +2,7 @@
 
 import collections
 import tempfile
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -98,6 +99,30 @@ def check(folder, seeds):
 def test_random_packages_mean_what_the_standard_says(tmp_path):
     counts = check(tmp_path, range(100))
     assert counts["equal"] >= 40
+
+
+def test_comments_and_processing_instructions_have_no_effect(tmp_path):
+    """They may be between any two elements, of the description and of the sets and mappings."""
+    plain, noted = tmp_path / "plain.ssp", tmp_path / "noted.ssp"
+    equal = 0
+    for seed in range(20):
+        random_package(plain, seed)
+        with zipfile.ZipFile(plain) as source, zipfile.ZipFile(noted, "w") as copy:
+            for name in source.namelist():
+                content = source.read(name)
+                if not name.endswith(".fmu"):
+                    content = content.replace(b">", b"><!-- note --><?tool note?>")
+                copy.writestr(name, content)
+        found = []
+        for path in (plain, noted):
+            with tempfile.TemporaryDirectory(dir=tmp_path) as copies:
+                try:
+                    found.append(Package(path, copies).flat)
+                except CouplingError as error:
+                    found.append(str(error).removeprefix(str(path)))
+        assert found[0] == found[1]
+        equal += not isinstance(found[0], str)
+    assert equal >= 8
 
 
 @pytest.mark.slow

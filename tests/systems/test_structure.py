@@ -219,9 +219,106 @@ def test_a_connector_without_a_unit_has_that_of_what_is_connected_inside(tmp_pat
             ),
             "loop without an FMU",
         ),
+        (system(component(source="http://[x]/a.fmu")), "is not a valid URI"),
         ("<ssd:System/>", "not valid by SSP 1.0"),
     ],
 )  # fmt: skip
 def test_what_is_not_supported_is_refused_by_name(content, words, tmp_path):
     with pytest.raises(CouplingError, match=words):
         meaning(tmp_path, content)
+
+
+def top(name: str) -> str:
+    """Return a system whose output of a name is that of its component."""
+    connector = f'<ssd:Connector name="{name}" kind="output"/>'
+    wire = f'startElement="a" startConnector="shuttle.x" endConnector="{name}"'
+    text = system(component(), rest=f"<ssd:Connections><ssd:Connection {wire}/></ssd:Connections>")
+    start = '<ssd:System name="top">'
+    return text.replace(start, f"{start}<ssd:Connectors>{connector}</ssd:Connectors>")
+
+
+@pytest.mark.parametrize("name", ["time", "a.shuttle.x"])
+def test_an_output_with_the_name_of_another_column_is_refused(name, tmp_path):
+    with pytest.raises(CouplingError, match=f"the output {name} of the system has the name of"):
+        meaning(tmp_path, top(name))
+
+
+def test_an_output_may_have_dots_in_its_name(tmp_path):
+    found = meaning(tmp_path, top("a.shuttle"))
+    assert {to: source for to, (source, _) in found.outputs.items()} == {"a.shuttle": "a.shuttle.x"}
+
+
+TEMPERATURES = """<UnitDefinitions>
+  <Unit name="K"><BaseUnit K="1"/></Unit>
+  <Unit name="degC"><BaseUnit K="1" offset="273.15"/></Unit>
+  <Unit name="1e-200 m"><BaseUnit m="1" factor="1e-200"/></Unit>
+  <Unit name="1e200 m"><BaseUnit m="1" factor="1e200"/></Unit>
+</UnitDefinitions>
+<TypeDefinitions>
+  <SimpleType name="Difference"><Real unit="degC" relativeQuantity="true"/></SimpleType>
+</TypeDefinitions>"""
+
+
+def converted(folder: Path, source: str, sink: str):
+    """Return the signal of a connection of two reals with attributes, in an FMU of their own."""
+    variables = "".join(
+        f'<ScalarVariable name="{name}" valueReference="{k}" causality="{kind}">'
+        f"<Real {own} {more}/></ScalarVariable>"
+        for k, (name, kind, own, more) in enumerate(
+            (("shuttle.x", "output", source, ""), ("stop.displacement", "input", sink, 'start="0"'))
+        )
+    )
+    text = (
+        '<fmiModelDescription fmiVersion="2.0" modelName="x" guid="x"><CoSimulation '
+        f'modelIdentifier="x"/>{TEMPERATURES}<ModelVariables>{variables}</ModelVariables>'
+        '<ModelStructure><Outputs><Unknown index="1"/></Outputs></ModelStructure>'
+        "</fmiModelDescription>"
+    )
+    fmu = folder / "x.fmu"
+    with zipfile.ZipFile(fmu, "w") as archive:
+        archive.writestr("modelDescription.xml", text)
+    wire = (
+        'startElement="a" startConnector="shuttle.x" endElement="a" '
+        'endConnector="stop.displacement"'
+    )
+    content = system(
+        component(), rest=f"<ssd:Connections><ssd:Connection {wire}/></ssd:Connections>"
+    )
+    files = {"resources/a.fmu": fmu.read_bytes()}
+    found = meaning(folder, content, files=files, fmus=())
+    return found.wires["a.stop.displacement"][1]
+
+
+RELATIVE = 'relativeQuantity="true"'
+
+
+@pytest.mark.parametrize(
+    ("source", "sink"),
+    [
+        (f'unit="degC" {RELATIVE}', 'unit="K"'),
+        ('unit="degC"', f'unit="K" {RELATIVE}'),
+        (f'unit="degC" {RELATIVE}', f'unit="K" {RELATIVE}'),
+        ('unit="K"', 'declaredType="Difference"'),
+        ('declaredType="Difference"', 'unit="K"'),
+    ],
+)
+def test_an_offset_is_never_added_to_a_difference(source, sink, tmp_path):
+    with pytest.raises(CouplingError, match="one of them is a relative quantity"):
+        converted(tmp_path, source, sink)
+
+
+def test_a_difference_without_an_offset_and_a_temperature_with_one_are_converted(tmp_path):
+    for k, (source, sink, expected) in enumerate((
+        ('unit="degC"', 'unit="K"', 283.15),
+        ('declaredType="Difference" relativeQuantity="false"', 'unit="K"', 283.15),
+        ('declaredType="Difference"', f'unit="degC" {RELATIVE}', 10.0),
+    )):  # fmt: skip
+        folder = tmp_path / str(k)
+        folder.mkdir()
+        assert float(converted(folder, source, sink)(10.0)) == pytest.approx(expected, rel=1e-15)
+
+
+def test_a_conversion_without_a_float_is_refused(tmp_path):
+    """Its factor, 1e400, has no float; the value would be lost in the run."""
+    with pytest.raises(CouplingError, match="too small or too large for a float"):
+        converted(tmp_path, 'unit="1e200 m"', 'unit="1e-200 m"')

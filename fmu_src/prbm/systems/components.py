@@ -1,8 +1,9 @@
 """FMUs as components of a system: FMPy's classes with access by name and errors with remedies."""
 
 import math
+import zipfile
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import chdir, suppress
 from difflib import get_close_matches
 from pathlib import Path
@@ -18,9 +19,10 @@ from fmpy.fmi2 import (  # type: ignore[import-untyped]
     fmi2CallbackLoggerTYPE,
 )
 from fmpy.fmi3 import FMU3Model, FMU3Slave  # type: ignore[import-untyped]
+from lxml import etree  # type: ignore[import-untyped]
 
 from ..base.archives import check_unpacked_size
-from ..base.errors import PrbmError
+from ..base.errors import ParameterError, PrbmError
 from ..runs.result import Columns
 
 Value = float | int | bool
@@ -39,6 +41,14 @@ TEXTS = {
     "Binary": bytes,
 }  # Python's types for the non-numeric types of FMI
 ENUMERATED = {2: "Integer", 3: "Int64"}  # type of an enumeration's values, by FMI version
+INTEGERS = {
+    **{f"Int{n}": (-(2 ** (n - 1)), 2 ** (n - 1) - 1) for n in (8, 16, 32, 64)},
+    **{f"UInt{n}": (0, 2**n - 1) for n in (8, 16, 32, 64)},
+}
+INTEGERS |= {"Integer": INTEGERS["Int32"], "Enumeration": INTEGERS["Int64"]}
+"""Smallest and largest value by type of FMI; ctypes drops the bits of others without a word."""
+FLOAT32_MAX = (2.0 - 2.0**-23) * 2.0**127
+LIMITED = {*INTEGERS, "Real", "Float64", "Float32", "String"}  # types of :func:`check_size`
 DESCRIBED = {CO_SIMULATION: "coSimulation", MODEL_EXCHANGE: "modelExchange"}
 
 
@@ -181,13 +191,25 @@ class Component:
         result: dict[str, Value] = {}
         for kind, some in self._kinds(names).items():
             references = [self.variables[name].valueReference for name in some]
-            result |= dict(zip(some, self.call(f"get{kind}", references), strict=True))
+            found = self.call(f"get{kind}", references)
+            if kind == "String" and self.version == 2:  # FMPy decodes those of FMI 3.0 only
+                found = [self._decoded(*pair) for pair in zip(some, found, strict=True)]
+            result |= dict(zip(some, found, strict=True))
         return result
+
+    def _decoded(self, name: str, text: bytes | None) -> str:
+        try:
+            return (text or b"").decode()
+        except UnicodeDecodeError as error:
+            raise CouplingError(f"{self.name}.{name} is not in UTF-8 ({error})") from None
 
     def set(self, values: Mapping[str, Value]) -> None:
         """Set variables by name, with one call of the FMU per type."""
         for kind, some in self._kinds(values).items():
             references = [self.variables[name].valueReference for name in some]
+            if kind in LIMITED:
+                for name in some:
+                    check_size(f"{self.name}.{name}", values[name], kind)
             self.call(f"set{kind}", references, [values[name] for name in some])
 
     def _kinds(self, names: Sequence[str] | Mapping[str, Value]) -> dict[str, list[str]]:
@@ -215,9 +237,25 @@ def described(name: str, fmu: str | Path) -> Any:
     """
     try:
         check_unpacked_size(fmu)
-        return read_model_description(str(fmu))
+        description = read_model_description(str(fmu))
+        _mark_relative(description, fmu)
     except Exception as error:
         raise CouplingError(f"{name}: {fmu} cannot be read as an FMU ({error})") from None
+    return description
+
+
+def _mark_relative(description: Any, fmu: str | Path) -> None:
+    """Set ``relativeQuantity`` of the variables; FMPy reads that of declared types only."""
+    with zipfile.ZipFile(fmu) as archive:
+        text = archive.read("modelDescription.xml")
+    if b"relativeQuantity" not in text:
+        return
+    root = etree.fromstring(text, etree.XMLParser(resolve_entities=False, no_network=True))
+    variables = {v.name: v for v in description.modelVariables}
+    for element in root.iterfind("ModelVariables/*"):
+        for own in (element, *element):
+            if (given := own.get("relativeQuantity")) is not None:
+                variables[element.get("name")].relativeQuantity = given.strip() in ("true", "1")
 
 
 def start_value(full: str, value: object, variable: Any) -> Any:
@@ -234,6 +272,7 @@ def start_value(full: str, value: object, variable: Any) -> Any:
         if not isinstance(value, TEXTS[variable.type]):
             kind = TEXTS[variable.type].__name__
             raise CouplingError(f"{full} = {value!r} must be of Python's type {kind}")
+        check_size(full, value, variable.type)
         return value
     if isinstance(value, SupportsFloat):  # False for a string
         with suppress(TypeError, OverflowError):  # an array, or an integer above the largest float
@@ -247,6 +286,7 @@ def _of_type(full: str, value: Any, kind: str) -> Value:
     if math.isnan(number):
         raise CouplingError(f"{full} = {value}: must be a number")
     if kind.startswith(("Real", "Float")):
+        check_size(full, value, kind)
         return number
     if kind == "Boolean":
         if number not in (0.0, 1.0):
@@ -254,7 +294,66 @@ def _of_type(full: str, value: Any, kind: str) -> Value:
         return bool(number)
     if not number.is_integer():
         raise CouplingError(f"{full} = {value} must be a whole number")
+    check_size(full, int(value), kind)
     return int(value)
+
+
+def check_size(full: str, value: Any, kind: str) -> None:
+    """Check that an FMU receives a value as it is: that it fits the type of FMI.
+
+    Raises
+    ------
+    CouplingError
+        If a number is too large for its type, an integer is not equal to a float, or a text
+        contains the character that ends it.
+    """
+    if kind in INTEGERS:
+        least, most = INTEGERS[kind]
+        if not least <= value <= most:
+            raise CouplingError(f"{full} = {value} must be in [{least}, {most}], its type {kind}")
+    elif kind in ("Real", "Float64"):
+        if isinstance(value, int) and int(float(value)) != value:
+            raise CouplingError(f"{full} = {value}: its type {kind} does not have this integer")
+    elif kind == "Float32" and math.isfinite(value) and abs(value) > FLOAT32_MAX:
+        raise CouplingError(f"{full} = {value} is too large for its type Float32")
+    elif kind == "String" and "\0" in value:
+        raise CouplingError(
+            f"{full} = {value!r}: a text of an FMU must not contain the character NUL"
+        )
+
+
+def check_instances(names: Iterable[str], forbidden: str) -> None:
+    """Check the names of the instances of a system.
+
+    Parameters
+    ----------
+    names : iterable of str
+        The names.
+    forbidden : str
+        Characters that a name must not contain.
+
+    Raises
+    ------
+    CouplingError
+        If a name is empty or contains one of these characters.
+    """
+    for name in names:
+        if not name or set(name) & set(forbidden):
+            raise CouplingError(
+                f"instance name {name!r}: must be non-empty and without {' '.join(forbidden)}"
+            )
+
+
+def check_duration(name: str, value: float) -> None:
+    """Check a duration [s].
+
+    Raises
+    ------
+    ParameterError
+        If it is not positive and finite.
+    """
+    if not (math.isfinite(value) and value > 0.0):
+        raise ParameterError(f"{name} = {value:g} s must be positive and finite")
 
 
 def check_wire(to: str, given: Any, source: str) -> None:

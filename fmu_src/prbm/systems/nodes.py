@@ -1,14 +1,16 @@
 """Components, systems and connections of a system structure package, and its meaning."""
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 from .components import CouplingError, Value, attribute
-from .signals import INTEGER, REAL, Linear, Signal, Table, Unit
+from .signals import ENUMERATION, INTEGER, REAL, WIDENED, Linear, Signal, Table, Unit
 
 SLASH = "/"
 """Between the names of nested systems in the name of an instance."""
+NUMBERED = {*WIDENED, (ENUMERATION, INTEGER), (ENUMERATION, REAL), (INTEGER, ENUMERATION)}
+"""Types that may be connected where an enumeration is its number."""
 
 
 def kind_of(variable: Any) -> str:
@@ -17,6 +19,37 @@ def kind_of(variable: Any) -> str:
     if kind.startswith(("Int", "UInt")):
         return INTEGER
     return REAL if kind.startswith("Float") else kind
+
+
+def check_types(
+    to: str,
+    given: Any,
+    source: str,
+    output: Any,
+    widened: Container[tuple[str, str]] = WIDENED,
+) -> None:
+    """Check that an input takes the values of an output as they are.
+
+    Parameters
+    ----------
+    to, source : str
+        Names of the input and of the output, for messages.
+    given, output
+        Descriptions of the input and of the output.
+    widened : container of (str, str)
+        Different types of SSP that may be connected.
+
+    Raises
+    ------
+    CouplingError
+        If the type of the input does not contain that of the output.
+    """
+    kinds = kind_of(output), kind_of(given)
+    if kinds[0] != kinds[1] and kinds not in widened:
+        raise CouplingError(
+            f"{source} of type {output.type} cannot be connected to {to} of type {given.type}: "
+            "connect variables of one type"
+        )
 
 
 def items_of(variable: Any) -> dict[int, str]:
@@ -75,7 +108,10 @@ class Node:
     def unit(self, variable: Any) -> Unit | None:
         """Return the unit of a variable of a component."""
         name = attribute(variable, "unit")
-        return self.units.get(name, Unit(name)) if name else None
+        if not name:
+            return None
+        relative = bool(attribute(variable, "relativeQuantity"))
+        return replace(self.units.get(name, Unit(name)), relative=relative)
 
 
 @dataclass(frozen=True)
@@ -115,6 +151,12 @@ def place(node: Node, element: str, name: str) -> str:
     return f"{path}.{name}" if path else name
 
 
+def column(full: str) -> str:
+    """Return the name of a variable in a result, ``system.component.variable``."""
+    instance, dot, variable = full.partition(".")
+    return instance.replace(SLASH, ".") + dot + variable
+
+
 def systems(node: Node) -> Iterator[Node]:
     """Yield a system and all systems inside."""
     if node.fmu is None:
@@ -137,7 +179,8 @@ def _units_inside(node: Node, name: str) -> dict[object, Unit | None]:
     """Return the units of a connector or variable, by their meaning."""
     unit = node.connectors[name].unit if node.fmu is None else node.unit(node.variables[name])
     if node.fmu is not None or unit is not None:
-        return {unit and (unit.base or unit.name, unit.factor, unit.offset): unit}
+        meaning = unit and (unit.base or unit.name, unit.factor, unit.offset, unit.relative)
+        return {meaning: unit}
     inside = [wire.sink for wire in node.wires if wire.source == ("", name)]
     inside += [wire.source for wire in node.wires if wire.sink == ("", name)]
     result: dict[object, Unit | None] = {}
@@ -156,16 +199,40 @@ def check_loops(top: Node) -> None:
         If there is such a loop.
     """
     sources = {
-        place(node, *wire.sink): place(node, *wire.source)
+        _end(node, *wire.sink): _end(node, *wire.source)
         for node in systems(top)
         for wire in node.wires
         if not (wire.sink[0] and node.elements[wire.sink[0]].fmu)
     }
-    for name in sources:
-        at, seen = name, {name}
-        while (at := sources.get(at, "")) not in ("", *seen):
+    for end in sources:
+        at, seen = sources.get(end), {end}
+        while at is not None and at not in seen:
             seen.add(at)
-        if at:
+            at = sources.get(at)
+        if at is not None:
+            name = ".".join(x for x in at if x)
             raise CouplingError(
-                f"{at}: its connections are a loop without an FMU; remove one of them"
+                f"{name}: its connections are a loop without an FMU; remove one of them"
+            )
+
+
+def _end(node: Node, element: str, name: str) -> tuple[str, str]:
+    """Return the path of the owner of a connector, and its name: names may have dots."""
+    return (node.elements[element] if element else node).path, name
+
+
+def check_names(outputs: Iterable[str], recorded: Iterable[str]) -> None:
+    """Check that the columns of a result have different names.
+
+    Raises
+    ------
+    CouplingError
+        If an output of the outermost system has the name of another column.
+    """
+    taken = {"time", *(column(x) for x in recorded)}
+    for name in outputs:
+        if name in taken:
+            raise CouplingError(
+                f"the output {name} of the system has the name of another column of the result; "
+                "rename its connector"
             )

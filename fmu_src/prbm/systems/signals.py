@@ -5,6 +5,7 @@ are exact fractions until the end.
 """
 
 import math
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -44,12 +45,15 @@ class Unit:
         Exponents of :data:`BASE_UNITS`; None: the file does not define the unit.
     factor, offset : Fraction
         Conversion to SI.
+    relative : bool
+        It is the unit of a difference of two values, to which no offset applies.
     """
 
     name: str
     base: tuple[int, ...] | None = None
     factor: Fraction = Fraction(1)
     offset: Fraction = Fraction(0)
+    relative: bool = False
 
     @classmethod
     def of(cls, name: str, given: Mapping[str, Any]) -> "Unit":
@@ -108,7 +112,7 @@ def conversion(source: Unit | None, target: Unit | None, where: str) -> Linear:
     Raises
     ------
     CouplingError
-        If the dimensions differ, or a unit is not defined.
+        If the dimensions differ, a unit is not defined, or an offset would apply to a difference.
     """
     if source is None or target is None:
         return IDENTITY
@@ -125,7 +129,24 @@ def conversion(source: Unit | None, target: Unit | None, where: str) -> Linear:
             f"{where}: {source.name} cannot be converted to {target.name}, which has another "
             "dimension; correct the unit, or set suppressUnitConversion"
         )
+    if (source.relative or target.relative) and source.offset != target.offset:
+        raise CouplingError(
+            f"{where}: {source.name} is not converted to {target.name}, since one of them is a "
+            "relative quantity and an offset lies between the units; use units without an offset"
+        )
     return Linear(source.factor / target.factor, (source.offset - target.offset) / target.factor)
+
+
+def _check_size(steps: tuple[Transformation, ...], where: str) -> None:
+    """Check that factors and offsets of functions are zero or floats of full precision."""
+    least, most = Fraction(sys.float_info.min), Fraction(sys.float_info.max)
+    for step in steps:
+        for number in (step.factor, step.offset) if isinstance(step, Linear) else ():
+            if number and not least <= abs(number) <= most:
+                raise CouplingError(
+                    f"{where}: units and transformations on the way have a factor or an offset "
+                    "that is too small or too large for a float; use units of a similar size"
+                )
 
 
 @dataclass(frozen=True)
@@ -205,7 +226,8 @@ class Signal:
         Raises
         ------
         CouplingError
-            If types or units do not match, or the value depends on a unit that cannot be deduced.
+            If types or units do not match, the value depends on a unit that cannot be deduced, or a
+        factor is no float.
         """
         signal = self
         if isinstance(transformation, Table):
@@ -234,4 +256,5 @@ class Signal:
                     "Real only"
                 )
             signal = signal.after(transformation)
+        _check_size(signal.steps, where)
         return signal

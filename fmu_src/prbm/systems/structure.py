@@ -25,6 +25,7 @@ from .nodes import (
     Node,
     Wire,
     check_loops,
+    check_names,
     deduce_units,
     items_of,
     kind_of,
@@ -57,8 +58,11 @@ def _schema(name: str) -> Any:
 
 
 def _document(content: bytes, schema: str, where: str) -> Any:
-    """Return the root of a file, which matches its schema."""
-    safe = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False)
+    """Return the root of a file, which matches its schema, without comments."""
+    safe = etree.XMLParser(
+        resolve_entities=False, no_network=True, load_dtd=False, remove_comments=True,
+        remove_pis=True,
+    )  # fmt: skip
     try:
         root = etree.fromstring(content, safe)
     except etree.XMLSyntaxError as error:
@@ -85,14 +89,17 @@ def local_path(source: str, where: str) -> str:
     Raises
     ------
     CouplingError
-        If the URI leads out of the package, or has a fragment or a query.
+        If the URI is not valid, leads out of the package, or has a fragment or a query.
 
     Examples
     --------
     >>> local_path("resources/Motor%20%231.fmu", "Motor")
     'resources/Motor #1.fmu'
     """
-    parts = urlsplit(source)
+    try:
+        parts = urlsplit(source)
+    except ValueError as error:
+        raise CouplingError(f"{where}: source {source} is not a valid URI ({error})") from None
     path = PurePosixPath(unquote(parts.path))
     if parts.scheme or parts.netloc or parts.query or path.is_absolute() or ".." in path.parts:
         raise CouplingError(f"{where}: source {source} is not in the package; put the file into it")
@@ -206,6 +213,7 @@ class _Reader:
                         )
                     (outputs if node.fmu is None else wires)[place(node, "", end)] = full, signal
         stop = times.get("stopTime")
+        check_names(outputs, recorded)
         return Flat(
             {x.path: x.fmu or "" for x in components}, wires, outputs, self.values(top),
             tuple(recorded), tuple(self.ignored), None if stop is None else float(stop),
@@ -364,9 +372,7 @@ class _Reader:
                 f"{where}: type {element.get('type')} is not supported; use {expected}"
             )
         source = element.get("source")
-        children = [] if inside is None else [
-            x for x in inside if isinstance(x.tag, str) and not x.tag.startswith(SSD)
-        ]  # fmt: skip
+        children = [] if inside is None else [x for x in inside if not x.tag.startswith(SSD)]
         schema = space.rpartition("}")[0].removeprefix("{" + NAMESPACE)
         if source is None:
             if not children:
@@ -477,7 +483,7 @@ def _declared(node: Node, element: str, name: str) -> tuple[str | None, Unit | N
 def _options(element: Any, where: str) -> tuple[Linear | Table | None, bool]:
     """Return transformation and suppression of the unit of a connection or a mapping entry."""
     suppress = _boolean(element.get("suppressUnitConversion", "false"))
-    given = next((x for x in element if isinstance(x.tag, str) and x.tag.startswith(SSC)
+    given = next((x for x in element if x.tag.startswith(SSC)
                   and etree.QName(x).localname in TRANSFORMATIONS), None)  # fmt: skip
     if given is None:
         return None, suppress
@@ -510,7 +516,7 @@ class Parameter:
 
 def _parameter(element: Any, units: Mapping[str, Unit], where: str) -> Parameter:
     """Return the value of a parameter."""
-    given = next(x for x in element if isinstance(x.tag, str))
+    given = element[0]
     kind, text = etree.QName(given).localname, given.get("value")
     if kind == "Binary":
         raise CouplingError(f"{where}: a value of type Binary is not supported; remove it")
@@ -636,9 +642,6 @@ def _last(
 ) -> Signal:
     """Return the signal at a variable of an FMU."""
     kind, unit = kind_of(variable), node.unit(variable)
-    if variable.relativeQuantity and unit is not None and unit.offset:
-        raise CouplingError(f"{where}: the unit {unit.name} of a relative quantity has an offset; "
-                            "use a unit without one")  # fmt: skip
     signal = signal.at(kind, unit, where, *options)
     if kind != ENUMERATION:
         return signal
