@@ -55,11 +55,46 @@ class Integrator(Fmi2Slave):
 '''
 
 
+RELAY = '''
+from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real, String
+
+
+class Relay(Fmi2Slave):
+    """Each output, ``Real_out`` to ``String_out``, is the input of its type."""
+
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        for kind, start in ((Real, 0.0), (Integer, 0), (Boolean, False), (String, "")):
+            name, discrete = kind.__name__, Fmi2Variability.discrete
+            setattr(self, name, start)
+            setattr(self, f"{name}_out", start)
+            for own, causality in ((name, "input"), (f"{name}_out", "output")):
+                self.register_variable(
+                    kind(own, causality=Fmi2Causality[causality], variability=discrete)
+                )
+
+    def do_step(self, current_time, step_size):
+        for name in ("Real", "Integer", "Boolean", "String"):
+            setattr(self, f"{name}_out", getattr(self, name))
+        return True
+'''
+
+
 @cache
 def integrator() -> Path:
     """Return the path of an FMU that integrates its input by explicit Euler steps."""
-    source = Path(_folder.name) / "integrator.py"
-    source.write_text(INTEGRATOR, encoding="utf-8")
+    return _built("integrator", INTEGRATOR)
+
+
+@cache
+def relay() -> Path:
+    """Return the path of an FMU with an input and an equal output of each type of FMI 2.0."""
+    return _built("relay", RELAY)
+
+
+def _built(name: str, text: str) -> Path:
+    source = Path(_folder.name) / f"{name}.py"
+    source.write_text(text, encoding="utf-8")
     return Path(_folder.name) / FmuBuilder.build_FMU(source, dest=_folder.name)
 
 

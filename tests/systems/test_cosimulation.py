@@ -16,7 +16,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave
 from fmpy.model_description import Dimension
 
-from coupled import guide, integrator
+from coupled import guide, integrator, relay
 from prbm.base.errors import ParameterError
 from prbm.references.scalar_guide import ScalarGuide
 from prbm.runs.result import structured
@@ -25,6 +25,7 @@ from prbm.systems.components import (
     CO_SIMULATION,
     Component,
     CouplingError,
+    check_size,
     described,
     start_value,
 )
@@ -434,6 +435,75 @@ def test_the_end_of_a_simulation_in_event_mode_is_not_ignored(monkeypatch):
         monkeypatch.setattr(own.fmu, "updateDiscreteStates", lambda: (False, True, False))
         with pytest.raises(CouplingError, match=r"guide terminated the simulation at 0 s"):
             own.update()
+
+
+KINDS = ("Real", "Integer", "Boolean", "String")
+VALUES = {"Real": 0.5, "Integer": 3, "Boolean": True, "String": "ä b"}
+WIDER = {("Boolean", "Integer"), ("Boolean", "Real"), ("Integer", "Real")}
+
+
+@pytest.mark.parametrize("sink", KINDS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_value_arrives_unchanged_or_its_connection_is_refused(kind, sink):
+    """A type is connected to itself and to types that contain it; true is 1."""
+    fmus, wires = {"a": relay(), "b": relay()}, {f"b.{sink}": f"a.{kind}_out"}
+    values = {f"a.{kind}": VALUES[kind]}
+    if kind == sink or (kind, sink) in WIDER:
+        found = simulate(fmus, wires, 0.4, 0.1, values, [f"b.{sink}_out"])
+        assert found[f"b.{sink}_out"][-1] == VALUES[kind]
+        return
+    with pytest.raises(
+        CouplingError, match=rf"a\.{kind}_out of type {kind} cannot be connected to b\.{sink} of"
+    ) as caught:
+        simulate(fmus, wires, 0.4, 0.1, values)
+    assert caught.value.columns is None  # before the run
+
+
+def test_a_function_may_change_the_type_of_a_value():
+    fmus, wires = {"a": relay(), "b": relay()}, {"b.Integer": "a.Real_out"}
+    found = simulate(
+        fmus, wires, 0.4, 0.1, {"a.Real": 2.75}, ["b.Integer_out"], functions={"b.Integer": int}
+    )
+    assert found["b.Integer_out"][-1] == 2
+
+
+@pytest.mark.parametrize("bits", [8, 16, 32, 64])
+@pytest.mark.parametrize("sign", ["", "U"])
+def test_integers_outside_their_type_are_refused(bits, sign):
+    """Two's complement: the least is -2^(n - 1) or zero, the most is one less than the power."""
+    kind = f"{sign}Int{bits}"
+    least, most = (0, 2**bits - 1) if sign else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+    for value in (least, most):
+        check_size("a.x", value, kind)
+    for value in (least - 1, most + 1):
+        with pytest.raises(CouplingError, match=rf"a\.x = {value} must be in .* type {kind}"):
+            check_size("a.x", value, kind)
+
+
+@pytest.mark.parametrize(
+    ("kind", "good", "bad"),
+    [
+        ("Float32", np.finfo(np.float32).max.item(), 3.5e38),
+        ("Float64", 2**53, 2**53 + 1),
+        ("Real", -(2**60), 2**60 + 1),
+        ("Integer", -(2**31), 2**31),
+        ("String", "ä b", "a\0b"),
+    ],
+)
+def test_values_that_a_type_does_not_have_are_refused(kind, good, bad):
+    check_size("a.x", good, kind)
+    with pytest.raises(CouplingError, match=r"a\.x = "):
+        check_size("a.x", bad, kind)
+
+
+def test_an_integer_that_grows_too_large_ends_the_run_with_its_rows():
+    fmus = {"a": integrator(), "b": relay()}
+    functions = {"b.Integer": lambda x: int(x * 2**31)}
+    with pytest.raises(CouplingError, match=r"b\.Integer = 2147483648 must be in") as caught:
+        simulate(fmus, {"b.Integer": "a.value"}, 2.0, 0.25, {"a.rate": 1.0}, functions=functions)
+    assert caught.value.columns["time"].tolist() == [0.0, 0.25, 0.5, 0.75]
+    with pytest.raises(CouplingError, match=r"b\.Integer = 1099511627776 must be in"):
+        simulate({"b": relay()}, {}, 1.0, 0.1, {"b.Integer": 2**40})
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+import re
 import tempfile
 import zipfile
 from pathlib import Path
@@ -12,8 +13,9 @@ import pytest
 from fmpy import read_model_description, simulate_fmu
 from lxml import etree
 
-from coupled import guide, integrator
+from coupled import guide, integrator, relay
 from package_meaning import Meaning
+from prbm.base.errors import PrbmError
 from prbm.systems import cosimulation, ssp
 from prbm.systems.components import CouplingError, described
 from prbm.systems.container import _common_platforms, container
@@ -129,8 +131,48 @@ def test_a_rejected_system_leaves_no_temporary_folder(tmp_path, monkeypatch, kin
 
 
 def test_the_name_of_an_instance_in_a_container_is_no_path(tmp_path):
-    with pytest.raises(CouplingError, match=r"'\.\./a': must be a name of a folder"):
+    with pytest.raises(CouplingError, match=r"'\.\./a': must be non-empty and without \. /"):
         container(tmp_path / "c.fmu", {"../a": guide(2)}, {}, STEP)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"fmus": {}}, "at least one FMU"),
+        ({"fmus": {"a.b": "x.fmu"}}, "'a.b': must be non-empty and without"),
+        ({"fmus": {"..": "x.fmu"}}, "'..': must be non-empty and without"),
+        ({"step": 0.0}, "step = 0 s must be positive and finite"),
+        ({"step": np.nan}, "step = nan s must be positive and finite"),
+        ({"stop_time": np.inf}, "stop_time = inf s must be positive and finite"),
+        ({"fmi": 1}, "fmi = 1 must be 2 or 3"),
+        ({"values": {"sum.gain": np.inf}}, "sum.gain = inf must be finite in a container"),
+        ({"values": {"sum.rate": 1.0}}, "sum.rate takes sum.value, so its value has no effect"),
+        ({"shown": ["sum.rate"]}, "sum.rate takes sum.value, so its value has no effect"),
+    ],
+)
+def test_a_container_that_would_be_invalid_is_refused(changes, words, tmp_path):
+    given = {"fmus": {"sum": integrator()}, "connections": {"sum.rate": "sum.value"}, "step": 1e-3}
+    with pytest.raises(PrbmError, match=re.escape(words)):
+        container(tmp_path / "x.fmu", **given | changes)
+    assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"fmus": {"a.b": "x.fmu"}}, "'a.b': must be non-empty and without"),
+        ({"fmus": {"a/b": "x.fmu"}}, "'a/b': must be non-empty and without"),
+        ({"stop_time": np.inf}, "stop_time = inf s must be positive and finite"),
+        ({"values": {"a.Real": np.inf}}, "a.Real = inf must be finite in a package"),
+        ({"values": {"a.Integer": 2**31}}, "a.Integer = 2147483648 must be in"),
+        ({"connections": {"a.Boolean": "a.Real_out"}}, "a.Real_out of type Real cannot be connec"),
+    ],
+)
+def test_a_package_that_no_reader_takes_is_refused(changes, words, tmp_path):
+    given = {"fmus": {"a": relay()}, "connections": {}}
+    with pytest.raises(PrbmError, match=re.escape(words)):
+        ssp.package(tmp_path / "x.ssp", **given | changes)
+    assert not any(tmp_path.iterdir())
 
 
 def test_package_contains_the_unchanged_fmus(package):

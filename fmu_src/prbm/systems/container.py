@@ -1,5 +1,6 @@
 """Containers: a system of FMUs inside one FMU, made by FMPy, for tools that load only one FMU."""
 
+import math
 import shutil
 import tempfile
 import zipfile
@@ -22,7 +23,16 @@ from fmpy.model_description import (  # type: ignore[import-untyped]
 
 from ..base.atomic import write
 from ..kernel import compiler
-from .components import CouplingError, Value, attribute, check_wire, described, start_value
+from .components import (
+    CouplingError,
+    Value,
+    attribute,
+    check_duration,
+    check_instances,
+    check_wire,
+    described,
+    start_value,
+)
 from .signals import BASE_UNITS
 
 # Types of FMI 3.0 by their names in FMI 2.0.
@@ -74,11 +84,26 @@ def container(
     Raises
     ------
     CouplingError
-        If an FMU cannot be read or has clocks, a name is unknown, a variable has the wrong
-        causality or a type that a container does not support, a connection has two types, or the
-        FMUs have no platform in common.
+        If an FMU cannot be read or has clocks, a name is unknown or cannot be used, a variable has
+        the wrong causality or a type that a container does not support, a connection has two types,
+        a start value has no effect or is not finite, or the FMUs have no platform in common.
+    ParameterError
+        If ``step`` or ``stop_time`` is not positive and finite.
     """
     values = dict(values or {})
+    if fmi not in (2, 3):
+        raise CouplingError(f"fmi = {fmi} must be 2 or 3")
+    if not fmus:
+        raise CouplingError("a container needs at least one FMU")
+    check_instances(fmus, "./\\")
+    check_duration("step", step)
+    check_duration("stop_time", stop_time)
+    for full in (*values, *shown):
+        if full in connections:
+            raise CouplingError(
+                f"{full} takes {connections[full]}, so its value has no effect: leave it out of "
+                "the variables of the container"
+            )
     with tempfile.TemporaryDirectory(prefix="prbm_container_") as temporary:
         folder = Path(temporary)
         inside = {name: _inside(name, fmu, folder) for name, fmu in fmus.items()}
@@ -125,8 +150,6 @@ def container(
 
 def _inside(name: str, fmu: str | Path, folder: Path) -> Any:
     """Copy an FMU to NAME.fmu, since the container names its folder after the file."""
-    if not name or Path(name).name != name:
-        raise CouplingError(f"instance name {name!r}: must be a name of a folder")
     description, own = described(name, fmu), folder / f"{name}.fmu"
     if description.coSimulation is None:
         raise CouplingError(f"{name}: {fmu} has no co-simulation, which a container needs")
@@ -198,7 +221,7 @@ def _shown(full: str, value: Value | None, inside: Mapping[str, Any], fmi: int) 
         causality=variable.causality,
         variability=variable.variability,
         initial="calculated" if output else None,
-        start=None if output else _text(start),
+        start=None if output else _text(full, start),
         **given,
     )
 
@@ -242,7 +265,9 @@ def _check_type(full: str, variable: Any) -> None:
         )
 
 
-def _text(value: Any) -> str:
+def _text(full: str, value: Any) -> str:
+    if isinstance(value, float) and not math.isfinite(value):
+        raise CouplingError(f"{full} = {value} must be finite in a container")
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 

@@ -34,7 +34,16 @@ from ..base.progress import Progress
 from ..fmu.unpack import plain_folder
 from ..runs.result import Columns, structured
 from ..runs.run import Source, communication_points
-from .components import CO_SIMULATION, Component, CouplingError, Value, check_wire, start_value
+from .components import (
+    CO_SIMULATION,
+    Component,
+    CouplingError,
+    Value,
+    check_instances,
+    check_wire,
+    start_value,
+)
+from .nodes import NUMBERED, check_types
 
 GAUSS_SEIDEL, JACOBI = "gauss-seidel", "jacobi"
 STEP_RTOL = 1e-12  # Round-off of communication points, as a fraction of the last one.
@@ -220,9 +229,7 @@ class System:
     ) -> None:
         if scheme not in (GAUSS_SEIDEL, JACOBI):
             raise CouplingError(f"scheme = {scheme!r} must be {GAUSS_SEIDEL!r} or {JACOBI!r}")
-        for name in fmus:
-            if "." in name or not name:
-                raise CouplingError(f"instance name {name!r}: must be non-empty and without dots")
+        check_instances(fmus, ".")
         self.scheme, self.connections = scheme, dict(connections)
         self.functions = dict(functions or {})
         self.time = 0.0
@@ -243,9 +250,12 @@ class System:
         wires: dict[str, dict[str, str]] = {name: {} for name in self.instances}
         for to, source in self.connections.items():
             instance, name = self.resolve(to)
-            check_wire(to, instance.variable(name), source)
+            given = instance.variable(name)
+            check_wire(to, given, source)
             giver, output = self.resolve(source)
-            giver.variable(output)
+            found = giver.variable(output)
+            if to not in self.functions:
+                check_types(to, given, source, found, NUMBERED)
             wires[instance.name][name] = source
         return wires
 

@@ -4,6 +4,7 @@ Co-simulation masters read such packages.  :func:`simulate` runs one with :mod:`
 """
 
 import io
+import math
 import tempfile
 import zipfile
 from collections.abc import Callable, Mapping
@@ -18,8 +19,16 @@ from ..base.atomic import write
 from ..base.progress import Progress
 from ..runs.result import Columns
 from . import cosimulation
-from .components import CouplingError, Value, check_wire, described, start_value
-from .nodes import SLASH, Flat, items_of
+from .components import (
+    CouplingError,
+    Value,
+    check_duration,
+    check_instances,
+    check_wire,
+    described,
+    start_value,
+)
+from .nodes import Flat, check_types, column, items_of
 from .structure import Package
 
 SSD = "http://ssp-standard.org/SSP1/SystemStructureDescription"
@@ -60,12 +69,16 @@ def package(
     Raises
     ------
     CouplingError
-        If an FMU cannot be read, a name is unknown, a variable has the wrong causality, or a type
-        has no counterpart in SSP.
+        If an FMU cannot be read, a name is unknown or cannot be used, a variable has the wrong
+        causality, types do not match, or a type or a value has no counterpart in SSP.
+    ParameterError
+        If ``stop_time`` is not positive and finite.
     OSError
         If the package cannot be written; no part of it remains.
     """
     path, values = Path(path), dict(values or {})
+    check_instances(fmus, "./")
+    check_duration("stop_time", stop_time)
     variables = {
         name: {v.name: v for v in described(name, fmu).modelVariables} for name, fmu in fmus.items()
     }
@@ -84,6 +97,7 @@ def package(
         check_wire(to, variables[end][given], source)
         if variables[start][output].causality != "output":
             raise CouplingError(f"{source} is not an output: connect {to} to an output")
+        check_types(to, variables[end][given], source, variables[start][output])
         _add(wires, SSD, "Connection", startElement=start, startConnector=output,
              endElement=end, endConnector=given)  # fmt: skip
     _enumerations(root, variables)
@@ -174,7 +188,11 @@ def _text_of(full: str, kind: str, value: Any, variable: Any) -> str:
         return "true" if value else "false"
     if kind == "String":
         return str(value)
-    return str(int(value)) if kind == "Integer" else repr(float(value))
+    if kind == "Integer":
+        return str(int(value))
+    if not math.isfinite(value):
+        raise CouplingError(f"{full} = {value} must be finite in a package")
+    return repr(float(value))
 
 
 def _enumeration(name: str, variable: Any) -> dict[str, str]:
@@ -273,7 +291,7 @@ def _named(columns: Columns, flat: Flat) -> Columns:
     for name, (source, signal) in flat.outputs.items():
         found[name] = np.array([signal(x) for x in columns[source].tolist()])
     for name in (columns.dtype.names or ())[1:]:
-        found[name.replace(SLASH, ".", name.partition(".")[0].count(SLASH))] = columns[name]
+        found[column(name)] = columns[name]
     result = np.empty(len(columns), [(name, x.dtype) for name, x in found.items()])
     for name, x in found.items():
         result[name] = x
