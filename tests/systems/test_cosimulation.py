@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 from fmpy import simulate_fmu
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Slave
+from fmpy.fmi2 import FMU2Slave, fmi2LastSuccessfulTime
+from fmpy.fmi3 import FMU3Slave
 from fmpy.model_description import Dimension
 
 from coupled import guide, integrator, relay
@@ -375,6 +376,32 @@ def test_the_end_by_an_fmu_of_fmi_2_is_the_reason():
     with pytest.raises(CouplingError, match=r"b terminated the simulation at 0.1 s$") as caught:
         simulate({"b": integrator()}, {}, 1.0, 0.1, {"b.end": 0.1}, ["b.value"])
     np.testing.assert_array_equal(caught.value.columns["time"], [0.0, 0.1])
+
+
+@pytest.mark.parametrize("scheme", [GAUSS_SEIDEL, JACOBI])
+def test_the_row_of_a_complete_step_that_ends_the_simulation_is_kept(scheme, monkeypatch):
+    """An FMU of FMI 2.0 reaches the end of its step, an FMU of FMI 3.0 its event before it."""
+
+    def status(own, kind):
+        return 1.0 if kind == fmi2LastSuccessfulTime else True
+
+    monkeypatch.setattr(FMU2Slave, "getBooleanStatus", status)
+    monkeypatch.setattr(FMU2Slave, "getRealStatus", status)
+    fmus = {"a": integrator(), "b": integrator()}
+    values = {"a.rate": 1.0, "b.rate": 1.0, "b.end": 0.75}
+    with pytest.raises(CouplingError, match=r"b terminated the simulation at 1 s") as caught:
+        simulate(fmus, {}, 2.0, 0.25, values, ["a.value"], scheme)
+    assert caught.value.columns["time"].tolist() == [0.0, 0.25, 0.5, 0.75, 1.0]
+    assert caught.value.columns["a.value"][-1] == 1.0
+
+
+@pytest.mark.parametrize("reached", [0.015, 0.02])
+def test_a_step_that_ends_the_simulation_before_its_end_has_no_row(reached, monkeypatch):
+    monkeypatch.setattr(FMU3Slave, "doStep", lambda *_, **__: (False, True, False, reached))
+    with pytest.raises(CouplingError, match=r"guide terminated the simulation at") as caught:
+        simulate({"guide": guide(3)}, {}, 0.1, 0.02, record=["guide.shuttle.x"])
+    expected = [0.0, 0.02] if reached == 0.02 else [0.0]
+    assert caught.value.columns["time"].tolist() == expected
 
 
 def test_the_reason_that_a_python_fmu_logs_is_part_of_the_message(fmus):

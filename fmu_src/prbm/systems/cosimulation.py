@@ -26,9 +26,12 @@ import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
-from fmpy.fmi2 import fmi2Terminated  # type: ignore[import-untyped]
+from fmpy.fmi2 import (  # type: ignore[import-untyped]
+    fmi2LastSuccessfulTime,
+    fmi2Terminated,
+)
 
 from ..base.progress import Progress
 from ..fmu.unpack import plain_folder
@@ -79,6 +82,7 @@ class Instance(Component):
         self.restorable = bool(self.interface.canGetAndSetFMUstate)
         self.updating = False  # in event mode
         self.stepping = False  # in step mode of an instance with events: discrete inputs are locked
+        self.end = ""  # the message that the FMU has ended the simulation, with its last step
         self.connected: dict[str, Value] = {}
         self.instantiate(eventModeUsed=self.events, earlyReturnAllowed=self.events)
 
@@ -108,14 +112,23 @@ class Instance(Component):
     # -- steps and events --
 
     def step(self, end: float) -> bool:
-        """Step towards a time [s]; return whether an event is due at the new ``time``."""
+        """Step towards a time [s]; return whether an event is due at the new ``time``.
+
+        An FMU that completes its step and ends the simulation with it sets ``end``.
+
+        Raises
+        ------
+        CouplingError
+            If the step fails, or the FMU ends the simulation within it.
+        """
         if self.version == 2:
             self._step_fmi2(end)
             return False
         result = self.call("doStep", self.time, end - self.time)
         event, terminated, early, reached = result
+        complete = early or _equal(reached, end)
         self.time = reached if early else end
-        self._check_not_terminated(terminated)
+        self._end_run(terminated, complete)
         return bool(event)
 
     def _step_fmi2(self, end: float) -> None:
@@ -124,21 +137,30 @@ class Instance(Component):
         try:
             self.call("doStep", self.time, end - self.time)
         except CouplingError:
-            self._check_not_terminated(self._has_terminated(), self.last_error)
-            raise
+            why = self.last_error
+            if not self._status("getBooleanStatus", fmi2Terminated):
+                raise
+            reached = self._status("getRealStatus", fmi2LastSuccessfulTime)
+            complete = reached is not None and _equal(reached, end)
+            self.time = end if complete else self.time
+            self._end_run(True, complete, why)
         self.time = end
 
-    def _has_terminated(self) -> bool:
-        """Return whether an FMU of FMI 2.0 whose step has failed reports the end."""
+    def _status(self, function: str, kind: int) -> Any:
+        """Return a status of an FMU of FMI 2.0 whose step has failed; None: not available."""
         try:
-            return bool(self.fmu.getBooleanStatus(fmi2Terminated))
-        except Exception:  # The function is optional.
-            return False
+            return getattr(self.fmu, function)(kind)
+        except Exception:  # The functions are optional.
+            return None
 
-    def _check_not_terminated(self, terminated: bool, why: str = "") -> None:
-        if terminated:
-            reason = why and f": {why}"
-            raise CouplingError(f"{self.name} terminated the simulation at {self.time:g} s{reason}")
+    def _end_run(self, terminated: bool, complete: bool = False, why: str = "") -> None:
+        """Note the end of the simulation by the FMU after a complete step, or raise it."""
+        if not terminated:
+            return
+        reason = why and f": {why}"
+        self.end = f"{self.name} terminated the simulation at {self.time:g} s{reason}"
+        if not complete:
+            raise CouplingError(self.end)
 
     def enter_events(self) -> None:
         """Enter event mode, if the instance uses it."""
@@ -151,7 +173,7 @@ class Instance(Component):
         if not self.updating:
             return False
         more, terminated, *_ = self.call("updateDiscreteStates")
-        self._check_not_terminated(terminated)
+        self._end_run(terminated)
         return bool(more)
 
     def leave_events(self) -> None:
@@ -179,12 +201,17 @@ class Instance(Component):
 
         def restore() -> None:
             self.call("setFMUState", state)
-            self.time = time
+            self.time, self.end = time, ""
 
         try:
             yield restore
         finally:
             self.call("freeFMUState", state)
+
+
+def _equal(reached: float, end: float) -> bool:
+    """Return whether an FMU has reached the end of a step [s], to rounding."""
+    return abs(reached - end) <= STEP_RTOL * abs(end)
 
 
 class System:
@@ -373,11 +400,20 @@ class System:
     # -- steps --
 
     def steps(self, end: float) -> Iterator[None]:
-        """Advance to a communication point [s]; yield there, and before and after each event."""
+        """Advance to a communication point [s]; yield there, and before and after each event.
+
+        Raises
+        ------
+        CouplingError
+            If an FMU fails, or after the last yield, if one has ended the simulation.
+        """
         stuck = 0
         while True:
             begin, event = self.time, self.advance(end)
             yield
+            for instance in self.instances.values():
+                if instance.end:
+                    raise CouplingError(instance.end)
             if event:
                 self.handle_events()
                 yield
