@@ -23,6 +23,7 @@ from prbm.hybrid.simulation import Simulation
 from prbm.mechanism.description import Mechanism
 from prbm.plots.figures import response
 from prbm.runs.headline import headline
+from prbm.runs.marks import strongest_hit
 from prbm.runs.result import Result, ResultError, UnknownColumnError, read_csv, rest_time
 from prbm.runs.run import simulate
 from support import SUPPORT
@@ -368,6 +369,17 @@ def test_forces_of_compliant_stops_have_marks_at_their_peaks() -> None:
     largest = max(impact.latched.peak_force for impact in result.impacts)
     rows = max(result[f"{name}.force"].max() for name in names)
     assert drawn.max() == pytest.approx(max(largest, rows), rel=1e-12)
+
+
+def test_the_strongest_hit_has_its_own_indentation_and_duration() -> None:
+    """Later contacts are weaker and last longer."""
+    result = simulate(two_compliant_stops(), stop_time=0.1, step=1e-3)
+    hits = [impact.latched for impact in result.impacts if impact.stop == "upper"]
+    best = max(hits, key=lambda hit: hit.peak_force)
+    expected = best.peak_force, best.indentation, best.contact_duration
+    assert strongest_hit(result, "upper") == expected
+    from_columns = strongest_hit(result.columns, "upper")
+    np.testing.assert_allclose(from_columns, expected, rtol=1e-12)
 
 
 def test_the_panel_of_the_rotation_shows_the_wall() -> None:

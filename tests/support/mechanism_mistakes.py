@@ -761,6 +761,11 @@ CHANGES = {
         '[tolerances]\nhanger.width = "0 mm"\n[release]',
         "tolerances.hanger.width = 0 mm: a tolerance of +- 0 must be positive",
     ),
+    "tolerance without a unit": (
+        "[release]",
+        '[tolerances]\nhanger.width = "0.02 uniform"\n[release]',
+        "tolerances.hanger.width = '0.02 uniform': write the distance",
+    ),
     "tolerance about a value": (
         "[release]",
         '[tolerances]\nhanger.width = "8 mm +- 2 %"\n[release]',

@@ -7,6 +7,7 @@ import pytest
 from scipy import stats
 
 from prbm.base.errors import ParameterError
+from prbm.commands.command_line import main
 from prbm.files.mechanism_file import load, shipped
 from prbm.files.settings import UserMistake
 from prbm.mechanism.parameters import Tolerance
@@ -131,6 +132,17 @@ def test_yield_with_the_tolerances_of_a_file_is_that_of_the_normal_distribution(
     np.testing.assert_array_equal(named.points, found.points[:8])
     with pytest.raises(ParameterError, match="no parameter is varied"):
         study(mechanisms["PRBDM"], None, ["fundamental"], runs=8, **SHORT)
+
+
+def test_the_command_prints_how_drawn_values_are_distributed(capsys):
+    """A uniform distribution between 1 and 3 mm."""
+    words = "study PRBDM --vary stop.position=1:3mm --runs 64 --of fundamental --workers 1"
+    assert main(words.split()) == 0
+    (line,) = [x for x in capsys.readouterr().out.splitlines() if x.lstrip().startswith("stop.pos")]
+    mean, deviation, least, low, median, high, most = map(float, line.split("]")[1].split())
+    assert (mean, median) == pytest.approx((2.0, 2.0), abs=0.02)
+    assert deviation == pytest.approx(1.0 / math.sqrt(3.0), rel=0.02)
+    assert 1.0 <= least < 1.03 < low < 1.1 < 2.9 < high < 2.97 < most <= 3.0
 
 
 def test_failed_simulations_are_not_good_ones(mechanisms):

@@ -21,7 +21,7 @@ from ..mechanics.stress import with_stress
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import Release
 from ..runs.experiment import STEPS, experiment
-from ..runs.marks import largest_latched
+from ..runs.marks import strongest_hit
 from ..runs.quantities import settling
 from ..runs.released import released_displacement, system_of
 from ..runs.result import Result
@@ -268,7 +268,7 @@ def _hits(result: Result, stop: str) -> Hits:
     )  # fmt: skip
     if not next(s for s in result.mechanism.stops if s.name == stop).compliant:
         return found
-    force, indentation, duration = largest_latched(result, stop)
+    force, indentation, duration = strongest_hit(result, stop)
     return replace(found, force=force, indentation=indentation, duration=duration)
 
 

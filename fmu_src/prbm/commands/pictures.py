@@ -34,6 +34,8 @@ def write_picture(options: argparse.Namespace) -> None:
     """Draw a mechanism to a PNG file."""
     mechanism = load(options.mechanism)
     path = options.out or Path(f"{mechanism.name}.png")
+    if not path.suffix:  # The name of a folder, as with --out of other commands.
+        path = path / f"{mechanism.name}.png"
     check_file(path)
     values = settings(mechanism, options.set)
     figure = picture(mechanism, values, options.modes)

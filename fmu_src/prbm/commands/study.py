@@ -40,6 +40,7 @@ EXAMPLE = '--vary "stop.position=-4:2 mm:25"'
 FILES = ("study.csv", "study.png", "best.ssv")  # Ends of the names of the written files.
 NUMBER = re.compile(r"[+-]?[\d.]+([eE][+-]?\d+)?")
 ROWS_PRINTED_MAX = 45  # Longer tables are only written.
+SPREAD = (0.0, 0.025, 0.5, 0.975, 1.0)  # Printed quantiles of drawn values.
 DIGITS = 5  # Significant digits of printed numbers.
 
 
@@ -67,6 +68,8 @@ def run_study(options: argparse.Namespace) -> None:
         overwrite=options.overwrite, progress=reporter(),
     )  # fmt: skip
     _print_table({**found.parameters, **found.outputs}, found.units)
+    if options.runs is not None:
+        _print_spread({**found.parameters, **found.outputs}, found.units)
     failed = [message for message in found.messages if message]
     print(f"{len(found.points)} simulations, {len(failed)} failed")
     for message in dict.fromkeys(failed[:3]):
@@ -162,6 +165,21 @@ def _print_table(columns: Mapping[str, Real], units: Mapping[str, str]) -> None:
         head.append(f"{name} [{shown}]")
         cells.append([f"{factor * value:.{DIGITS}g}" for value in x])
     print(aligned(head, list(zip(*cells, strict=True))))
+
+
+def _print_spread(columns: Mapping[str, Real], units: Mapping[str, str]) -> None:
+    """Print how drawn parameters and their outputs are distributed."""
+    rows = []
+    for name, x in columns.items():
+        known = x[np.isfinite(x)]
+        if not len(known):
+            continue
+        factor, shown = prefixed_unit(float(np.abs(known).max()), units[name])
+        numbers = [known.mean(), known.std(), *np.quantile(known, SPREAD)]
+        heading = f"{name} [{shown or '-'}]"
+        rows.append([heading, *(f"{factor * float(value):.{DIGITS}g}" for value in numbers)])
+    heads = ["", "mean", "deviation", *(f"{100 * share:g} %" for share in SPREAD)]
+    print(aligned(heads, rows))
 
 
 def _optimum_lines(optimum: Optimum, units: Mapping[str, str], verb: str) -> list[str]:

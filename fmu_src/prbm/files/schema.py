@@ -50,7 +50,7 @@ from .copies import (
     origins,
 )
 from .outlines import mean, plate
-from .settings import is_tolerance, tolerance
+from .settings import has_unit, is_tolerance, tolerance
 from .tables import STRENGTHS, MaterialTable, Named, ParameterTable, RepeatTable, Table
 from .units import check_coherent, contact_stiffness
 from .values import (
@@ -448,7 +448,9 @@ def _tolerances(table: Mapping[str, Any], mechanism: Mechanism) -> dict[str, Tol
         key = f"tolerances.{name}"
         if name not in units:
             raise MechanismError(f"{key}: {unknown(name, units)}")
-        if not isinstance(text, str) or is_tolerance(text):
+        half = text.strip().removesuffix("uniform") if isinstance(text, str) else ""
+        bare = bool(units[name]) and not has_unit(half) and not half.strip().endswith("%")
+        if not isinstance(text, str) or is_tolerance(text) or bare:
             raise MechanismError(
                 f"{key} = {text!r}: write the distance of the limits from the value, "
                 'for instance "2 %"' + f' or "1 {units[name]}"' * bool(units[name])

@@ -390,16 +390,16 @@ def stop_forces(
         The stops.
     peaks : sequence of (str, float, float)
         Stop, time and peak force [N] of each hit, which can be shorter than a step of the columns.
-        Hits of compliant stops get a mark.
+        Those with a force get a mark.
     """
-    hits = [peak for peak in peaks if np.isfinite(peak[2])]
+    hits = [peak for peak in peaks if peak[2] > 0.0]
     forces = {stop.name: np.asarray(columns[f"{stop.name}.force"], float) for stop in stops}
     sizes = [float(np.abs(force).max()) for force in forces.values()]
     factor, shown = prefixed_unit(max([*sizes, *(force for *_, force in hits)]) or 1.0, "N")
     for stop in stops:
         (line,) = axes.plot(time, factor * forces[stop.name], linewidth=1.2, label=stop.name)
         own = [(at, factor * force) for name, at, force in hits if name == stop.name]
-        if stop.compliant and own:
+        if own:
             axes.plot(*zip(*own, strict=True), "v", markersize=4, color=line.get_color())
     axes.set_ylabel(f"stop force [{shown}]")
     if len(stops) > 1:

@@ -93,11 +93,18 @@ def curves(
                          label="within 5 %")  # fmt: skip
             axes.plot(x.factor * best, y.factor * value, "v", color=IMPACT, label="optimum")
             axes.legend(loc="best", fontsize=9, frameon=False)
+        axes.set_xlim(*_with_margin(x.x))
         axes.set_ylabel(y.label_in_two_lines)
     every[0].set_title(title, fontsize=11, loc="left")
     every[-1].set_xlabel(x.label)
     figure.align_ylabels(every)
     return figure
+
+
+def _with_margin(x: Real) -> tuple[float, float]:
+    """Return limits of an axis around all samples, failed ones too."""
+    low, high = float(np.min(x)), float(np.max(x))
+    return low - 0.05 * (high - low), high + 0.05 * (high - low)
 
 
 @own_style()

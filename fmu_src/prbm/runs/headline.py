@@ -10,7 +10,7 @@ from ..mechanics.statics import equilibrium, free_displacement
 from ..mechanics.stress import stressed
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
-from .marks import largest_latched, marks
+from .marks import marks, strongest_hit
 from .quantities import FREQUENCY, KINETIC, SETTLED_ENERGY_RTOL, settling, settling_estimate
 from .released import displacement_outputs, released_displacement
 from .result import Columns, Result, column, moves, rest_time
@@ -81,7 +81,7 @@ def contact_line(stop: str, force: float, indentation: float, duration: float) -
     stop : str
         Name of the stop.
     force, indentation, duration : float
-        Largest contact force [N], indentation [m] and duration of a contact [s].
+        Its peak force [N], indentation [m] and duration [s].
 
     Examples
     --------
@@ -141,7 +141,7 @@ def headline(
             nearest = float(column(columns, f"{stop}.gap").min())
             details = f", the smallest gap was {length(nearest, system.length)}"
         lines.append(f"impacts at {stop:9} {count}{details}")
-        force, indentation, duration = largest_latched(result, stop) if compliant else (0.0,) * 3
+        force, indentation, duration = strongest_hit(result, stop) if compliant else (0.0,) * 3
         if force > 0.0:
             lines.append(contact_line(stop, force, indentation, duration))
         since = None if compliant and _in_impact(columns, stop) else rest_time(columns, stop)

@@ -5,6 +5,7 @@ from ..hybrid.records import Impact
 from .headline import instant, speed_text
 from .result import Result
 
+SPEED_RTOL = 1e-9  # Smaller opening speeds, as a share of the closing one, are round-off.
 HITS_MAX = 5  # Impacts of one run in a summary.
 
 
@@ -18,9 +19,9 @@ def hits(result: Result) -> list[str]:
     compliant = {stop.name for stop in result.mechanism.stops if stop.compliant}
     lines = []
     for number, impact in enumerate(result.impacts[:HITS_MAX], start=1):
-        speeds = " to ".join(
-            speed_text(x) for x in (impact.latched.approach_speed, impact.latched.rebound_speed)
-        )
+        closing, opening = impact.latched.approach_speed, impact.latched.rebound_speed
+        after = speed_text(opening) if opening > SPEED_RTOL * closing else "rest"
+        speeds = f"{speed_text(closing)} to {after}"
         text = f"{instant(impact.time, span, 5)}, {speeds}, {_load(impact, compliant)}"
         lines.append(f"impact {number:<14}{impact.stop}: {text}")
     more = len(result.impacts) - HITS_MAX

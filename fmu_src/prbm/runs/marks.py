@@ -1,6 +1,5 @@
 """The impacts in a result, from the engine or from recorded outputs."""
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -25,7 +24,8 @@ class Mark:
     count : int
         Number of impacts at the stop, including this one.
     force : float
-        Peak force of the hit [N]; NaN if not recorded.
+        Peak force of the hit [N]; 0 at a rigid stop, and if only columns are known, whose row of
+        the impact is before the peak.
     """
 
     stop: int
@@ -33,26 +33,30 @@ class Mark:
     speed: float
     rebound: float
     count: int
-    force: float = math.nan
+    force: float = 0.0
 
 
-LARGEST = ("peak_force", "indentation", "contact_duration")
+HIT = ("peak_force", "indentation", "contact_duration")
 
 
-def largest_latched(result: Result | Columns, stop: str) -> list[float]:
-    """Return the largest force [N], indentation [m] and duration [s] of contacts at a stop.
+def strongest_hit(result: Result | Columns, stop: str) -> tuple[float, float, float]:
+    """Return peak force [N], indentation [m] and duration [s] of the strongest hit of a stop.
 
     The stop is compliant.  The columns contain contacts that are not counted as impacts, and the
     contact at the end; the records of the engine contain impacts between two rows.
     """
     columns = result.columns if isinstance(result, Result) else result
     impacts = result.impacts if isinstance(result, Result) else ()
-    own = [impact.latched for impact in impacts if impact.stop == stop]
-    found = []
-    for output in LARGEST:
-        recorded = [float(getattr(latched, output)) for latched in own]
-        found.append(max(float(np.max(column(columns, f"{stop}.{output}"))), *recorded, 0.0))
-    return found
+    hits = [
+        tuple(float(getattr(impact.latched, name)) for name in HIT)
+        for impact in impacts
+        if impact.stop == stop
+    ]
+    force, *others = (np.asarray(column(columns, f"{stop}.{name}"), float) for name in HIT)
+    last = len(force) - 1 - int(np.argmax(force[::-1]))  # The contact may have ended by then.
+    hits.append((float(force[last]), *(float(x[last]) for x in others)))
+    strongest, depth, duration = max(hits, key=lambda hit: hit[0])
+    return strongest, depth, duration
 
 
 def marks(result: Result | Columns, mechanism: Mechanism) -> tuple[Mark, ...]:

@@ -10,6 +10,7 @@ import io
 import itertools
 import math
 import re
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -272,7 +273,9 @@ def sensitivity(names: Sequence[str], values: Real, seed: int = 0) -> Sensitivit
         func={"f_A": a[None, :], "f_B": b[None, :], "f_AB": mixed[:, None, :]},
         n=n, rng=np.random.default_rng(seed),
     )  # fmt: skip
-    spread: Any = found.bootstrap(confidence_level=CONFIDENCE, n_resamples=RESAMPLES)
+    with warnings.catch_warnings():  # The indices of a parameter without effect have no spread.
+        warnings.simplefilter("ignore", RuntimeWarning)
+        spread: Any = found.bootstrap(confidence_level=CONFIDENCE, n_resamples=RESAMPLES)
 
     def interval(x: Any) -> Real:
         low, high = np.ravel(x.confidence_interval.low), np.ravel(x.confidence_interval.high)

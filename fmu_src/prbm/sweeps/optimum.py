@@ -17,6 +17,7 @@ from ..mechanics.arrays import Real
 from .outputs import RELATIONS
 
 NEIGHBOURS = 5  # Samples of a range whose worst output is compared with that of other ranges.
+WINDOWS_MIN = 3  # With fewer samples than this many groups of neighbours, one says little.
 FLAT_RTOL = 0.05  # An optimum is flat where the output is within this share of it.
 REFINED_RTOL = 1e-3  # Tolerance of the refined parameters, relative to the distance of samples.
 ROUNDS_MAX = 4  # Repetitions of the refinement.
@@ -278,7 +279,7 @@ class Search:
     def _robust(self) -> tuple[float, float, float] | None:
         """Return the neighbouring samples whose worst output is best, and this output."""
         x = self.samples.points[:, 0]
-        if len(x) < NEIGHBOURS:
+        if self.count < WINDOWS_MIN * NEIGHBOURS:
             return None
         windows = np.lib.stride_tricks.sliding_window_view(self.costs[: self.count], NEIGHBOURS)
         worst = windows.max(axis=1)  # Infinite if a simulation has failed.
