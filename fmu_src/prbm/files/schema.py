@@ -355,8 +355,7 @@ class MechanismTable(Table):
     )
     release: ReleaseTable = Field(description="Start of the motion")
     tolerances: dict[str, Any] = Field(
-        default_factory=dict,
-        description='Tolerances of parameters by name, "2 %", "0.1 mm" or "0.1 mm uniform"',
+        default_factory=dict, description='Tolerances of parameters, "2 %" or "0.1 mm uniform"'
     )
 
 
