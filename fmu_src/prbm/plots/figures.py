@@ -16,7 +16,7 @@ from ..mechanics.assembly import assemble
 from ..mechanics.system import unit
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import GROUND, Stop
-from ..runs.marks import Mark, marks
+from ..runs.marks import SPEED_RTOL, Mark, marks
 from ..runs.released import (
     displacement_outputs,
     released_displacement,
@@ -47,7 +47,6 @@ WALL_MARGIN = 0.5  # Walls are drawn up to this distance from the motion, as a s
 Y_MARGIN = 0.05  # Margin above and below the displacement, as a share of its range.
 TOUCH_RTOL = 0.02  # Smaller gaps, as a share of their range, are contacts between two rows.
 PARALLEL_ATOL = 1e-6  # Walls are drawn if their sine to the direction of release is smaller.
-SPEED_RTOL = 1e-9  # Smaller speeds, as a share of the largest one, are round-off.
 LOG_RATIO_MIN = 5.0  # Smaller ratios of impact speeds are drawn on a linear axis.
 LABELLED_RATIO_MAX = 300.0  # Up to this ratio, 2 and 5 are labelled on a logarithmic axis.
 

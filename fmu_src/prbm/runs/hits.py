@@ -3,9 +3,9 @@
 from ..base.unit_text import prefixed_unit
 from ..hybrid.records import Impact
 from .headline import instant, speed_text
+from .marks import SPEED_RTOL
 from .result import Result
 
-SPEED_RTOL = 1e-9  # Smaller opening speeds, as a share of the closing one, are round-off.
 HITS_MAX = 5  # Impacts of one run in a summary.
 
 

@@ -8,6 +8,8 @@ import numpy as np
 from ..mechanism.description import Mechanism
 from .result import Columns, Result, column, names
 
+SPEED_RTOL = 1e-9  # Smaller speeds after an impact, as a share of those before it, are round-off.
+
 
 @dataclass(frozen=True)
 class Mark:

@@ -303,6 +303,18 @@ def in_unit(name: str, value: Any, unit: str) -> float:
     return float(value)
 
 
+def check_duration(name: str, value: float) -> None:
+    """Check a duration [s].
+
+    Raises
+    ------
+    ParameterError
+        If it is not positive and finite.
+    """
+    if not (math.isfinite(value) and value > 0.0):
+        raise ParameterError(f"{name} = {value:g} s must be positive and finite")
+
+
 def communication_points(stop_time: float, step: float) -> list[float]:
     """Return 0, step, 2 step, ... up to the stop time [s].
 
@@ -316,9 +328,8 @@ def communication_points(stop_time: float, step: float) -> list[float]:
     >>> communication_points(1.0, 0.4)
     [0.0, 0.4, 0.8, 1.0]
     """
-    for name, value in (("stop_time", stop_time), ("step", step)):
-        if not (math.isfinite(value) and value > 0.0):
-            raise ParameterError(f"{name} = {value:g} s must be positive and finite")
+    check_duration("stop_time", stop_time)
+    check_duration("step", step)
     steps = math.ceil(stop_time / step - LAST_STEP_RTOL)
     if steps > ROWS_MAX:
         raise ParameterError(

@@ -22,7 +22,7 @@ from fmpy.fmi3 import FMU3Model, FMU3Slave  # type: ignore[import-untyped]
 from lxml import etree  # type: ignore[import-untyped]
 
 from ..base.archives import check_unpacked_size
-from ..base.errors import ParameterError, PrbmError
+from ..base.errors import PrbmError
 from ..runs.result import Columns
 
 Value = float | int | bool
@@ -342,18 +342,6 @@ def check_instances(names: Iterable[str], forbidden: str) -> None:
             raise CouplingError(
                 f"instance name {name!r}: must be non-empty and without {' '.join(forbidden)}"
             )
-
-
-def check_duration(name: str, value: float) -> None:
-    """Check a duration [s].
-
-    Raises
-    ------
-    ParameterError
-        If it is not positive and finite.
-    """
-    if not (math.isfinite(value) and value > 0.0):
-        raise ParameterError(f"{name} = {value:g} s must be positive and finite")
 
 
 def check_wire(to: str, given: Any, source: str) -> None:

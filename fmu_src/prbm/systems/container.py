@@ -23,11 +23,11 @@ from fmpy.model_description import (  # type: ignore[import-untyped]
 
 from ..base.atomic import write
 from ..kernel import compiler
+from ..runs.run import check_duration
 from .components import (
     CouplingError,
     Value,
     attribute,
-    check_duration,
     check_instances,
     check_wire,
     described,

@@ -18,11 +18,11 @@ import numpy as np
 from ..base.atomic import write
 from ..base.progress import Progress
 from ..runs.result import Columns
+from ..runs.run import check_duration
 from . import cosimulation
 from .components import (
     CouplingError,
     Value,
-    check_duration,
     check_instances,
     check_wire,
     described,
