@@ -53,11 +53,13 @@ default      {name}_out.csv: start values of the FMU, 0 to {stop:g} s
 Rows are {step:g} s apart, which is the communication step. Compare your results as follows.
 
 1. Simulate with this communication step. In co-simulation keep the tolerance of the FMU; in model
-   exchange use a relative tolerance of 1e-8.
+   exchange use a relative tolerance of 1e-9, and for each state an absolute one of this times its
+   nominal value.
 2. Compare rows of equal time. Leave out rows within {near:g} s of an impact: outputs jump there.
 3. Integer and Boolean outputs are equal. Differences of other outputs are at most 1e-5 (model
-   exchange: 1e-3) of the largest magnitude in the column, or of a larger nominal value; of
-   modal_restitution, a ratio of velocities that vanish in the last bounces, ten times as much.
+   exchange: 1e-3) of the largest magnitude in the column, or of a larger nominal value; the
+   components x and y of a vector share the larger magnitude; of modal_restitution, a ratio of
+   velocities that vanish in the last bounces, ten times as much.
    Without damping a motion can be chaotic: compare the time until the first impacts then.
 """
 SAMPLED = """\
