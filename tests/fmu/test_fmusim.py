@@ -16,10 +16,10 @@ from reference_check import (
     DAMPED,
     EQUAL_RTOL,
     EXCHANGE_RTOL,
-    EXCHANGE_TOLERANCE,
     EXPERIMENT_NAMES,
     EXPERIMENTS,
     compared,
+    exchange_tolerance,
     file_of,
     member,
     rows_of,
@@ -43,7 +43,7 @@ def checked(fmu: Path, model: str, kind: str, experiment: str, folder: Path) -> 
     words += ["--stop-time", repr(float(expected["time"][-1]))]
     words += ["--output-interval", repr(float(expected["time"][1]))]
     if kind == "me":
-        words += ["--solver", "cvode", "--tolerance", repr(EXCHANGE_TOLERANCE)]
+        words += ["--solver", "cvode", "--tolerance", repr(exchange_tolerance(fmu))]
     for name in expected.dtype.names[1:]:
         words += ["--output-variable", name]
     for name, value in start_values(fmu, model, experiment, folder).items():

@@ -23,10 +23,10 @@ from prbm.runs.experiment import Experiment
 from reference_check import (
     DAMPED,
     EXCHANGE_RTOL,
-    EXCHANGE_TOLERANCE,
     EXPERIMENT_NAMES,
     EXPERIMENTS,
     compared,
+    exchange_tolerance,
     file_of,
     member,
     rows_of,
@@ -61,7 +61,7 @@ def in_model_exchange(fmu: Path, model: str, experiment: str, folder: Path) -> i
     """Compare an experiment in model exchange as README.txt describes."""
     expected = rows_of(member(fmu, file_of(model, experiment)))
     found = simulate_fmu(
-        str(fmu), fmi_type="ModelExchange", relative_tolerance=EXCHANGE_TOLERANCE,
+        str(fmu), fmi_type="ModelExchange", relative_tolerance=exchange_tolerance(fmu),
         output=expected.dtype.names[1:], stop_time=expected["time"][-1],
         output_interval=expected["time"][1],
         start_values=start_values(fmu, model, experiment, folder),

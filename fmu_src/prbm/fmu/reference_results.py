@@ -40,6 +40,8 @@ VALIDATION_SHARE = 5  # The default experiment is this many times longer than th
 VALIDATION_RESTITUTION = 0.9  # Factor of the coefficients of restitution in the validation.
 VALIDATION_ACCELERATION = 0.1  # Acceleration of the base in the validation, of the nominal one.
 NEAR_IMPACT = 1e-3  # Of a step: rows nearer to an impact are not compared.
+EXCHANGE_TOLERANCE = 1e-8  # Of the solver of the importing tool in model exchange.
+COMPLIANT_TOLERANCE = 1e-9  # With compliant stops: forces follow small indentations.
 SAME_TIME = 1e-6  # Of a step: largest difference of the times of an impact.
 GUIDE = """\
 Reference results of {name}
@@ -53,8 +55,8 @@ default      {name}_out.csv: start values of the FMU, 0 to {stop:g} s
 Rows are {step:g} s apart, which is the communication step. Compare your results as follows.
 
 1. Simulate with this communication step. In co-simulation keep the tolerance of the FMU; in model
-   exchange use a relative tolerance of 1e-9, and for each state an absolute one of this times its
-   nominal value.
+   exchange use a relative tolerance of {tolerance:g}, and for each state an absolute one of this
+   times its nominal value.
 2. Compare rows of equal time. Leave out rows within {near:g} s of an impact: outputs jump there.
 3. Integer and Boolean outputs are equal. Differences of other outputs are at most 1e-5 (model
    exchange: 1e-3) of the largest magnitude in the column, or of a larger nominal value; the
@@ -122,10 +124,12 @@ def reference(
     smoke = columns[: SMOKE_STEPS + 1]
     validation = _validation(mechanism, changes, variables, experiment, outputs)
     more = VALIDATION.format(name=name, end=stop / VALIDATION_SHARE) if validation else ""
+    compliant = any(stop.compliant for stop in mechanism.stops)
     parts = GUIDE, SAMPLED if stressed(mechanism) else "", AT_IMPACTS if validation else ""
     text = "".join(parts).format(
         name=name, stop=stop, step=step, smoke=float(smoke["time"][-1]), validation=more,
         near=NEAR_IMPACT * step, same=SAME_TIME * step,
+        tolerance=COMPLIANT_TOLERANCE if compliant else EXCHANGE_TOLERANCE,
     )  # fmt: skip
     about = f"(0 to {stop:g} s, communication step {1e3 * step:g} ms)"
     return (
