@@ -230,6 +230,8 @@ def test_container_moves_as_in_our_master(outer, inner, ours, tmp_path):
     description = read_model_description(path, validate=True)
     assert description.fmiVersion == f"{outer}.0"
     assert [x.variable.name for x in description.initialUnknowns] == shown
+    with zipfile.ZipFile(path) as archive:  # FMI 2.0 allows this attribute for inputs only.
+        assert b"canHandleMultipleSet" not in archive.read("modelDescription.xml")
     variables = {x.name: x for x in description.modelVariables}
     assert variables["follower.shuttle.x"].unit == "m"
     assert {x.name for x in description.unitDefinitions} >= {"m"}

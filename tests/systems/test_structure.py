@@ -237,6 +237,15 @@ def top(name: str) -> str:
     return text.replace(start, f"{start}<ssd:Connectors>{connector}</ssd:Connectors>")
 
 
+def test_an_output_of_the_system_without_an_fmu_is_refused(tmp_path):
+    """The input of the system leads to its output, which no FMU gives a value."""
+    content = top("Y").replace('startElement="a" startConnector="shuttle.x"', 'startConnector="U"')
+    given = '<ssd:Connector name="U" kind="input"/>'
+    content = content.replace("<ssd:Connectors>", f"<ssd:Connectors>{given}", 1)
+    with pytest.raises(CouplingError, match="connection to Y: no output of an FMU leads to"):
+        meaning(tmp_path, content)
+
+
 @pytest.mark.parametrize("name", ["time", "a.shuttle.x"])
 def test_an_output_with_the_name_of_another_column_is_refused(name, tmp_path):
     with pytest.raises(CouplingError, match=f"the output {name} of the system has the name of"):

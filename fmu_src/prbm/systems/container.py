@@ -39,6 +39,7 @@ from .signals import BASE_UNITS
 NAMES3 = {"Real": "Float64", "Integer": "Int32"}
 KINDS = ("parameter", "input", "output")
 SUPPORTED = ("Float64", "Int32", "Boolean")  # types of FMI 3.0 that FMPy's library passes on
+UNWRITTEN = {"canHandleMultipleSetPerTimeInstant": False}  # FMPy writes it unless it is False.
 PLATFORMS = {platform.folder2: platform.name for platform in compiler.PLATFORMS.values()}
 """Platforms in FMI 3.0 by their names in FMI 2.0."""
 
@@ -116,6 +117,7 @@ def container(
             type=_type("Float64", fmi),
             causality="independent",
             variability="continuous",
+            **UNWRITTEN,
         )
         outputs = [v for v in mapped if v.causality == "output"]
         system = config.Configuration(
@@ -223,6 +225,7 @@ def _shown(full: str, value: Value | None, inside: Mapping[str, Any], fmi: int) 
         initial="calculated" if output else None,
         start=None if output else _text(full, start),
         **given,
+        **UNWRITTEN,
     )
 
 

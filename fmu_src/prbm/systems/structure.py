@@ -212,6 +212,7 @@ class _Reader:
                             "the parameter a start value"
                         )
                     (outputs if node.fmu is None else wires)[place(node, "", end)] = full, signal
+        _check_driven(top, outputs)
         stop = times.get("stopTime")
         check_names(outputs, recorded)
         return Flat(
@@ -406,6 +407,17 @@ def _components(node: Node) -> Iterator[Node]:
         yield node
     for element in node.elements.values():
         yield from _components(element)
+
+
+def _check_driven(top: Node, outputs: Mapping[str, object]) -> None:
+    """Reject outputs of the system whose connections lead to no output of an FMU."""
+    for wire in top.wires:
+        name = place(top, *wire.sink)
+        if not wire.sink[0] and name not in outputs:
+            raise CouplingError(
+                f"connection to {name}: no output of an FMU leads to this output of the system, "
+                "which is not supported; remove the connection"
+            )
 
 
 def _numeric(variable: Any) -> bool:
