@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from c_importer import ANVIL, needs
+from c_importer import ANVIL, COMPLIANT, needs
 from reliability import (
     calls,
     draws,
@@ -22,12 +22,12 @@ from reliability.report import Part
 
 pytestmark = pytest.mark.native
 
-QUICK = [ANVIL, "PRBDM2R"]
+QUICK = [ANVIL, COMPLIANT, "PRBDM2R"]
 OFFLINE = re.compile("NewConnectionError|NameResolutionError|ConnectTimeoutError|ProxyError")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["cs", "events", "me"])
+@pytest.mark.parametrize("kind", ["cs", "events", "clock", "me"])
 def test_arbitrary_calls_give_true_values_or_errors(kind):
     for model in QUICK:
         found = calls.called(model, 3, kind, 10_000, 0, sanitize=False)
@@ -37,10 +37,11 @@ def test_arbitrary_calls_give_true_values_or_errors(kind):
 
 
 @pytest.mark.slow
-def test_oracles_report_penetration_energy_and_cost():
+@pytest.mark.parametrize("kind", ["cs", "me"])
+def test_oracles_report_penetration_energy_and_cost(kind):
     """With limits that no FMU satisfies, each oracle reports violations."""
     limits = {"gap_atol": -1.0, "energy_rtol": -1.0, "energy_factor": 0.0, "call_seconds": 0.0}
-    found = drive(ANVIL, 2, "cs", "calls", count=1, size=40, **limits)
+    found = drive(ANVIL, 2, kind, "calls", count=4, size=40, **limits)
     assert set(found.violations()) == {"penetrated", "energy_lost", "over_budget"}
 
 

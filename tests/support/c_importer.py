@@ -22,6 +22,7 @@ from fmpy import read_model_description
 from fmpy.model_description import ModelDescription
 
 import prbm.kernel
+from compliant_pivot import two_compliant_stops
 from many_parts import anvil
 from prbm.base.atomic import write
 from prbm.kernel.compiler import cache_folder
@@ -38,7 +39,7 @@ FOLDERS = (f"-I{KERNEL}", "-isystem", str(HEADERS))
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", *WARNINGS, *FOLDERS)
 POSIX = ("-D_POSIX_C_SOURCE=200809L", "-ldl", "-lm", "-lpthread")
 TYPES = {"Real": "r", "Float64": "r", "Integer": "i", "Int32": "i", "Boolean": "b"}
-TWO_STOPS, ANVIL = "TwoStops", "Anvil"
+TWO_STOPS, ANVIL, COMPLIANT = "TwoStops", "Anvil", "TwoCompliant"
 
 
 @dataclass(frozen=True)
@@ -297,13 +298,18 @@ def run(job: Job, *words: Any, **options: Any) -> Result:
 
 @cache
 def described(model: str) -> Mechanism:
-    """Return a mechanism by name: a shipped one, or one of two that only the tests use.
+    """Return a mechanism by name: a shipped one, or one of three that only the tests use.
 
     ``TWO_STOPS`` is the 2R guide with two stops with friction.  ``ANVIL`` has two bodies that hit
-    each other, on flexures that stretch.
+    each other, on flexures that stretch.  ``COMPLIANT`` is a pivot between two compliant stops
+    with friction, with outputs of the stress.
     """
     if model == ANVIL:
         return anvil()
+    if model == COMPLIANT:
+        pivot = two_compliant_stops()
+        rough = tuple(dataclasses.replace(stop, friction=0.2) for stop in pivot.stops)
+        return dataclasses.replace(pivot, stops=rough)
     if model != TWO_STOPS:
         return mechanism(model)
     place = ("shuttle.width", "flexure.length + shuttle.com_height")
@@ -343,6 +349,14 @@ def native(model: str, fmi: int, platform: str = "host") -> Path:
             write(path, built(described(model), fmi, (platform,)))
 
     fmu = once(f"{name}.fmu", make)
+    return once(name, lambda path: unpack(fmu, path))
+
+
+@cache
+def native_clock(model: str) -> Path:
+    """Return the folder of an unpacked native FMU of FMI 3.0 with a clock."""
+    name = f"{model}-clock"
+    fmu = once(f"{name}.fmu", lambda path: write(path, built(described(model), fmi=3, clock=True)))
     return once(name, lambda path: unpack(fmu, path))
 
 

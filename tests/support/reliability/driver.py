@@ -13,7 +13,7 @@ from typing import Any
 
 from fmpy import read_model_description
 
-from c_importer import POSIX, SOURCES, Job, compile_c, kernel_library, native
+from c_importer import POSIX, SOURCES, Job, compile_c, kernel_library, native, native_clock
 from fuzzing import ENVIRONMENT, SANITIZERS
 from prbm.files.mechanism_file import shipped
 from shared import once
@@ -23,7 +23,8 @@ TYPES = {"Real": "r", "Float64": "r", "Integer": "i", "Int32": "i"}
 ROLES = {"input": "u", "output": "o", "local": "o", "calculatedParameter": "o"}
 ENDS = {
     "gap": "g", "impact_count": "n", "work": "w", "kinetic": "e", "elastic": "e",
-    "gravitational": "e", "dissipated": "e", "tolerance": "a",
+    "gravitational": "e", "dissipated": "e", "tolerance": "a", "position": "m",
+    "displacement": "m", "velocity": "m",
 }  # fmt: skip
 """Tags of variables by the end of their names; the driver's oracles read them."""
 
@@ -88,18 +89,33 @@ def plan(folder: Path, kind: str, step: float, **limits: float) -> str:
         "call_seconds": CALL_SECONDS, "process_seconds": PROCESS_SECONDS, **limits,
     }  # fmt: skip
     lines = [" ".join(map(repr, (step, *numbers.values())))]
-    lines += [_line(v, kind) for v in found.modelVariables if v.type in TYPES and v.name != "time"]
+    variables = [v for v in found.modelVariables if v.type in TYPES and v.name != "time"]
+    ends: dict[str, set[str]] = {}
+    for v in variables:
+        ends.setdefault(_part(v), set()).add(v.name.rpartition(".")[2])
+    lines += [_line(v, kind, ends[_part(v)]) for v in variables]
     return "\n".join(lines) + "\n"
 
 
-def _line(variable: Any, kind: str) -> str:
-    """Return the line of a plan for a variable: reference, type, role, tag, start and bounds."""
+def _part(variable: Any) -> str:
+    return str(variable.name.rpartition(".")[0])
+
+
+def _line(variable: Any, kind: str, ends: set[str]) -> str:
+    """Return the line of a plan for a variable: reference, type, role, tag, start and bounds.
+
+    The variables of the same part end with ``ends``.  The gap of a compliant stop, which has a
+    peak force, may be negative; what moves the wall of a stop has a tag.
+    """
     v = variable
     role = ROLES.get(v.causality) or ("t" if v.variability == "tunable" else "p")
     end = v.name.rpartition(".")[2]
     kept = kind == "me" and role == "t" and end == "offset"
     role = "k" if kept else role
     tag = "-" if v.name.startswith("der(") else ENDS.get(end, "-")
+    compliant, stop = "peak_force" in ends, "impact_count" in ends
+    if (tag == "g" and compliant) or (tag == "m" and (not stop or role == "o")):
+        tag = "-"
     start = float(v.start or 0.0)
     nominal = float(v.nominal or (v.declaredType and v.declaredType.nominal) or 0.0)
     scale = nominal or abs(start) or 1.0
@@ -132,7 +148,7 @@ def drive(
     model : str
         Name of a mechanism.
     kind : str
-        ``cs``, ``events`` or ``me``.
+        ``cs``, ``events``, ``clock`` (events of an FMU with a clock) or ``me``.
     part : str
         ``calls``, ``states`` or ``draws``.
     count, size : int
@@ -150,7 +166,8 @@ def drive(
         Limits other than the defaults: ``gap_atol`` [m], ``energy_rtol``, ``call_seconds`` and
         ``process_seconds``.
     """
-    folder = native(model, fmi)
+    folder = native_clock(model) if kind == "clock" else native(model, fmi)
+    kind = "events" if kind == "clock" else kind
     flags = sanitized_flags() if sanitize else ()
     library = kernel_library("sanitized-fast", flags) if sanitize else None
     job = Job(folder, kind, substep=substep, library=library, tolerance=tolerance)

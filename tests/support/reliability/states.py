@@ -5,9 +5,7 @@ be accepted, but the FMU must then give finite values or an error.  After each a
 state must continue as before, bit by bit in co-simulation.
 """
 
-from c_importer import ANVIL, TWO_STOPS
-
-from .calls import INTERFACES, NAMES
+from .calls import INTERFACES, NAMES, OWN
 from .driver import VIOLATIONS, Counts, drive, models
 from .report import Part
 
@@ -16,7 +14,7 @@ TRIALS = 40  # Damaged states of one instance.
 
 def run(total: int, seed: int = 0, names: list[str] | None = None) -> Part:
     """Damage about a total number of states of all mechanisms."""
-    every = names or [*models(), ANVIL, TWO_STOPS]
+    every = names or [*models(), *OWN]
     part = Part(
         "Damaged saved states of native FMUs",
         ("interface", "states", "rejected", "forged and accepted", "violations"),

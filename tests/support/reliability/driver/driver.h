@@ -13,7 +13,8 @@
 
 /* Roles and tags of variables in a plan file. */
 enum { FIXED = 'p', TUNABLE = 't', GEOMETRY = 'k', INPUT = 'u', OUTPUT = 'o' };
-enum { GAP = 'g', COUNT = 'n', ENERGY = 'e', WORK = 'w', TOLERANCE = 'a' };
+enum { GAP = 'g', COUNT = 'n', ENERGY = 'e', WORK = 'w', TOLERANCE = 'a',
+       MOVING = 'm' }; /* what moves the wall of a stop */
 
 typedef struct {
     uint32_t reference;
@@ -81,7 +82,7 @@ typedef struct {
     size_t *places;          /* in the plan */
     double tolerance;        /* of the integration */
     double balance, largest; /* energy [J]: balance at the reference, largest part since then */
-    bool referenced, judges_gaps, judges_energy;
+    bool referenced, judges_gaps, judges_energy, keeps_walls;
     double *counted;         /* impact counts at the last observation, (integers,) */
 } Subject;
 

@@ -141,13 +141,16 @@ static bool advance(Solver *solver, double h) {
         }
     }
     s->time += h;
+    s->judges_gaps = s->keeps_walls;
     memcpy(solver->x, solver->trial, solver->n * sizeof *solver->x);
     memcpy(solver->z, solver->z_new, solver->m * sizeof *solver->z);
     if (!FINE(EITHER(CompletedIntegratorStep, (s->c, fmi2True, &asked2, &terminate2),
                      CompletedIntegratorStep, (s->c, true, &asked, &terminate)))) {
         return false;
     }
-    return found || asked || asked2 ? event(solver, false) : (subject_observe(s), true);
+    bool good = found || asked || asked2 ? event(solver, false) : (subject_observe(s), true);
+    s->judges_gaps = false;
+    return good;
 }
 
 static void directional(Solver *solver) {
@@ -192,6 +195,7 @@ void integrated_calls(Subject *s, size_t actions) {
     if (!subject_instantiate(s)) {
         return;
     }
+    s->keeps_walls = chance(&s->random, 2);
     if (chance(&s->random, 2)) {
         change_some(s, "pt", 3);
     }

@@ -343,7 +343,8 @@ void must_be_same(Subject *s, const double *one, const double *other, const char
 size_t pick(Subject *s, const char *roles) {
     for (;;) {
         size_t i = below(&s->random, (unsigned)s->plan->count);
-        if (strchr(roles, s->plan->variables[i].role)) {
+        const Variable *v = s->plan->variables + i;
+        if (strchr(roles, v->role) && !(s->keeps_walls && v->tag == MOVING)) {
             return i;
         }
     }
