@@ -1,6 +1,7 @@
 """Designs of studies: lists, tolerances, yield and sensitivities with closed forms; optima."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -257,3 +258,40 @@ def test_the_optimum_of_a_guide_with_three_parameters_and_two_constraints(mechan
     assert 2 <= len(best.best) <= 10
     assert (np.diff(best.best_values) >= 0.0).all()
     assert 0.0 < found.share.share < 1.0
+
+
+@pytest.mark.parametrize("given", ["mechanism", "argument"])
+def test_the_yield_around_an_optimum_counts_parameters_that_are_not_varied(mechanisms, given):
+    """The frequency is proportional to h^1.5 for light flexures, so 0.98 f is reached by Phi(z).
+
+    With a standard deviation of a third of 2 % of h, z = 3 (1 - 0.98^(2/3)) / 0.02.
+    """
+    guide, h = mechanisms["PRBDM"], {"flexure.thickness": Tolerance(0.02, relative=True)}
+    guide = replace(guide, tolerances=h) if given == "mechanism" else guide
+    values = {**FREE, "flexure.density": 1.0}
+    width = guide.values()["flexure.width"]
+    thinner = ScalarGuide.of({**guide.values(), **values}).frequency
+    found = study(
+        guide, {"flexure.width": [width, 1.1 * width, 1.2 * width]}, minimise="mode(1)",
+        subject_to=[f"fundamental > {0.98 * thinner:.12g} Hz"], values=values,
+        tolerances={} if given == "mechanism" else {"flexure.thickness": "2 %"}, workers=1,
+    )  # fmt: skip
+    assert found.optimum.point["flexure.width"] == pytest.approx(width, rel=1e-9)
+    assert found.toleranced == ("flexure.thickness",)
+    expected = stats.norm.cdf(3.0 * (1.0 - 0.98 ** (2.0 / 3.0)) / 0.02)
+    assert found.share.runs == 256
+    assert found.share.low < expected < found.share.high < 1.0
+
+
+def test_a_tolerance_of_an_unknown_parameter_is_rejected_before_the_simulations(mechanisms):
+    arguments = {"minimise": "mode(1)", "subject_to": ["fundamental > 1 Hz"], **SHORT}
+    with pytest.raises(ParameterError, match=r"tolerance of flexure\.thicknes: .*thickness"):
+        study(
+            mechanisms["PRBDM"], {"flexure.width": [7e-3, 8e-3]},
+            tolerances={"flexure.thicknes": "1 %"}, **arguments,
+        )  # fmt: skip
+    with pytest.raises(ParameterError, match=r"gravity\.x: .* of the value 0 has no width"):
+        study(
+            mechanisms["PRBDM"], {"flexure.width": [7e-3, 8e-3]}, values={"gravity.x": 0.0},
+            tolerances={"gravity.x": "1 %"}, **arguments,
+        )  # fmt: skip

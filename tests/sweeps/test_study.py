@@ -395,16 +395,24 @@ def test_figures_show_all_outputs_and_the_optimum():
     y = np.array([0.3, 0.2, np.nan, 0.25, 0.3])
     units = {"a": "m", "b": "", "f": "s"}
     further = {"f": (np.array([-9e-4]), np.array([0.19]))}
-    figure = curves("title", ("a", x), {"f": y}, units, further, ("f", -9e-4, 0.19, (-1e-3, -8e-4)))
+    good = np.array([True, True, False, True, True])
+    best = ("f", -9e-4, 0.19, (-1e-3, -8e-4))
+    figure = curves("title", ("a", x), {"f": y}, units, good, further, best)
     (axes,) = figure.axes
     assert axes.get_xlabel() == "a [mm]"
     labels = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert labels == ["samples", "refinement", "within 5 %", "optimum"]
+    assert labels == ["samples", "violated condition", "refinement", "within 5 %", "optimum"]
+    np.testing.assert_allclose(axes.lines[1].get_xdata(), 1e3 * x[2:3])
     grid = np.arange(15.0)
-    drawn = maps("title", {"a": x, "b": np.arange(3.0)}, {"f": grid}, units, ("f", [0.0, 1.0], 0.0))
+    drawn = maps(
+        "title", {"a": x, "b": np.arange(3.0)}, {"f": grid}, units, grid != 2 * 3 + 1,
+        ("f", [0.0, 1.0], 0.0),
+    )  # fmt: skip
     mesh = drawn.axes[0].collections[0].get_array()
     assert mesh.shape == (3, 5)
     assert mesh[1, 2] == grid[2 * 3 + 1]
+    crosses = drawn.axes[0].lines[0]
+    np.testing.assert_allclose(crosses.get_xydata(), [[1e3 * x[2], 1.0]])
     drawn.draw_without_rendering()
 
 

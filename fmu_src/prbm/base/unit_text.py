@@ -92,7 +92,14 @@ def prefixed_unit(largest: float, unit: str) -> tuple[float, str]:
 
     >>> prefixed_unit(2.2e8, "Pa")
     (1e-06, 'MPa')
+
+    Dimensionless quantities have no prefix:
+
+    >>> prefixed_unit(0.05, "1"), prefixed_unit(0.05, "")
+    ((1.0, ''), (1.0, ''))
     """
+    if unit in ("", "1"):
+        return 1.0, ""
     if unit == "Pa" and largest >= PASCALS_MAX:
         return 1e-6, "MPa"
     if largest == 0.0:

@@ -239,7 +239,8 @@ def study_arguments(parser: ArgumentParser) -> None:
     )  # fmt: skip
     add(
         "--tolerance-of", action="append", default=[], metavar="NAME=TOLERANCE",
-        help="tolerance for the yield around the optimum, e.g. 'stop.position=0.1 mm'; repeatable",
+        help="tolerance for the yield around the optimum, e.g. 'stop.position=0.1 mm', beside "
+        "those in the mechanism file; repeatable",
     )  # fmt: skip
     add("--step", metavar="T", help="time between samples of a motion [s] (default: 1/4000 of it)")
     add(

@@ -67,7 +67,7 @@ def run_study(options: argparse.Namespace) -> None:
         table=None if options.out is None else options.out / table,
         overwrite=options.overwrite, progress=reporter(),
     )  # fmt: skip
-    _print_table({**found.parameters, **found.outputs}, found.units)
+    _print_table({**found.parameters, **found.outputs}, found.units, found.satisfied)
     if options.runs is not None:
         _print_spread({**found.parameters, **found.outputs}, found.units)
     failed = [message for message in found.messages if message]
@@ -83,7 +83,12 @@ def run_study(options: argparse.Namespace) -> None:
             print(line)
         output.text(best, _best_set(mechanism, found.optimum, values))
     if found.share is not None:
-        print(_yield_line(found.share, options.subject_to))
+        print(_yield_line(found.share, options.subject_to, found.toleranced))
+    elif options.subject_to:
+        good = int(np.sum(found.good))
+        print(
+            f"{good} of {len(found.points)} simulations satisfy {' and '.join(options.subject_to)}"
+        )
     output.figure(figure, lambda: _figure(mechanism, found))
     if options.out is not None:
         print(options.out / table)
@@ -147,23 +152,26 @@ def _ends(low: str, high: str, unit: str, option: str) -> tuple[float, float]:
 
 def _text(x: float, unit: str) -> str:
     """Return a number with its display unit."""
-    if not unit:
-        return f"{x:.{DIGITS}g}"
     factor, shown = prefixed_unit(abs(x), unit)
-    return f"{factor * x:.{DIGITS}g} {shown}"
+    return f"{factor * x:.{DIGITS}g} {shown}".rstrip()
 
 
-def _print_table(columns: Mapping[str, Real], units: Mapping[str, str]) -> None:
-    """Print the samples, unless there are many."""
+def _print_table(
+    columns: Mapping[str, Real], units: Mapping[str, str], satisfied: Any = True
+) -> None:
+    """Print the samples, unless there are many; a cross marks those that violate a condition."""
     if len(next(iter(columns.values()))) > ROWS_PRINTED_MAX:
         return
     head, cells = [], []
     for name, x in columns.items():
         known = np.abs(x[np.isfinite(x)])
         largest = float(known.max()) if len(known) else 0.0
-        factor, shown = prefixed_unit(largest, units[name]) if units[name] else (1.0, "-")
-        head.append(f"{name} [{shown}]")
+        factor, shown = prefixed_unit(largest, units[name])
+        head.append(f"{name} [{shown or '-'}]")
         cells.append([f"{factor * value:.{DIGITS}g}" for value in x])
+    if not np.all(satisfied):
+        head.append("violated")
+        cells.append(["" if held else "x" for held in satisfied])
     print(aligned(head, list(zip(*cells, strict=True))))
 
 
@@ -234,9 +242,10 @@ def _print_sensitivities(found: Study) -> None:
         print(aligned(["parameter", "alone", "95 %", "in total", "95 %"], rows))
 
 
-def _yield_line(share: Yield, constraints: Sequence[str]) -> str:
+def _yield_line(share: Yield, constraints: Sequence[str], toleranced: Sequence[str]) -> str:
+    where = f" within the tolerances of {', '.join(toleranced)}" if toleranced else ""
     return (
-        f"yield: {100 * share.share:.4g} % of {share.runs} simulations satisfy "
+        f"yield{where}: {100 * share.share:.4g} % of {share.runs} simulations satisfy "
         f"{' and '.join(constraints)}; 95 % confidence: {100 * share.low:.4g} to "
         f"{100 * share.high:.4g} %"
     )
@@ -258,14 +267,19 @@ def _figure(mechanism: Mechanism, found: Study) -> "Figure":
     if not found.whole_grid or len(found.varied) > 2:
         point = None if best is None else (best.point, best.others)
         return scatter(
-            mechanism.title, found.parameters, found.outputs, found.units, found.good, point
+            mechanism.title, found.parameters, found.outputs, found.units, found.satisfied, point
         )
     if len(found.varied) == 2:
         marked = None if best is None else (best.output, [*best.point.values()], best.value)
-        return maps(mechanism.title, found.varied, found.outputs, found.units, marked)
+        return maps(
+            mechanism.title, found.varied, found.outputs, found.units, found.satisfied, marked
+        )
     ((name, samples),) = found.varied.items()
-    if best is None:
-        return curves(mechanism.title, (name, samples), found.outputs, found.units, {}, None)
-    further = {best.output: (best.points[:, 0], best.values)}
-    shown = (best.output, best.point[name], best.value, best.flat[name])
-    return curves(mechanism.title, (name, samples), found.outputs, found.units, further, shown)
+    further, shown = {}, None
+    if best is not None:
+        further = {best.output: (best.points[:, 0], best.values)}
+        shown = (best.output, best.point[name], best.value, best.flat[name])
+    return curves(
+        mechanism.title, (name, samples), found.outputs, found.units, found.satisfied, further,
+        shown,
+    )  # fmt: skip

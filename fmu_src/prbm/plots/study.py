@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 
 from ..base.unit_text import prefixed_unit
 from ..drawing.style import BODY, IMPACT, PAST, own_style
@@ -19,6 +20,7 @@ PANEL_HEIGHT, WIDTH = 2.2, 7.0  # Of an output over one parameter [inch].
 MAP = (4.6, 3.6)  # Width and height of a map [inch].
 MAP_COLUMNS = 2
 SCATTER = (2.6, 2.2)  # Width and height of a panel [inch].
+VIOLATED = "violated condition"
 LETTERS = 11.0  # Of a title in an inch, at most.
 WAYS: tuple[dict[str, Any], ...] = (
     {"color": BODY, "marker": ".", "markersize": 2.5, "zorder": 3},
@@ -46,10 +48,9 @@ class Scaled:
     def __init__(self, name: str, unit: str, x: Real) -> None:
         known = np.abs(x[np.isfinite(x)])
         largest = float(known.max()) if len(known) else 0.0
-        plain_number = unit in ("", "1")
-        self.factor, shown = (1.0, "-") if plain_number else prefixed_unit(largest, unit)
-        self.label, self.x = f"{name} [{shown}]", self.factor * x
-        self.label_in_two_lines = f"{name}\n[{shown}]"
+        self.factor, shown = prefixed_unit(largest, unit)
+        self.label, self.x = f"{name} [{shown or '-'}]", self.factor * x
+        self.label_in_two_lines = f"{name}\n[{shown or '-'}]"
 
 
 @own_style()
@@ -58,6 +59,7 @@ def curves(
     varied: tuple[str, Real],
     outputs: Mapping[str, Real],
     units: Mapping[str, str],
+    good: Sequence[bool] | Real,
     further: Mapping[str, tuple[Real, Real]],
     optimum: tuple[str, float, float, tuple[float, float]] | None,
 ) -> Figure:
@@ -73,6 +75,8 @@ def curves(
         Values (n,) of each output; failed simulations (NaN) are gaps.
     units : mapping
         SI units of the parameter and the outputs.
+    good : (n,)
+        Whether each simulation satisfies all constraints; the others are open dots.
     further : mapping
         Parameter and values (m,) of the simulations that refine an output.
     optimum : (str, float, float, (float, float)) or None
@@ -81,9 +85,13 @@ def curves(
     name, samples = varied
     x = Scaled(name, units[name], samples)
     figure, every = panels(len(outputs), 1, (WIDTH, 0.6 + PANEL_HEIGHT * len(outputs)))
+    violated = ~np.asarray(good, bool)
     for axes, (output, values) in zip(every, outputs.items(), strict=True):
         y = Scaled(output, units[output], values)
         axes.plot(x.x, y.x, "o-", color=PAST, markersize=3.5, linewidth=1.0, label="samples")
+        if violated.any():
+            axes.plot(x.x[violated], y.x[violated], "o", color=PAST, markersize=3.5,
+                      markerfacecolor="white", label=VIOLATED)  # fmt: skip
         if output in further:
             at, found = further[output]
             axes.plot(x.factor * at, y.factor * found, ".", color=BODY, label="refinement")
@@ -92,10 +100,11 @@ def curves(
             axes.axvspan(x.factor * low, x.factor * high, color=IMPACT, alpha=0.15, linewidth=0,
                          label="within 5 %")  # fmt: skip
             axes.plot(x.factor * best, y.factor * value, "v", color=IMPACT, label="optimum")
+        if violated.any() or (optimum is not None and optimum[0] == output):
             axes.legend(loc="best", fontsize=9, frameon=False)
         axes.set_xlim(*_with_margin(x.x))
         axes.set_ylabel(y.label_in_two_lines)
-    every[0].set_title(title, fontsize=11, loc="left")
+    every[0].set_title(fill(title, int(WIDTH * LETTERS)), fontsize=11, loc="left")
     every[-1].set_xlabel(x.label)
     figure.align_ylabels(every)
     return figure
@@ -113,6 +122,7 @@ def maps(
     varied: Mapping[str, Real],
     outputs: Mapping[str, Real],
     units: Mapping[str, str],
+    good: Sequence[bool] | Real,
     optimum: tuple[str, Sequence[float], float] | None,
 ) -> Figure:
     """Draw outputs over two parameters as maps of colours.
@@ -127,6 +137,8 @@ def maps(
         Values (n,) of each output on the grid, the second parameter varying fastest.
     units : mapping
         SI units of the parameters and the outputs.
+    good : (n,)
+        Whether each simulation satisfies all constraints; the others have a cross.
     optimum : (str, (float, float), float) or None
         Output, parameters and value of the optimum.
     """
@@ -135,22 +147,39 @@ def maps(
     figure = Figure((MAP[0] * columns, 0.4 + MAP[1] * rows), dpi=120, layout="constrained")
     every: list[Axes] = [*np.atleast_1d(figure.subplots(rows, columns)).flat]
     x, y = (Scaled(name, units[name], samples) for name, samples in varied.items())
+    violated = ~np.asarray(good, bool)
+    crosses = [at.ravel()[violated] for at in np.meshgrid(x.x, y.x, indexing="ij")]
     for axes, (output, values) in zip(every, outputs.items(), strict=False):
         z = Scaled(output, units[output], values)
         grid = np.ma.masked_invalid(z.x.reshape(len(x.x), len(y.x)).T)
         mesh = axes.pcolormesh(edges(x.x), edges(y.x), grid, cmap="viridis")
         figure.colorbar(mesh, ax=axes, pad=0.02).set_label(z.label)
+        if violated.any():
+            axes.plot(*crosses, "x", color=PAST, markersize=4.0, label=VIOLATED,
+                      path_effects=[withStroke(linewidth=2.5, foreground="white")])  # fmt: skip
         if optimum is not None and optimum[0] == output:
             a, b = optimum[1]
             axes.plot(x.factor * a, y.factor * b, "v", color=IMPACT, label="optimum")
-            axes.legend(loc="best", fontsize=9)
         axes.set_xlabel(x.label)
         axes.set_ylabel(y.label)
         plain(axes)
     for axes in every[len(outputs) :]:
         axes.set_visible(False)
-    figure.suptitle(title, fontsize=11)
+    shown: dict[str, Any] = {}
+    for axes in every:
+        handles, labels = axes.get_legend_handles_labels()
+        shown |= dict(zip(labels, handles, strict=True))
+    if shown:
+        _legend_below(figure, shown)
+    figure.suptitle(fill(title, int(figure.get_figwidth() * LETTERS)), fontsize=11)
     return figure
+
+
+def _legend_below(figure: Figure, shown: Mapping[str, Any]) -> None:
+    """Place a legend of artists by label below all panels."""
+    figure.legend(
+        [*shown.values()], [*shown], loc="outside lower center", ncols=3, frameon=False, fontsize=9
+    )
 
 
 @own_style()
@@ -189,7 +218,7 @@ def scatter(
             axes = table[i, j]
             if not held.all():
                 axes.plot(x.x[~held], y.x[~held], "o", markerfacecolor="none", color=BODY,
-                          markersize=3.5, label="violated")  # fmt: skip
+                          markersize=3.5, label=VIOLATED)  # fmt: skip
             axes.plot(x.x[held], y.x[held], "o", color=PAST, markersize=3.0, label="simulations")
             if best is not None:
                 axes.plot(x.factor * best[0][name], y.factor * best[1][output], "v", color=IMPACT,
@@ -201,9 +230,7 @@ def scatter(
                 axes.set_xlabel(x.label)
     if best is not None or not held.all():
         handles, labels = table[0, 0].get_legend_handles_labels()
-        figure.legend(
-            handles, labels, loc="outside lower center", ncols=3, frameon=False, fontsize=9
-        )
+        _legend_below(figure, dict(zip(labels, handles, strict=True)))
     lines = fill(title, int(size[0] * LETTERS))
     figure.suptitle(lines, fontsize=11, x=0.01, ha="left")
     return figure
@@ -235,7 +262,7 @@ def behaviour_map(
         at = np.repeat(x.factor * values, strobe.shape[1])
         upper.plot(at, y.factor * strobe.ravel(), **style, linestyle="none", label=label)
         lower.plot(x.factor * values, impacts.mean(axis=1), **style, linewidth=0.8)
-    upper.set_title(title, fontsize=11, loc="left")
+    upper.set_title(fill(title, int(WIDTH * LETTERS)), fontsize=11, loc="left")
     upper.set_ylabel(y.label_in_two_lines)
     lower.set_ylabel("impacts\nper period")
     lower.set_xlabel(x.label)

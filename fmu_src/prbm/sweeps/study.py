@@ -11,7 +11,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -89,6 +89,8 @@ class Study:
     share : Yield or None
         The share of simulations that satisfy the constraints, if there are any and the points are
         drawn; with an optimum and tolerances, that of simulations around the optimum.
+    toleranced : tuple of str
+        The parameters with a tolerance around the optimum.
     sensitivities : mapping
         Sobol's indices of each output, if they were requested and exist.
     """
@@ -102,12 +104,18 @@ class Study:
     whole_grid: bool = True
     good: Any = True
     share: Yield | None = None
+    toleranced: tuple[str, ...] = ()
     sensitivities: Mapping[str, Sensitivity] = field(default_factory=dict)
 
     @property
     def parameters(self) -> dict[str, Real]:
         """The parameter of each simulation (n,) by name."""
         return dict(zip(self.varied, self.points.T, strict=True))
+
+    @property
+    def satisfied(self) -> Any:
+        """Whether each simulation (n,) satisfies all constraints, or has failed."""
+        return np.asarray(self.good) | np.array([bool(message) for message in self.messages])
 
     def __repr__(self) -> str:
         failed = sum(map(bool, self.messages))
@@ -185,8 +193,8 @@ def study(
     subject_to : sequence of str
         Constraints on outputs, ``"fundamental > 40 Hz"``.
     tolerances : mapping or None
-        Tolerances of varied parameters, ``{"flexure.thickness": "2 %"}``, that give the yield
-        around the optimum.
+        Tolerances of parameters, varied or not, ``{"flexure.thickness": "2 %"}``, that give the
+        yield around an optimum under constraints, in addition to those of the mechanism.
     values, inputs, stop_time, tolerance, engine
         As for :func:`prbm.simulate`.
     step : float, str or None
@@ -220,7 +228,7 @@ def study(
         mechanism, vary, outputs, runs, (method, seed), _goal(minimise, maximise), subject_to,
         values, inputs, (stop_time, step, tolerance, engine),
     )  # fmt: skip
-    spread = _around(plan, tolerances or {})
+    plan = _with_spread(plan, tolerances or {})
     if table is not None:
         check_file(Path(table))
     check_limits(workers, timeout)
@@ -231,11 +239,11 @@ def study(
         if where.executor is not None:
             _check_sources(plan.job.inputs)
         journal = Journal(
-            None if table is None else Path(table), plan.settings, plan.names, plan.texts
+            None if table is None else Path(table), plan.settings, plan.columns, plan.texts
         )
         with journal.opened(overwrite):
-            with Runner(plan.job, plan.names, journal, where, timeout=timeout) as runner:
-                found = _run(plan, runner, spread, progress or (lambda fraction: None))
+            with Runner(plan.job, plan.columns, journal, where, timeout=timeout) as runner:
+                found = _run(plan, runner, progress or (lambda fraction: None))
             if table is not None:
                 write(table, csv_text(*found.table()).encode())
             journal.remove()
@@ -265,6 +273,10 @@ class Plan:
         Whether the points are a grid, the method and the seed.
     units : mapping
         Units of the parameters and outputs.
+    spread : mapping
+        Tolerances around an optimum.
+    beside : mapping
+        Values of the parameters with a tolerance that are not varied.
     """
 
     job: MechanismJob
@@ -274,11 +286,23 @@ class Plan:
     constraints: tuple[Constraint, ...]
     design: tuple[bool, str, int]
     units: Mapping[str, str]
+    spread: Mapping[str, Tolerance] = field(default_factory=dict)
+    beside: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def names(self) -> list[str]:
         """Names of the varied parameters."""
         return [*self.varied]
+
+    @property
+    def columns(self) -> list[str]:
+        """Names of the varied parameters, and of those beside them."""
+        return [*self.varied, *self.beside]
+
+    def rows(self, points: Real) -> Real:
+        """Return the values of all columns at points (n, p)."""
+        beside = np.tile([*self.beside.values()], (len(points), 1))
+        return np.column_stack([points, beside])
 
     @property
     def texts(self) -> list[str]:
@@ -294,7 +318,7 @@ class Plan:
         return {
             "version": __version__,
             "mechanism": hashlib.sha256(described).hexdigest(),
-            "parameters": self.names,
+            "parameters": self.columns,
             "outputs": self.texts,
             "values": dict(job.values),
             "inputs": {name: _described(source) for name, source in job.inputs.items()},
@@ -486,10 +510,7 @@ def _distribution(
     if isinstance(given, Tolerance):
         if name not in base:
             raise ParameterError(f"{name} has a tolerance, but no value; write it before +-")
-        try:
-            return distribution(base[name], given)
-        except ParameterError as error:
-            raise ParameterError(f"{name}: {error}") from None
+        return _law(name, base[name], given)
     if hasattr(given, "ppf"):
         return given
     ends = _samples(name, given, known)
@@ -498,22 +519,40 @@ def _distribution(
     return float(ends[0]), float(ends[1])
 
 
-def _around(plan: Plan, tolerances: Mapping[str, str | Tolerance]) -> dict[str, Tolerance]:
-    """Return the checked tolerances around an optimum."""
+def _with_spread(plan: Plan, given: Mapping[str, str | Tolerance]) -> Plan:
+    """Return the plan with the checked tolerances around an optimum under constraints."""
     from ..files.settings import tolerance  # imported here: pint
 
-    found = {}
-    for name, given in tolerances.items():
-        if name not in plan.names:
-            raise ParameterError(f"the tolerance of {name}: {proposal(name, plan.varied)}")
-        unit = plan.units[name]
-        found[name] = tolerance(given, unit, f"{name} =")[1] if isinstance(given, str) else given
-    if found and not (plan.goal and plan.constraints):
-        raise ParameterError(
-            "tolerances give the yield around an optimum; give an output to optimise and "
-            "constraints, or vary the parameters within their tolerances"
-        )
-    return found
+    if not (plan.goal and plan.constraints):
+        if given:
+            raise ParameterError(
+                "tolerances give the yield around an optimum; give an output to optimise and "
+                "constraints, or vary the parameters within their tolerances"
+            )
+        return plan
+    mechanism = plan.job.mechanism
+    values = {**mechanism.values(), **plan.job.values}
+    units = {**{p.name: p.unit for p in mechanism.parameters}, **plan.units}
+    found = dict(mechanism.tolerances)
+    for name, text in given.items():
+        if name not in values and name not in plan.varied:
+            every = dict.fromkeys([*plan.varied, *values])
+            raise ParameterError(f"the tolerance of {name}: {proposal(name, every)}")
+        if isinstance(text, str):
+            text = tolerance(text, units[name], f"{name} =")[1]
+        found[name] = text
+    beside = {name: values[name] for name in found if name not in plan.varied}
+    for name, value in beside.items():
+        _law(name, value, found[name])  # Report mistakes.
+    return replace(plan, spread=found, beside=beside)
+
+
+def _law(name: str, value: float, tolerance: Tolerance) -> Any:
+    """Return the distribution of a parameter with a tolerance."""
+    try:
+        return distribution(value, tolerance)
+    except ParameterError as error:
+        raise ParameterError(f"{name}: {error}") from None
 
 
 def _check_sources(inputs: Mapping[str, Source]) -> None:
@@ -550,16 +589,16 @@ def _condition(text: str) -> tuple[str, str, str, str]:
 # --- simulations ----------------------------------------------------------------------------------
 
 
-def _run(plan: Plan, runner: Runner, spread: Mapping[str, Tolerance], progress: Progress) -> Study:
+def _run(plan: Plan, runner: Runner, progress: Progress) -> Study:
     """Simulate, search the optimum and its yield."""
     points, count = plan.points, len(plan.points)
     extra = REFINEMENTS_EXPECTED * len(plan.names) if plan.goal else 0
-    extra += YIELD_RUNS if spread else 0
+    extra += YIELD_RUNS if plan.spread else 0
 
     def report(done: float) -> None:
         progress(min(done / (count + extra), LAST_FRACTION) if extra else done / count)
 
-    outcomes = runner.outcomes(_tuples(points), lambda share: report(share * count))
+    outcomes = runner.outcomes(_tuples(plan.rows(points)), lambda share: report(share * count))
     table = _table(outcomes, len(plan.texts))
     messages = tuple(outcome.message for outcome in outcomes)
     whole, method, seed = plan.design
@@ -579,42 +618,57 @@ def _run(plan: Plan, runner: Runner, spread: Mapping[str, Tolerance], progress: 
         progress(1.0)
         return Study(**found)
 
-    def evaluate(x: Real) -> Real:
-        return _table(runner.outcomes(_tuples(x)), len(plan.texts))
+    best = _optimum(plan, runner, table, messages)
+    if plan.spread:
+        rows = _tuples(_around(plan, best))
+        found["share"] = yield_of(_good(plan, _table(runner.outcomes(rows), len(plan.texts))))
+    progress(1.0)
+    return Study(**found, optimum=best, toleranced=tuple(plan.spread))
 
-    output, sign = plan.goal
+
+def _optimum(plan: Plan, runner: Runner, table: Real, messages: Sequence[str]) -> Optimum:
+    """Search the optimum from the outputs (n, k) of the points and their messages."""
+    assert plan.goal is not None
+    (output, sign), points = plan.goal, plan.points
+
+    def evaluate(x: Real) -> Real:
+        return _table(runner.outcomes(_tuples(plan.rows(x))), len(plan.texts))
+
     bounds = np.column_stack([points.min(axis=0), points.max(axis=0)])
     for k, given in enumerate(plan.varied.values()):
         if isinstance(given, tuple):  # A range from which the points were drawn.
             bounds[k] = given
+    whole = plan.design[0]
     spaces = (
         [len(np.unique(x)) - 1 for x in points.T]
         if whole
-        else [count ** (1 / len(bounds))] * len(bounds)
+        else [len(points) ** (1 / len(bounds))] * len(bounds)
     )
     sizes = np.ptp(points, axis=0) / np.maximum(spaces, 1)
     samples = Samples(plan.names, points, plan.texts, table, bounds, sizes)
     try:
-        best = Search(evaluate, samples, output, sign, plan.constraints).optimum()
+        return Search(evaluate, samples, output, sign, plan.constraints).optimum()
     except ParameterError as error:
         reasons = sorted({message for message in messages if message})
-        why = reasons[0] if reasons else "simulate longer, or choose another output"
+        remedy = "simulate longer, or choose another output"
+        if plan.constraints and np.isfinite(table[:, plan.texts.index(output)]).any():
+            remedy = "loosen them, or vary the parameters further"
         raise ParameterError(
-            f"{error}; {why}" + f"; {runner.journal.kept}" * bool(runner.journal.kept)
+            f"{error}; {reasons[0] if reasons else remedy}"
+            + f"; {runner.journal.kept}" * bool(runner.journal.kept)
         ) from None
-    if spread:
-        found["share"] = _yield_at(plan, best, spread, evaluate)
-    progress(1.0)
-    return Study(**found, optimum=best)
 
 
-def _yield_at(plan: Plan, best: Optimum, spread: Mapping[str, Tolerance], evaluate: Any) -> Yield:
-    """Return the share of good simulations with the tolerances around an optimum."""
-    laws = {name: distribution(best.point[name], given) for name, given in spread.items()}
-    moved = drawn(laws, YIELD_RUNS, YIELD_SEED, "random")
-    points = np.tile([best.point[name] for name in plan.names], (YIELD_RUNS, 1))
-    points[:, [plan.names.index(name) for name in laws]] = moved
-    return yield_of(_good(plan, evaluate(points)))
+def _around(plan: Plan, best: Optimum) -> Real:
+    """Return drawn values of all columns around an optimum, (n, columns)."""
+    at = {**best.point, **plan.beside}
+    laws = {n: distribution(at[n], x) for n, x in plan.spread.items() if x.at(at[n]) > 0.0}
+    rows = np.tile([at[name] for name in plan.columns], (YIELD_RUNS, 1))
+    if laws:
+        rows[:, [plan.columns.index(name) for name in laws]] = drawn(
+            laws, YIELD_RUNS, YIELD_SEED, "random"
+        )
+    return rows
 
 
 def _good(plan: Plan, table: Real) -> Any:
