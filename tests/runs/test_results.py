@@ -419,3 +419,21 @@ def test_units_of_the_panels_follow_the_magnitudes(mechanisms: dict[str, Mechani
     figure = response(simulate(mechanisms["PRBDM"], small, stop_time=0.1))
     labels = [axes.get_ylabel() for axes in figure.axes]
     assert labels == ["displacement [µm]", "velocity [mm/s]", "impact speed [mm/s]", "energy [nJ]"]
+
+
+def test_the_curves_of_a_figure_pass_through_the_impacts(mechanisms):
+    """Between two samples the body reaches the wall, and its velocity jumps by the restitution."""
+    result = simulate(mechanisms["PRBDM"], {"stop.position": 2e-3}, stop_time=0.2, step=0.01)
+    figure = response(result)
+    moved, speed = (axes.lines[0].get_xydata() for axes in figure.axes[:2])
+    wall, e = 1e3 * result.start_values["stop.position"], result.start_values["stop.restitution"]
+    assert len(result.impacts) > 2
+    for hit in result.impacts:
+        rows = np.flatnonzero(moved[:, 0] == 1e3 * hit.time)
+        np.testing.assert_allclose(moved[rows, 1], wall, rtol=1e-9)
+        before, after = speed[rows, 1]
+        assert before == pytest.approx(hit.latched.approach_speed, rel=1e-6)
+        assert after == pytest.approx(-e * before, rel=1e-6)
+    assert (np.diff(moved[:, 0]) >= 0.0).all()
+    marks = next(line for line in figure.axes[0].lines if line.get_label() == "impact")
+    np.testing.assert_allclose(marks.get_ydata(), wall, rtol=1e-9)

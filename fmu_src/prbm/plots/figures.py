@@ -47,6 +47,7 @@ WALL_MARGIN = 0.5  # Walls are drawn up to this distance from the motion, as a s
 Y_MARGIN = 0.05  # Margin above and below the displacement, as a share of its range.
 TOUCH_RTOL = 0.02  # Smaller gaps, as a share of their range, are contacts between two rows.
 PARALLEL_ATOL = 1e-6  # Walls are drawn if their sine to the direction of release is smaller.
+RATE_ANGLE = 1e-4  # rad: half the turn over which a rate is a central difference.
 LOG_RATIO_MIN = 5.0  # Smaller ratios of impact speeds are drawn on a linear axis.
 LABELLED_RATIO_MAX = 300.0  # Up to this ratio, 2 and 5 are labelled on a logarithmic axis.
 
@@ -71,6 +72,9 @@ class _Plot:
         self.columns = result.columns if isinstance(result, Result) else result
         self.mechanism = mechanism
         self.marks = marks(result, mechanism)
+        rigid = {stop.name for stop in mechanism.stops if not stop.compliant}
+        known = result.impacts if isinstance(result, Result) else ()
+        self.impacts = [hit for hit in known if hit.stop in rigid]
         self.system = (
             system_of(result)
             if isinstance(result, Result)
@@ -101,6 +105,31 @@ class _Plot:
     def displacement(self) -> Real:
         """Return the displacement of the released point along the direction of the release [m]."""
         return released_displacement(self.system, self.columns)
+
+    def through_impacts(self, x: Real, rate: bool = False) -> tuple[Real, Real]:
+        """Return times in the unit of the axis and values with both sides of rigid impacts, (m,).
+
+        ``x`` (n,) is the displacement or rotation of the released body at all rows, or its rate.
+        """
+        amount, values = self.system.amount, []
+        for hit in self.impacts:
+            for change in (hit.before, hit.after):
+                if rate:
+                    h = RATE_ANGLE / (float(np.abs(change).max()) or 1.0)
+                    ends = amount(hit.q + h * change), amount(hit.q - h * change)
+                    values.append((ends[0] - ends[1]) / (2.0 * h))
+                else:
+                    values.append(amount(hit.q))
+        times = np.repeat([hit.time for hit in self.impacts], 2)
+        rows = np.searchsorted(self.seconds, times)
+        return self.factor * np.insert(self.seconds, rows, times), np.insert(x, rows, values)
+
+    def draw_impacts(self, axes: Axes, time: Real, x: Real) -> None:
+        """Mark the impacts on a curve."""
+        if self.marks:
+            when = self.factor * np.array([mark.time for mark in self.marks])
+            at_hit = np.interp(when, time, x)
+            axes.plot(when, at_hit, "v", color=IMPACT, markersize=5, label="impact")
 
     def at_rest(self) -> bool:
         """Return whether the recorded displacement of the released point is round-off."""
@@ -265,11 +294,9 @@ def _displacement(axes: Axes, plot: _Plot) -> None:
         x = np.full(len(x), round(float(x[0]) / plot.size, 9) * plot.size)
     factor, unit_name = length_unit(float(np.abs(x).max()) or plot.size)
     body = plot.mechanism.release.body
-    axes.plot(plot.time, factor * x, color=PAST, linewidth=1.4, label=body)
-    if plot.marks:
-        when = plot.factor * np.array([mark.time for mark in plot.marks])
-        at_hit = np.interp(when, plot.time, factor * x)
-        axes.plot(when, at_hit, "v", color=IMPACT, markersize=5, label="impact")
+    time, through = plot.through_impacts(x)
+    axes.plot(time, factor * through, color=PAST, linewidth=1.4, label=body)
+    plot.draw_impacts(axes, time, factor * through)
     _walls(axes, plot, x, factor)
     if len(axes.lines) > 1:
         axes.legend(loc="best", fontsize=9, frameon=False, ncols=3)
@@ -279,11 +306,9 @@ def _displacement(axes: Axes, plot: _Plot) -> None:
 def _rotation(axes: Axes, plot: _Plot) -> None:
     body = plot.mechanism.release.body
     angle = np.degrees(plot.columns[f"{body}.angle"])
-    axes.plot(plot.time, angle, color=PAST, linewidth=1.4, label=body)
-    if plot.marks:
-        when = plot.factor * np.array([mark.time for mark in plot.marks])
-        at_hit = np.interp(when, plot.time, angle)
-        axes.plot(when, at_hit, "v", color=IMPACT, markersize=5, label="impact")
+    time, through = plot.through_impacts(np.radians(angle))
+    axes.plot(time, np.degrees(through), color=PAST, linewidth=1.4, label=body)
+    plot.draw_impacts(axes, time, np.degrees(through))
     _touched(axes, plot, angle)
     if len(axes.lines) > 1:
         axes.legend(loc="best", fontsize=9, frameon=False, ncols=3)
@@ -307,7 +332,7 @@ def _touched(axes: Axes, plot: _Plot, angle: Real) -> None:
 
 def _turning(axes: Axes, plot: _Plot) -> None:
     omega = plot.columns[f"{plot.mechanism.release.body}.omega"]
-    axes.plot(plot.time, omega, color=PAST, linewidth=1.2)
+    axes.plot(*plot.through_impacts(omega, rate=True), color=PAST, linewidth=1.2)
     axes.set_ylabel("rate [rad/s]")
 
 
@@ -338,8 +363,9 @@ def _walls(axes: Axes, plot: _Plot, x: Real, factor: float) -> None:
 def _velocity(axes: Axes, plot: _Plot) -> None:
     at_rest = plot.at_rest()
     v = np.zeros(len(plot.time)) if at_rest else released_velocity(plot.system, plot.columns)
-    factor, unit_name = prefixed_unit(float(np.abs(v).max()), "m/s")
-    axes.plot(plot.time, factor * v, color=PAST, linewidth=1.2)
+    time, through = plot.through_impacts(v, rate=True)
+    factor, unit_name = prefixed_unit(float(np.abs(through).max()), "m/s")
+    axes.plot(time, factor * through, color=PAST, linewidth=1.2)
     axes.set_ylabel(f"velocity [{unit_name}]")
 
 
