@@ -15,6 +15,7 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
+from itertools import cycle
 from pathlib import Path
 
 import matplotlib as mpl
@@ -45,7 +46,8 @@ PAGE = ROOT / "docs" / "flexure-models.md"
 FIGURE = ROOT / "docs" / "figures" / "flexure-models.png"
 COORDINATES = ROOT / "docs" / "figures" / "flexure-coordinates.png"
 PUBLISHED = tuple(name for name, model in flexure.MODELS.items() if model.coefficients)
-MODELS = (*PUBLISHED, "beam", "10R", "40R")
+CHAINS_SHOWN = ("10R", "40R")
+MODELS = (*PUBLISHED, "beam", *CHAINS_SHOWN)
 FORCES = (0.1, 1.0, 2.0, 4.0, 8.0)  # Scaled forces P L^2/EI.
 MOMENTS = (0.1, math.pi / 4, math.pi / 2, math.pi)  # Scaled moments M L/EI.
 TIPS = (
@@ -357,7 +359,7 @@ def unloaded_height(model: str, displacement: float) -> float:
 def stress_table() -> str:
     """Return the table of errors of the stress at the clamps of leaves [%]."""
     rows = []
-    for model in (*MODELS[:3], "beam 3", "beam 5", *MODELS[4:]):
+    for model in (*PUBLISHED, "beam 3", "beam 5", *CHAINS_SHOWN):
         cells: list[Cell] = []
         for x in STRESS_STROKES:
             free = unloaded_height(model, x)
@@ -407,7 +409,7 @@ def order(ns: Sequence[int], errors: Sequence[float]) -> float:
 
 
 COLOURS = {"beam": "#000000", "10R": "#009e73", "40R": "#0072b2"} | dict(
-    zip(PUBLISHED, ("#d55e00", "#e69f00", "#cc79a7"), strict=True)
+    zip(PUBLISHED, cycle(("#d55e00", "#e69f00", "#cc79a7", "#56b4e9")), strict=False)
 )  # Colours that colour-blind readers can distinguish.
 LOADS: dict[str, tuple[str, Callable[[float], Tip], float]] = {
     "force": ("end force, P L²/EI", end_force, 8.0),

@@ -1,18 +1,19 @@
 """Mechanism files: values with units, defaults, messages for mistakes, schema and page."""
 
 import contextlib
-import copy
 import json
 import math
 import os
 import random
 import re
+import runpy
 import subprocess
 import sys
 import tomllib
 from dataclasses import fields
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import jsonschema
 import pytest
@@ -561,61 +562,23 @@ def test_pint_is_not_imported_for_a_file_without_units(tmp_path):
     subprocess.run(command, check=True, env=os.environ | {"PYTHONPATH": str(ROOT / "fmu_src")})
 
 
-REFERENCE = ROOT / "docs" / "mechanism-files.md"
-
-
-def keys_of(table: dict) -> str:
-    """Return the keys of a table of the schema as a table of Markdown."""
-    rows = ["| key | unit | default | range | meaning |", "|---|---|---|---|---|"]
-    for key, entry in table["properties"].items():
-        meaning, _, unit = entry["description"].partition(" [")
-        cells = (f"`{key}`", unit.rstrip("]"), default(table, key), span(entry), meaning)
-        rows.append("| " + " | ".join(cells).replace("|  |", "| |") + " |")
-    return "\n".join(row.replace("|  |", "| |").replace("|  |", "| |") for row in rows)
-
-
-def default(table: dict, key: str) -> str:
-    """Return the default of a key as the page shows it."""
-    if key in table.get("required", ()):
-        return "required"
-    value = table["properties"][key].get("default", "")
-    return "" if value in ("", [], {}) else f"`{json.dumps(value)}`"
-
-
-def span(entry: dict) -> str:
-    """Return the bounds or the choices of a key."""
-    choices = [entry, *entry.get("anyOf", ()), *entry.get("oneOf", ())]
-    for choice in choices:
-        if "enum" in choice:
-            return ", ".join(f"`{value}`" for value in choice["enum"])
-        if "minimum" in choice:
-            return f"{choice['minimum']:g} to {choice['maximum']:g}"
-    items = entry.get("items", {})
-    return span(items) if items else ""
+keys = SimpleNamespace(**runpy.run_path(str(ROOT / "docs" / "write_keys.py")))
 
 
 def test_the_page_has_every_key_with_unit_default_and_range():
-    page = REFERENCE.read_text("utf-8")
-    root = schema()
-    tables = {key: _definition(root, key) for key in root["properties"]}
-    tables["repeat"] = root["definitions"]["RepeatTable"]
-    wrong = ""
-    for key, table in {"mechanism": root, **tables}.items():
-        if table is not None:
-            block = f"<!-- keys of {key} -->\n{keys_of(table)}\n<!-- end -->\n"
-            wrong += "" if block in page else block
-    assert not wrong, f"docs/mechanism-files.md needs these keys:\n{wrong}"
+    """``python docs/write_keys.py`` writes the tables."""
+    page = keys.PAGE.read_text("utf-8")
+    assert keys.page(page) == page
     assert all(f"`{symbol}`" in page for symbol in re.findall(r"(\w+)(?:,| *$)", units.KNOWN)[:9])
 
 
-def _definition(root: dict, key: str) -> dict | None:
-    """Return the schema of the table, or of the tables in the array, at a key of the file."""
-    reference = re.search(r"#/definitions/(\w+)", json.dumps(root["properties"][key]))
-    return copy.copy(root["definitions"][reference[1]]) if reference else None
+def test_a_page_without_a_place_for_a_table_is_not_written():
+    with pytest.raises(SystemExit, match="needs one place for the keys of"):
+        keys.page("")
 
 
 def test_the_example_of_the_page_is_a_mechanism(tmp_path):
-    page = REFERENCE.read_text("utf-8")
+    page = keys.PAGE.read_text("utf-8")
     for text in re.findall(r"```toml\n(.*?)```", page, re.DOTALL):
         if "title" in text:
             assert schema_errors(tomllib.loads(text)) == []

@@ -202,6 +202,14 @@ GUIDES = {  # Rest position [mm], f1, f2, f3 at rest, f1 straight [Hz]; by indep
     "3R": (10.95, 4.854, 147.7, 233.2, 4.590),
     "40R": (10.73, 4.904, 129.9, 208.6, 4.638),
 }  # fmt: skip
+
+
+def test_every_model_has_limits_of_its_errors():
+    every = set(models.MODELS)
+    assert set(FORCE_ERRORS) == set(FREQUENCY_ERRORS) == every
+    assert set(GUIDES) >= set(models.PUBLISHED)
+
+
 HALF_DIGITS = (5e-3, 5e-4, 0.05, 0.05, 5e-4)
 
 
