@@ -3,6 +3,7 @@ r"""Saddle-point systems of constrained motions, and projections onto constraint
 Sources
 -------
 .. [1] E. Eich, SIAM J. Numer. Anal. 30 (1993) 1467 (coordinate projection).
+.. [2] N. J. Higham, Accuracy and Stability of Numerical Algorithms, SIAM, 2002, section 9.4.
 """
 
 from contextlib import suppress
@@ -147,6 +148,21 @@ def _regular(diagonal: Real) -> bool:
     return bool(min(pivots) > SINGULAR_RTOL * max(pivots))
 
 
+def _check_regular(matrix: Real) -> None:
+    """Reject a scaled matrix if a pivot of its elimination is round-off.
+
+    For P A = L U with |L_ij| <= 1, the least pivot is at least 1/(n |A^-1|) in the 1-norm, and the
+    largest one at most n max |A_ij| unless elements grow exceptionally [2]_.  The elimination
+    itself, which is slow in Python, decides where these bounds do not.
+    """
+    n = len(matrix)
+    with suppress(np.linalg.LinAlgError):
+        least = 1.0 / (n * np.linalg.norm(np.linalg.inv(matrix), 1))
+        if least > SINGULAR_RTOL * n * np.abs(matrix).max():
+            return
+    _check_pivots(_pivots(matrix))
+
+
 def _check_pivots(diagonal: Real) -> None:
     """Reject a scaled matrix with these pivots if one of them is round-off."""
     if not _regular(diagonal):
@@ -183,7 +199,7 @@ def solve(kkt: Real, right: Real, n: int, length: float) -> Real:
     """
     scale = scales(kkt, n, length)
     A = kkt * scale * scale[:, None]
-    _check_pivots(_pivots(A))
+    _check_regular(A)
     spread = scale if right.ndim == 1 else scale[:, None]
     x: Real = spread * np.linalg.solve(A, spread * right)
     return x
@@ -244,7 +260,7 @@ def determinant_sign(kkt: Real, n: int, length: float) -> int:
     try:
         scale = scales(kkt, n, length)
         A = kkt * scale * scale[:, None]
-        _check_pivots(_pivots(A))
+        _check_regular(A)
     except SimulationError:
         return 0
     return int(np.linalg.slogdet(A)[0])
