@@ -238,10 +238,11 @@ def _example(mechanism: Mechanism, experiment: Experiment, options: str = "") ->
     body = mechanism.release.body
     output = f'"{body}.x"' + "".join(f', "{stop}.impact_count"' for stop in stops)
     code = (
-        "from fmpy import plot_result, simulate_fmu\n\n"
+        "from fmpy import simulate_fmu\n\n"
         f'result = simulate_fmu(\n    "{mechanism.name}.fmu",\n'
         f"    stop_time={experiment.stop_time:g},\n"
-        f"{start}    output=[{output}],\n{options})\nplot_result(result)"
+        f"{start}    output=[{output}],\n{options})\n"
+        "for name in result.dtype.names:\n    print(name, result[name][-1])"
     )
     return f"<pre><code>{escape(code)}</code></pre>\n"
 
@@ -351,8 +352,10 @@ WALL_RULES = (
     "In event mode, <code>velocity</code> acts at once. A jump below <code>rest_speed</code> "
     "leaves a closed stop closed; its impulse is part of <code>impulse_sum</code>.",
     "A wall that is part of another model has a <code>mobility</code>, its inverse effective mass. "
-    "The impulse is that between two masses, the wall changes its velocity by it, and the other "
-    "model must receive <code>impulse_sum</code>.",
+    "The impulse is that between two masses, and the wall changes its velocity by it. The other "
+    "model must receive, in the direction in which the body approaches, the growth of "
+    "<code>impulse_sum</code> at impacts and <code>force</code> while the stop holds; from a "
+    "compliant stop, <code>force</code> only.",
 )
 
 
@@ -460,6 +463,15 @@ def _licenses() -> str:
 # --- native FMUs --------------------------------------------------------------------------------
 
 
+LOGGED = {
+    2: "Errors are logged always, warnings and impacts if logging is on (FMPy: "
+    "<code>debug_logging=True</code>).",
+    3: "FMI 3.0 forbids all messages while logging is off: switch it on to see reasons (FMPy: "
+    "<code>debug_logging=True</code>).",
+}
+"""When messages are logged, by the version of FMI."""
+
+
 def _native_use(
     mechanism: Mechanism,
     interface: NativeInterface,
@@ -487,14 +499,20 @@ def _native_use(
         "<p>The compiled library is the same for every mechanism. At instantiation it reads the "
         "mechanism from <code>resources/mechanism.bin</code> and checks it against the token of "
         f"this FMU.{reference}</p>",
-        "<p>Model exchange in FMPy: <code>fmi_type=&quot;ModelExchange&quot;</code>. The steps of "
-        "the importer's solver should be short compared with the time between two bounces. In a "
-        "longer step, a contact that begins and ends within the step may be missed (CVode in FMPy "
-        "limits its steps to a fiftieth of the simulated time).</p>",
+        f"<p>The default experiment has a communication step of {experiment.step:g}&#160;s and "
+        f"the tolerance {_default('solver.tolerance', interface.variables)}.</p>",
+        "<p>Model exchange in FMPy: <code>fmi_type=&quot;ModelExchange&quot;, output_interval="
+        f"{experiment.step:g}</code> or less. Its solver CVode takes at most 500 steps from one "
+        "output to the next; if it needs more, an error says <code>mxstep steps taken</code>. The "
+        "steps of "
+        "the importer's solver should be short compared with the time between two bounces: in a "
+        "longer step, a contact that begins and ends within the step may be missed. Solvers "
+        "with a fixed step need one that is stable for the fastest vibration of the flexures.</p>",
         "<p>An invalid value, call or step is rejected: the reason is logged and the instance does "
-        "not change. Steps are rejected until an invalid value is corrected. The state of an "
-        "instance can be saved, serialized and restored bit for bit. Instances are independent of "
-        "each other; each may be used by one thread at a time.</p>",
+        "not change. Steps are rejected until an invalid value is corrected, or, after a variable "
+        f"was set that cannot be set, until a reset. {LOGGED[version]} The state of an instance "
+        "can be saved, serialized and restored bit for bit. Instances are independent of each "
+        "other; each may be used by one thread at a time.</p>",
     ]
     if version == 3 and not interface.clocks:
         parts.append(
@@ -553,6 +571,18 @@ def _peaks(mechanism: Mechanism) -> Iterator[str]:
         )
 
 
+_EVENT_LOOP = """\
+<p>After a step that needs event handling, a master</p>
+<ol>
+<li>calls <code>fmi3EnterEventMode</code>;</li>
+<li>sets the inputs of walls and forces that jump at this time;</li>
+<li>calls <code>fmi3UpdateDiscreteStates</code> until no other update is needed;</li>
+<li>gets <code>impulse_sum</code> and gives its growth to the model of the wall;</li>
+<li>sets the new <code>velocity</code> of the wall, and returns by <code>fmi3EnterStepMode</code>.
+</li>
+</ol>"""
+
+
 def _events(mechanism: Mechanism, interface: NativeInterface, version: int) -> str:
     if not (mechanism.stops or mechanism.frictions):
         return "<h2>Events</h2>\n<p>This mechanism has no events.</p>"
@@ -574,6 +604,7 @@ def _events(mechanism: Mechanism, interface: NativeInterface, version: int) -> s
             "<code>fmi3UpdateDiscreteStates</code>. If the importer does not allow early return, "
             "impacts happen inside the step.</p>"
         )
+        parts.append(_EVENT_LOOP)
     if interface.clocks:
         names = ", ".join(f"<code>{escape(name)}</code>" for name in interface.clocks)
         parts.append(

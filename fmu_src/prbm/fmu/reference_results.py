@@ -56,7 +56,7 @@ Rows are {step:g} s apart, which is the communication step. Compare your results
 
 1. Simulate with this communication step. In co-simulation keep the tolerance of the FMU; in model
    exchange use a relative tolerance of {tolerance:g}, and for each state an absolute one of this
-   times its nominal value.
+   times its nominal value, as FMPy does.
 2. Compare rows of equal time. Leave out rows within {near:g} s of an impact: outputs jump there.
 3. Integer and Boolean outputs are equal. Differences of other outputs are at most 1e-5 (model
    exchange: 1e-3) of the largest magnitude in the column, or of a larger nominal value; the
