@@ -17,6 +17,7 @@ from prbm.fmu.start import interface
 from prbm.hybrid.simulation import Simulation
 from random_mechanisms import seeded
 from scaled import Units, unbounded
+from springs import web
 from support import CASES, each_shipped, mechanism, own_fmu
 
 TIMES = (0.0, 3e-3, 0.01, 0.02)
@@ -81,6 +82,11 @@ def test_the_motion_of_a_shipped_mechanism_is_the_same_in_all_units(model, facto
 @pytest.mark.parametrize("model", ["PRBDM", "ImpactOscillator"])
 def test_the_motion_in_the_engine_is_the_same_in_all_units(model, factors, monkeypatch):
     assert_same_motion(Simulation, mechanism(model), factors, monkeypatch)
+
+
+@each_change
+def test_the_motion_of_bodies_on_springs_is_the_same_in_all_units(factors, monkeypatch):
+    assert_same_motion(Simulation, web(), factors, monkeypatch)
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -190,14 +190,14 @@ class Comparison:
     def head(self) -> None:
         m, r = self.mechanism, self.reader
         assert (r.text(), r.text()) == (TOKEN, m.name)
-        counts = [r.take("I") for _ in range(14)]
+        counts = [r.take("I") for _ in range(15)]
         parts = (
-            m.bodies, m.flexure_types, m.flexures, m.joints, m.stops, m.frictions, m.forces,
-            m.probes, m.ground,
+            m.bodies, m.flexure_types, m.flexures, m.joints, m.springs, m.stops, m.frictions,
+            m.forces, m.probes, m.ground,
         )  # fmt: skip
         assert counts[0] == len(m.parameters)
-        assert counts[1:10] == [*map(len, parts)]
-        assert counts[10:] == [
+        assert counts[1:11] == [*map(len, parts)]
+        assert counts[11:] == [
             len(self.bounds), len(self.native.variables), len(self.native.independent),
             len(input_names(m)),
         ]  # fmt: skip
@@ -257,6 +257,11 @@ class Comparison:
             self.between(joint)
             assert r.take("I") == (joint.stiffness is not None)
             self.fields(joint)
+        for spring in m.springs:
+            assert r.text() == spring.name
+            self.between(spring)
+            assert r.take("I") == (spring.free_length is not None)
+            self.fields(spring)
 
     def contacts_and_forces(self) -> None:
         m, r = self.mechanism, self.reader

@@ -19,6 +19,7 @@ import pytest
 
 import prbm.interface.tables
 import sizes
+from free_bodies import flying
 from kernel_library import (
     KERNEL,
     KernelError,
@@ -44,6 +45,7 @@ from prbm.mechanics import (
     contact,
     direction_map,
     dynamics,
+    elements,
     forces,
     kinetics,
     modal,
@@ -60,6 +62,7 @@ from prbm.mechanism.description import Mechanism
 from prbm.mechanism.expressions import Affine
 from prbm.mechanism.parameters import Parameter
 from prbm.mechanism.parts import FlexureType
+from springs import oscillator, web
 from support import ROOT, SHIPPED, SUPPORT, mechanism
 
 TWINS = {}
@@ -883,6 +886,37 @@ def test_forces_and_energies_are_the_same(name):
             assert_same(rows, forces.load_rows(system, frame, e))
 
 
+@twin(
+    spring_tension=elements.spring_tension, spring_slope=elements.spring_slope,
+    spring_energy=elements.spring_energy,
+)  # fmt: skip
+def test_laws_of_springs_are_the_same():
+    rng = np.random.default_rng(0)
+    for _ in range(10):
+        law, x = elements.SpringLaw(*rng.normal(size=5)), float(rng.normal())
+        ours = structures()["SpringLaw"](*law)
+        for name in ("spring_tension", "spring_slope", "spring_energy"):
+            assert getattr(kernel(), name)(ours, x) == getattr(elements, name)(law, x)
+
+
+@each_mechanism
+def test_elements_are_the_same(name):
+    for system, ours, rng in systems(name):
+        q, v = random_state(system, rng)
+        e, n, own = system.directions(q), system.n, elements.Elements(system)
+        K, row, found = np.zeros((n, n)), np.zeros(n), np.zeros(n)
+        kernel().element_forces(ours.structure, q, e, 0.7, found)
+        size = float(np.abs(own.drawn).max())
+        assert_same(found, own.force(q, e, 0.7), scale=size)
+        assert_same(kernel().element_energy(ours.structure, q, e), own.energy(q, e), scale=size)
+        kernel().element_tangent(ours.structure, e, 0.7, K)
+        assert_same(K, own.tangent(e, 0.7))
+        kernel().element_stiffness(ours.structure, e, K)
+        assert_same(K, own.stiffness(e))
+        kernel().element_torques(ours.structure, e, v, found, row)
+        assert_same(found, own.stiffness(e) @ v)
+
+
 # --- contact.c -----------------------------------------------------------------------------------
 
 
@@ -1060,8 +1094,10 @@ def test_tangent_stiffness_is_the_same(name):
         e, n, B = system.directions(q), system.n, system.loops
         w, lam = rng.normal(size=(system.d, 2)).view(complex)[:, 0], rng.normal(size=len(B))
         w, K_t = system.spread(w), np.full((n, n), np.nan)
-        kernel().tangent_stiffness(ours.structure, len(B), w, B, lam, e, K_t)
-        assert_same(K_t, statics.tangent_stiffness(system.K, w, B, lam, e, system.arm, system.Phi))
+        kernel().tangent_stiffness(ours.structure, 0.7, len(B), w, B, lam, e, K_t)
+        K = elements.Elements(system).tangent(e, 0.7)
+        expected = statics.tangent_stiffness(K, w, B, lam, e, system.arm, system.Phi)
+        assert_same(K_t, expected)
 
 
 def stacked_release(system):
@@ -1113,6 +1149,25 @@ def test_messages_about_buckling_under_gravity_are_the_same():
     found, *_arrays = equilibrium_of(system := assembly.assemble(guide, values))
     message = message_of(KernelError, kernel().equilibrium, ours.structure, False, 0.0, found)
     assert message == message_of(EquilibriumError, statics.equilibrium, system)
+
+
+@twin(resting=statics.resting, with_bodies_placed=statics.with_bodies_placed)
+@pytest.mark.parametrize(
+    "model", [web(), oscillator(parts={"gravity": (0.0, -9.81)}), flying()], ids=lambda m: m.name
+)
+def test_shapes_under_gravity_of_bodies_on_springs_are_the_same(model):
+    system = assembly.assemble(model, model.values())
+    ours = KernelSystem(model, system.n - len(system.loops))
+    ours.assemble(model.values())
+    placed = kernel().with_bodies_placed(ours.structure)
+    assert placed.placed_count == len(statics.with_bodies_placed(system).placed)
+    shape, q, _ = equilibrium_of(system)
+    expected, balanced = statics.resting(system)
+    found = ctypes.c_bool()
+    kernel().resting(ours.structure, shape, ctypes.addressof(found))
+    assert found.value == balanced
+    assert_same(q, expected.q, 1e-9, scale=1.0)
+    ours.close()
 
 
 @twin(release_velocity=statics.release_velocity)
@@ -1317,7 +1372,7 @@ class KernelEquations:
         """Set the accelerations and multipliers of the evaluation, and return them as one."""
         for address, x in ((self.evaluation.a, a), (self.evaluation.lam, lam)):
             ctypes.memmove(address, np.ascontiguousarray(x).ctypes.data, 8 * len(x))
-        return dynamics.Evaluation(a, lam, None, None)
+        return dynamics.Evaluation(a, lam, None, None, None)
 
     def rate(self, t, y):
         """Return the rates of a state at a time."""

@@ -27,7 +27,7 @@ def test_the_amplitude_falls_to_the_inverse_of_e_in_the_decay_time(law):
     """The peaks of the motion of the 1R guide, which has one mode."""
     changes = {"damping.zeta": 0.0, "damping.beta": 0.0} | law
     system, one = found("PRBDM", **changes)
-    (_,), (time,) = damping(system, one)
+    (_,), (time,) = damping(system, one, system.q0)
     period = 1.0 / float(one.frequency[0])
     whole = round(time / period) * period
     result = simulate(load("PRBDM"), SMALL | changes, stop_time=1.2 * whole, step=period / 200)
@@ -39,7 +39,7 @@ def test_the_amplitude_falls_to_the_inverse_of_e_in_the_decay_time(law):
 def test_the_slower_of_two_motions_counts_above_the_critical_damping():
     changes = {"damping.zeta": 2.0, "damping.beta": 0.0}
     system, one = found("PRBDM", **changes)
-    (ratio,), (time,) = damping(system, one)
+    (ratio,), (time,) = damping(system, one, system.q0)
     assert ratio == pytest.approx(2.0)
     result = simulate(load("PRBDM"), SMALL | changes, stop_time=4 * time, step=time)
     assert result["shuttle.x"][3] / result["shuttle.x"][2] == pytest.approx(1 / math.e, rel=1e-3)
@@ -49,7 +49,7 @@ def test_the_ratios_are_those_of_uncoupled_oscillators():
     """With damping by M or by K alone; the times are those of the roots of the oscillators."""
     for zeta, beta in ((0.01, 0.0), (0.0, 1e-6)):
         system, several = found("PRBDM2R", **{"damping.zeta": zeta, "damping.beta": beta})
-        ratios, times = damping(system, several)
+        ratios, times = damping(system, several, system.q0)
         omega = 2 * math.pi * several.frequency
         # Without loads, K of the springs is the tangent stiffness: the modes are uncoupled.
         expected = zeta * omega[0] / omega + beta * omega / 2
@@ -61,7 +61,7 @@ def test_the_ratios_are_those_of_uncoupled_oscillators():
 
 def test_modes_without_damping_do_not_decay():
     system, one = found("PRBDM", **{"damping.zeta": 0.0, "damping.beta": 0.0})
-    ratios, times = damping(system, one)
+    ratios, times = damping(system, one, system.q0)
     assert (ratios[0], times[0]) == (0.0, math.inf)
 
 
@@ -69,4 +69,4 @@ def test_unstable_modes_have_no_decay_time():
     system, one = found("PRBDM", **{"flexure.K_theta": 1.0, "gravity.y": -400.0})
     unstable = one.frequency < 0.0
     assert unstable.any()
-    assert np.isnan(np.array(damping(system, one))[:, unstable]).all()
+    assert np.isnan(np.array(damping(system, one, system.q0))[:, unstable]).all()

@@ -205,15 +205,17 @@ def test_slow_loading_ends_at_the_largest_load_that_can_be_carried(monkeypatch):
     for limit in (1.0, *near, *rng.uniform(size=200)):
         tried, slope = [], rng.uniform(0.6, 3.0)
 
-        def carried(system, held, load, start, limit=limit, slope=slope, tried=tried):
-            share = load[1]
+        def carried(system, given, start, limit=limit, slope=slope, tried=tried):
+            share = given.share
             tried.append(share)
             assert len(tried) <= 4.0 / STATICS_LOAD_STEP_MIN, "the loading does not end"
             return np.full(system.n, slope * share) if share <= limit else None
 
         monkeypatch.setattr(statics, "_newton", carried)
         start = np.zeros(system.n)
-        _, done = statics._follow(system, lambda share: (None, None, share), start)
+        _, done = statics._follow(
+            system, lambda share: statics._Given(None, None, None, share), start
+        )
         assert limit - 1.001 * STATICS_LOAD_STEP_MIN <= done <= limit
         assert done < 1.0 or limit == 1.0
         assert max(tried) <= 1.0

@@ -13,6 +13,7 @@ from prbm.mechanism.parts import (
     Joint,
     Probe,
     Release,
+    Spring,
     Stop,
 )
 from support import mechanism
@@ -107,6 +108,10 @@ def elastic():
         joints=(
             Joint("hinge", "stage.hinge", "lever.pin", stiffness="L/40"),
             Joint("hook", "pendulum.pin", "stage.hook"),
+        ),
+        springs=(
+            Spring("coil", "stage.right", "hammer.root", "500*L", "1.75*L", 2e4, 0.03),
+            Spring("cord", "pendulum.pin", "ground.far", 15.0, damping="L/2"),
         ),
         stops=(
             Stop("knock", "hammer", (0.035, "L + 0.055"), 5.0, 2e-3, "L/20", 0.7, 0.2, on="stage"),

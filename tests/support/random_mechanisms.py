@@ -37,6 +37,7 @@ from prbm.mechanism.parts import (
     Joint,
     Probe,
     Release,
+    Spring,
     Stop,
 )
 
@@ -133,11 +134,13 @@ def build(
     friction: bool = True,
     damping: bool = True,
     free: bool = False,
+    springs: int = 0,
 ) -> Mechanism:
     """Return a mechanism, which may be over-constrained.
 
-    ``bodies``, ``loops`` and ``stops`` are the largest numbers of these parts.  With ``free``, one
-    or two more bodies fly freely, alone or connected to each other.
+    ``bodies``, ``loops``, ``stops`` and ``springs`` are the largest numbers of these parts.  With
+    ``free``, one or two more bodies fly freely, alone or connected to each other, unless springs
+    hold them.
     """
     b = _Builder(choose, rng)
     for _ in range(choose((1, 2, 3))):
@@ -179,6 +182,7 @@ def build(
     probes = [Probe("probe", f"{names[-1]}.p0")]
     aimed = [(stop.body, stop.direction) for stop in walls]
     body, direction = choose((*aimed, *aimed, (choose(names), choose(directions))))
+    coils = [_spring(b, i, names) for i in range(choose(range(1, springs + 1)) if springs else 0)]
     gravity = choose(((0.0, 0.0), (0.0, -1.0), (0.3, 0.4)))
     return Mechanism(
         name="Random",
@@ -191,6 +195,7 @@ def build(
         flexure_types=tuple(b.types),
         flexures=tuple(b.flexures),
         joints=tuple(b.joints),
+        springs=tuple(coils),
         stops=tuple(walls),
         frictions=tuple(rubs),
         forces=tuple(pushes),
@@ -200,6 +205,19 @@ def build(
         damping_zeta=choose((0.0, 0.02)) if damping and not free else 0.0,
         damping_beta=choose((0.0, 1e-5)) if damping else 0.0,
     )
+
+
+def _spring(b: _Builder, i: int, names: list[str]) -> Spring:
+    """Return a soft spring between two bodies, or a body and the ground, with pretension or not."""
+    body = b.choose(names)
+    other = b.choose([GROUND, *(name for name in names if name != body)])
+    end = b.near(body)
+    start = end + b.disc(CELL) if other == GROUND else b.near(other)
+    free = b.choose((None, b.real(0.95, 1.05) * abs(end - start)))
+    return Spring(
+        f"coil{i}", b.point(other, start), b.point(body, end), b.real(5.0, 40.0), free,
+        b.choose((0.0, b.real(1e3, 1e5))), b.choose((0.0, b.real(0.01, 0.2))),
+    )  # fmt: skip
 
 
 def _add_free_bodies(b: _Builder) -> list[str]:

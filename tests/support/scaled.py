@@ -85,7 +85,7 @@ class Units:
     def mechanism(self, given: Mechanism) -> Mechanism:
         """Return a mechanism in the new units; parameters must be unbounded."""
         known = {p.name: p.unit for p in given.parameters}
-        kinds = ("bodies", "flexure_types", "stops", "frictions", "forces")
+        kinds = ("bodies", "flexure_types", "joints", "springs", "stops", "frictions", "forces")
         changed = {
             kind: tuple(self._part(part, known) for part in getattr(given, kind)) for kind in kinds
         }

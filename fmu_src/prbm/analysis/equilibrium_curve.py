@@ -14,9 +14,9 @@ from ..base.errors import SimulationError
 from ..base.tolerances import STATICS_CONSTRAINT_RTOL
 from ..mechanics import constraints
 from ..mechanics.arrays import Complex, Real
-from ..mechanics.forces import springs
+from ..mechanics.elements import Elements
 from ..mechanics.modal import modes, moved_by, unstable_directions
-from ..mechanics.statics import Equilibrium, balance_matrix, load_row
+from ..mechanics.statics import Equilibrium, balance_matrix, load_row, pin_idle
 from ..mechanics.system import System
 
 NEWTON_MAX = 8  # Iterations of a correction.
@@ -123,6 +123,7 @@ class EquilibriumCurve:
         kkt = balance_matrix(system, shape, held=False)
         stiff = kkt[:n, :n]  # Round-off would determine the scale of a motion without springs.
         stiff[np.abs(stiff) < ROUND_OFF_RTOL * np.abs(stiff).max()] = 0.0
+        pin_idle(system, kkt)
         loads, by_share = (
             system.Phi.pull((w * e).real) + moment
             for w, moment in (
@@ -130,7 +131,7 @@ class EquilibriumCurve:
                 (self.loads[1], self.moments[1]),
             )
         )
-        torque = springs(system.K, shape.q - system.q0) + loads + shape.lam @ kkt[n:, :n]
+        torque = Elements(system).force(shape.q, e) + loads + shape.lam @ kkt[n:, :n]
         open_by = system.loop_rows.values(e)
         column = np.concatenate([-by_share, np.zeros(len(open_by))])
         return kkt, column, np.concatenate([torque, -open_by])

@@ -27,6 +27,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..base.errors import EquilibriumError, SimulationError
+from ..mechanics.elements import Elements
 from ..mechanics.statics import Equilibrium, equilibrium
 from ..mechanics.system import System
 from .equilibrium_curve import RATE_RTOL, EquilibriumCurve, LoadPath, PathPoint, state_of
@@ -181,7 +182,7 @@ def _held_start(system: System, begin: Equilibrium) -> tuple[EquilibriumCurve, f
 
     A small change of the displacement changes the share as much as the coordinates.
     """
-    n, springs = system.n, system.K.diagonal()
+    n, springs = system.n, Elements(system).drawn.diagonal()
     acting = springs[springs > 0.0]
     softest = float(acting.min()) if len(acting) else float(np.abs(begin.load).max(initial=0.0))
     unit = (softest or 1.0) / system.length

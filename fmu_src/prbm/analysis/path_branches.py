@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from ..mechanics.arrays import Real
-from ..mechanics.forces import elastic_energy
+from ..mechanics.elements import Elements
 from .equilibrium_curve import EquilibriumCurve, LoadPath, PathPoint, state_of
 from .path_following import BIFURCATION, Range, followed
 
@@ -129,8 +129,9 @@ def _alike(
     curve: EquilibriumCurve, point: PathPoint, other: PathPoint, rtol: float = MIRROR_RTOL
 ) -> bool:
     """Return whether two points have the same load and elastic energy, as mirror images have."""
+    system = curve.system
     first, second = (
-        elastic_energy(curve.system.K, x.shape.q - curve.system.rest) for x in (point, other)
+        Elements(system).energy(x.shape.q, system.directions(x.shape.q)) for x in (point, other)
     )
     same = math.isclose(first, second, rel_tol=rtol)
     return same and math.isclose(point.share, other.share, rel_tol=rtol)

@@ -85,6 +85,11 @@ WALL_MOBILITY_MAX = 1e100  # 1/kg; larger mobilities lose impulses to underflow.
 EVENTS_AT_ONCE_MAX = 16  # Events of one contact at one time in model exchange.
 IMPACT_COUNT_MAX = 2147483647  # Largest Integer of FMI.
 
+# --- springs -----------------------------------------------------------------------------------
+SPRING_LENGTH_RTOL = 1e-9  # Of the size: length of a spring whose ends coincide.
+SPRING_APART_RTOL = 1e-6  # Of the size: smallest distance of the ends of a spring as drawn.
+SPRING_IDLE_RTOL = 1e-9  # Of the stiffest: that of a body on springs in directions without any.
+
 # --- compliant stops ---------------------------------------------------------------------------
 DAMPING_ELASTIC_MIN = 0.9999  # Restitution above which the first term of a series is exact.
 DAMPING_PLASTIC_MAX = 0.03  # Restitution below which the factor of the damping is 1/e.

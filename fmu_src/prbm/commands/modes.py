@@ -36,14 +36,14 @@ def frequencies(options: argparse.Namespace) -> None:
     if not len(found.frequency):
         raise UserMistake(
             f"{mechanism.name} has no modes: all bodies fly freely; connect them to the ground by "
-            "flexures or joints, or simulate the motion"
+            "flexures, joints or springs, or simulate the motion"
         )
     count = min(options.count, len(found.frequency))
     motions = [(body.name, m) for body in mechanism.bodies for m in ("x", "y", "turning")]
     e = system.directions(shape.q)
     shares = np.array([_shares(system, e, found.shape[:, k]) for k in range(count)])
     print(_where(system, shape, at, loads))
-    ratios, times = damping(system, found)
+    ratios, times = damping(system, found, shape.q)
     head = [
         "mode",
         "frequency",

@@ -49,6 +49,7 @@ STYLES = {
     "straight": Style(0.0, GHOST),
     "leaf": Style(3.0, STEEL, 2.2),
     "leaf thin": Style(3.0, STEEL, 1.5),
+    "spring": Style(3.1, STEEL, 0.9),
     "profile": Style(1.0, STEEL, fill=BODY),
     "body": Style(2.0, STEEL, fill=BODY),
     "centre": Style(4.0, STEEL, fill=STEEL, diameter=3.5),
@@ -159,13 +160,15 @@ def _faint_parts(shapes: Shapes) -> Iterator[Part]:
 
 
 def _parts(shapes: Shapes, E: Complex) -> Iterator[Part]:
-    """Yield flexures, bodies and pins in a shape."""
+    """Yield flexures, springs, bodies and pins in a shape."""
     leaf = "leaf thin" if len(shapes.flexures) >= THIN_LINES_MIN else "leaf"
     for line in shapes.flexures:
         if line.shaped:
             yield Area("profile", [line.edge(E)])
         else:
             yield Line(leaf, line.centre_line(E))
+    for spring in shapes.springs(E):
+        yield Line("spring", spring)
     for name in shapes.bodies:
         yield Area("body", shapes.areas(name, E))
         yield Dots("centre", np.array([shapes.centre(name, E)]))

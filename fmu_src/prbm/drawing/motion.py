@@ -91,4 +91,4 @@ def angles(system: System) -> dict[str, int]:
     They are angles, and displacements of free bodies: the outputs have the units ``system.units``.
     """
     bodies = (frame.j for frame in system.bodies.values())
-    return {system.variables[j][0]: j for j in (*system.links, *bodies, *system.placed)}
+    return {system.variables[j][0]: j for j in (*system.links, *bodies, *system.floating)}

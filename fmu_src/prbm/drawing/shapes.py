@@ -26,6 +26,9 @@ INSIDE_RTOL = 1e-9  # A point that is nearer to a side of a hull counts as outsi
 GROUND_SHARE_MAX = 0.4  # Longest ground at the end of a flexure, as a share of its length,
 GROUND_THICKNESSES_MIN = 1.3  # unless the flexure is thick: shortest ground over its thickness.
 STROKES = 6  # Strokes of the hatching.
+SPRING_WIDTH = 0.05  # Of the size: width of the zigzag of a spring.
+COILS = 6  # Corners of this zigzag on each side.
+COILED = 0.7  # Share of the length of a spring that is coiled.
 INCLINED_AREA_MAX = 0.4  # An inclined box must be smaller than this share of the upright box.
 
 
@@ -77,6 +80,24 @@ def hatched(point: complex, into: complex, size: float) -> Complex:
         z = point + along * ((k + 0.5) / STROKES - 0.5)
         parts += [z, z + (into * size - along) * 0.6 / STROKES, complex(np.nan, np.nan)]
     return np.array(parts)
+
+
+def zigzag(start: complex, end: complex, width: float) -> Complex:
+    """Return the line of a coil spring between two points.
+
+    Examples
+    --------
+    >>> z = zigzag(0j, 1.0 + 0j, 0.1)
+    >>> complex(z[0]), complex(z[-1]), round(float(np.ptp(z.imag)), 3)
+    (0j, (1+0j), 0.1)
+    """
+    along = end - start
+    across = 0.5j * width * along / (abs(along) or 1.0)
+    shares = 0.5 + COILED * (np.linspace(0.0, 1.0, 2 * COILS + 2) - 0.5)
+    sides = np.resize([1.0, -1.0], 2 * COILS + 2)
+    sides[[0, -1]] = 0.0
+    coils: Complex = start + shares * along + sides * across
+    return np.concatenate([[start], coils, [end]])
 
 
 def hull(points: Complex) -> Complex:
@@ -232,6 +253,7 @@ class Shapes:
         self.straight = self.arms(system.q0)
         self.flexures = [self._flexure(o) for o in system.outlines if o.kind == "flexure"]
         self.joints = [o for o in system.outlines if o.kind == "joint"]
+        self.coils = [o for o in system.outlines if o.kind == "spring"]
         self.hits = [self._hit(stop) for stop in system.mechanism.stops]
         self.bodies = {name: self._body(name) for name in system.bodies}
         self.holes = {name: self._holes(name) for name in system.bodies}
@@ -354,7 +376,7 @@ class Shapes:
         return min(self.size, 2.0 * float(np.abs(self.bodies[stop.on]).max()))
 
     def ground(self) -> list[Complex]:
-        """Return the hatched lines where flexures and joints are fixed to the ground."""
+        """Return the hatched lines where flexures, joints and springs are fixed to the ground."""
         lines = []
         for line in self.flexures:
             z = corners(line.outline, self.straight)
@@ -376,7 +398,19 @@ class Shapes:
             for o in self.joints
             if o.name in grounded
         ]
+        for spring, outline in zip(self.system.mechanism.springs, self.coils, strict=True):
+            z = corners(outline, self.straight)
+            along = (z[1] - z[0]) / abs(z[1] - z[0])
+            for end, point, into in ((spring.start, z[0], -along), (spring.end, z[1], along)):
+                if body_of(end) == GROUND:
+                    length = GROUND_LENGTH * self.size / 2
+                    lines.append(hatched(complex(point), complex(into), length))
         return lines
+
+    def springs(self, E: Complex) -> list[Complex]:
+        """Return the lines of the springs in a shape [m]."""
+        ends = [corners(outline, E) for outline in self.coils]
+        return [zigzag(complex(a), complex(b), SPRING_WIDTH * self.size) for a, b in ends]
 
     def pins(self, E: Complex) -> Complex:
         """Return the positions of joints and of pinned ends of flexures in a shape [m]."""

@@ -1,4 +1,4 @@
-"""Mirror images and repeated copies of bodies, flexures and joints as ordinary parts.
+"""Mirror images and repeated copies of bodies, flexures, joints and springs as ordinary parts.
 
 A copy is attached to the image of the body to which the original is attached, or to the same body
 if there is no image.  The points of the copy are created unless they are defined.
@@ -14,7 +14,7 @@ import numpy as np
 
 from ..base.errors import MechanismError
 from ..mechanism.expressions import affine
-from ..mechanism.parts import FIELDS, GROUND, Body, Flexure, FlexureType, Joint, Point
+from ..mechanism.parts import FIELDS, GROUND, Body, Flexure, FlexureType, Joint, Point, Spring
 from .images import SAME_ATOL, SAME_RTOL, Image, Line, displaced, rotated, same, written
 
 COPIES_MAX = 10_000  # Copies in one file.
@@ -24,7 +24,7 @@ SUBJECT_WORDS = 2  # The subject of a message is among its first words: flexure 
 _NAME = re.compile(r"[\w\[\]]+(?:\.[\w\[\]]+)*")
 
 Chain = tuple[Image, ...]
-Connection = TypeVar("Connection", Flexure, Joint)
+Connection = TypeVar("Connection", Flexure, Joint, Spring)
 
 
 class Repeat(Protocol):
@@ -166,7 +166,7 @@ class Drawing:
     def connections(
         self, tables: Sequence[Copied], parts: Sequence[Connection]
     ) -> Iterator[Connection]:
-        """Yield flexures or joints, each followed by its copies.
+        """Yield flexures, joints or springs, each followed by its copies.
 
         Raises
         ------

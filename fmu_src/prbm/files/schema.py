@@ -5,7 +5,6 @@ material instead of a type, several types may share a material, points may be gi
 quantities may have units.
 """
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Annotated, Any
@@ -23,11 +22,9 @@ from pydantic import (
 from ..base.errors import MechanismError, PrbmError
 from ..base.names import unknown
 from ..hybrid.rest_speed import with_rest_speeds
-from ..mechanics.collection import Collection
-from ..mechanics.flexures import check_drawn
 from ..mechanism import parameters, parts
 from ..mechanism.description import RESERVED, Mechanism, undefined
-from ..mechanism.expressions import Quantity, affine
+from ..mechanism.expressions import Quantity
 from ..mechanism.flexure import (
     CLAMP,
     HINGE_ORDER_DEFAULT,
@@ -49,6 +46,7 @@ from .copies import (
     mirrored_types,
     origins,
 )
+from .drawn import check_drawing
 from .outlines import mean, plate
 from .settings import has_unit, is_tolerance, tolerance
 from .tables import STRENGTHS, MaterialTable, Named, ParameterTable, RepeatTable, Table
@@ -236,6 +234,21 @@ class JointTable(Named):
     repeat: RepeatTable | None = _repeat()
 
 
+class SpringTable(Named):
+    """A coil spring and a damper between two points."""
+
+    start: Reference = Field(description="First end, body.point or ground.point")
+    end: Reference = Field(description="Second end, body.point or ground.point")
+    stiffness: Annotated[Quantity, measured(parts.Spring, "stiffness")]
+    free_length: Annotated[Quantity, measured(parts.Spring, "free_length")] | None = None
+    cubic_stiffness: Annotated[Quantity, measured(parts.Spring, "cubic_stiffness")] = (
+        parts.Spring.cubic_stiffness
+    )
+    damping: Annotated[Quantity, measured(parts.Spring, "damping")] = parts.Spring.damping
+    mirror: LineOrLines = _mirror()
+    repeat: RepeatTable | None = _repeat()
+
+
 class StopTable(Named):
     """A contact of a point of a body with a wall, which is fixed to the ground or another body."""
 
@@ -347,6 +360,7 @@ class MechanismTable(Table):
     )
     flexures: tuple[FlexureTable, ...] = Field((), description="Flexures")
     joints: tuple[JointTable, ...] = Field((), description="Pins")
+    springs: tuple[SpringTable, ...] = Field((), description="Springs and dampers")
     stops: tuple[StopTable, ...] = Field((), description="Walls")
     frictions: tuple[FrictionTable, ...] = Field((), description="Coulomb friction")
     forces: tuple[ForceTable, ...] = Field((), description="Forces that are inputs of the FMU")
@@ -381,13 +395,14 @@ def mechanism(file: MechanismTable, drawing: str = "") -> Mechanism:
     own = (flexure for flexure in file.flexures if flexure.type is None)
     types = [_type(table, materials) for table in (*file.flexure_types, *own)]
     joints = tuple(drawn.connections(file.joints, [*map(_joint, file.joints)]))
+    springs = tuple(drawn.connections(file.springs, [*map(_spring, file.springs)]))
     connected = mirrored_types(file.flexures, flexures, types)
     try:
-        result = _assembled(file, drawn, connected, joints, drawing)
+        result = _assembled(file, drawn, connected, (joints, springs), drawing)
         result = replace(result, tolerances=_tolerances(file.tolerances, result))
         if misshapen:  # Raised after an undefined name in an outline, which may be its cause.
             raise misshapen[0]
-        _check_drawn(result)
+        check_drawing(result)
     except PrbmError as error:
         made_by = origins(_with_copies(file)) | drawn.made_by
         raise type(error)(explained(str(error), made_by)) from None
@@ -398,10 +413,10 @@ def _assembled(
     file: MechanismTable,
     drawn: Drawing,
     connected: tuple[tuple[parts.Flexure, ...], tuple[parts.FlexureType, ...]],
-    joints: tuple[parts.Joint, ...],
+    others: tuple[tuple[parts.Joint, ...], tuple[parts.Spring, ...]],
     drawing: str,
 ) -> Mechanism:
-    """Return the mechanism of a file, whose bodies, flexures and joints include the copies."""
+    """Return the mechanism of a file, whose bodies and connections include the copies."""
     points = {body.name: body.points for body in drawn.bodies}
     same = ("name", "title", "description", "gravity", "damping_zeta", "damping_beta")
     return Mechanism(
@@ -410,7 +425,8 @@ def _assembled(
         bodies=drawn.bodies,
         flexures=connected[0],
         flexure_types=connected[1],
-        joints=joints,
+        joints=others[0],
+        springs=others[1],
         stops=tuple(_stop(stop, points) for stop in file.stops),
         frictions=tuple(parts.Friction(**_attached(part, points)) for part in file.frictions),
         forces=tuple(parts.Force(**_attached(force, points)) for force in file.forces),
@@ -479,7 +495,15 @@ def _materials(file: MechanismTable) -> dict[str, dict[str, Any]]:
 def _check_names(file: MechanismTable) -> None:
     """Reject a name of two parts of one kind, or of a material and any other part."""
     parts: tuple[tuple[Named, ...], ...] = (file.bodies, file.flexure_types, file.flexures)
-    parts = (*parts, file.joints, file.stops, file.frictions, file.forces, file.probes)
+    parts = (
+        *parts,
+        file.joints,
+        file.springs,
+        file.stops,
+        file.frictions,
+        file.forces,
+        file.probes,
+    )
     reserved = {*RESERVED}
     for kind in (file.materials, *parts):
         seen = set(reserved)
@@ -496,7 +520,7 @@ def _check_names(file: MechanismTable) -> None:
 
 def _with_copies(file: MechanismTable) -> tuple[Copied, ...]:
     """Return the tables of parts that may have copies."""
-    return (*file.bodies, *file.flexures, *file.joints)
+    return (*file.bodies, *file.flexures, *file.joints, *file.springs)
 
 
 def _referred(material: MaterialTable, key: str) -> Quantity:
@@ -621,6 +645,12 @@ def _joint(table: JointTable) -> parts.Joint:
     return parts.Joint(table.name, table.start, table.end, table.stiffness)
 
 
+def _spring(table: SpringTable) -> parts.Spring:
+    """Return the spring of a table."""
+    given = dict(table)
+    return parts.Spring(**{key: given[key] for key in given if key not in ("mirror", "repeat")})
+
+
 def _flexure(table: FlexureTable) -> parts.Flexure:
     """Return the flexure of a table; without a type, its type has the name of the flexure."""
     own = [key for key in _OWN if key in table.model_fields_set]
@@ -666,35 +696,3 @@ def _attached(
             )
         given["point"] = points[name]
     return given
-
-
-def _check_drawn(mechanism: Mechanism) -> None:
-    """Reject a mechanism that cannot be drawn, or has expressions out of bounds, by default."""
-    values = mechanism.values()
-    for name, point in _places(mechanism):
-        x, y = (affine(coordinate)(values) for coordinate in point)
-        if not math.hypot(x, y) <= LENGTH_MAX:
-            raise MechanismError(
-                f"{name} is drawn at ({x:g} m, {y:g} m): draw the mechanism within "
-                f"{LENGTH_MAX:g} m of the origin"
-            )
-    types = {kind.name: kind for kind in mechanism.flexure_types}
-    drawn = Collection(mechanism, values)
-    for flexure in mechanism.flexures:
-        check_drawn(drawn, flexure, types[flexure.type])
-    for joint in mechanism.joints:
-        apart = abs(drawn.end(joint, joint.end) - drawn.end(joint, joint.start))
-        if apart > LENGTH_MIN:
-            raise MechanismError(
-                f"joint {joint.name}: {joint.start} and {joint.end} are drawn {apart:g} m apart; "
-                "draw them at the same position"
-            )
-
-
-def _places(mechanism: Mechanism) -> Iterator[tuple[str, parts.Point]]:
-    """Yield the names and coordinates of all drawn points."""
-    yield from ((f"{GROUND}.{name}", point) for name, point in mechanism.ground.items())
-    for body in mechanism.bodies:
-        yield f"{body.name}.centre", body.centre
-        yield from ((f"{body.name}.{name}", point) for name, point in body.points.items())
-        yield from ((f"{body.name}.outline", corner) for corner in body.outline)

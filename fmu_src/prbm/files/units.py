@@ -23,7 +23,7 @@ UNIT_LENGTH_MAX = 100  # characters
 EXPONENT_MAX = 20  # Exponent of a base unit; no quantity of mechanics has a larger one.
 COHERENT = (
     "m", "kg", "s", "rad", "N", "Pa", "kg/m3", "kg.m2", "N/m", "N.m", "m/s", "m/s2", "Hz", "rad/s",
-    "1/m", "N.m/rad",
+    "1/m", "N.m/rad", "N/m3", "N.s/m",
 )  # fmt: skip
 COMMON = {
     "m": {"m": 0, "cm": -2, "mm": -3, "um": -6, "µm": -6, "μm": -6, "nm": -9},

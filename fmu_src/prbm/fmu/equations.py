@@ -11,6 +11,10 @@ STRETCHING = (
 )
 
 
+SPRINGS = (
+    f"<p>The force of a spring is {inline('k x + k_3 x^3 + c dot(l)')}, positive in tension, with "
+    f"the elongation {inline('x = l - l_0')} of the distance {inline('l')} of its ends.</p>\n"
+)
 FLOATING = (
     "where a body that nothing connects to the ground has e = x + i y, its displacement, and its "
     "derivatives by x and y in place of i e, "
@@ -74,14 +78,14 @@ def equations(mechanism: Mechanism) -> str:
         f"<p>{BEAMS if beams else ''}With the absolute angles {inline('q')} of the links "
         f"{'and nodes ' if beams else ''}and {inline('e = exp(i q)')}, every point is "
         f"{inline('z = c + A e')}, {STRETCHING if stretches(mechanism) else ''}"
-        f"{FLOATING if mechanism.free_bodies else ''}and</p>\n"
+        f"{FLOATING if mechanism.floating_bodies else ''}and</p>\n"
         f"{motion}\n{mass}\n{formula(loads)}\n"
         "<p>The last row acts while a stop holds. "
         f"{inline('Phi(q) = 0')} are the loop constraints; positions and velocities are "
         "projected onto them. The gap "
         f"{inline('g')} has the rate {inline('dot(g) = G v + w')}, with {inline('w')} the velocity "
         f"of the wall.</p>\n{''.join(STOP_LAWS[law] for law in laws)}"
-        f"{_flexure_table(mechanism)}"
+        f"{SPRINGS if mechanism.springs else ''}{_flexure_table(mechanism)}"
         "<p>Energy balance: kinetic + elastic + gravitational + dissipated energy - work is "
         "constant, also across impacts.</p>"
     )

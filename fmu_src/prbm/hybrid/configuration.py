@@ -25,6 +25,7 @@ from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble, calculated
 from ..mechanics.contact_state import ContactState
 from ..mechanics.dynamics import Equations
+from ..mechanics.elements import Elements
 from ..mechanics.inputs import Inputs
 from ..mechanics.modal import fundamental_frequency, slow_rates
 from ..mechanics.system import System
@@ -44,8 +45,8 @@ class Scales:
         Fundamental angular frequency; if it is zero, the rate of a fall or of the initial motion
         (:func:`prbm.mechanics.modal.slow_rates`) [rad/s].
     energy : float
-        Torque of the stiffest torsion spring at one radian; without torsion springs, the largest
-        inertia times the square of the rate [J].
+        Torque of the stiffest element at one radian, or at a displacement of the size; without
+        elements, the largest inertia times the square of the rate [J].
     time : float
         Period of the motion [s].
 
@@ -66,7 +67,10 @@ class Scales:
         """Return the scales of a system with a fundamental angular frequency [rad/s], or 0."""
         arms = np.ones(system.d)
         arms[system.shifts] = arms[system.floats] = system.length
-        K, inertia = np.abs(system.K), float((np.abs(system.H) * np.outer(arms, arms)).max())
+        K, inertia = (
+            np.abs(Elements(system).drawn),
+            float((np.abs(system.H) * np.outer(arms, arms)).max()),
+        )
         turns = np.setdiff1d(np.arange(system.n), system.strains)
         rate, fast = (omega, omega) if omega else slow_rates(system)
         energy = float(K[np.ix_(turns, turns)].max()) or inertia * rate**2
@@ -152,7 +156,7 @@ class Magnitudes:
     @classmethod
     def of(cls, system: System, scales: Scales, y: Real) -> "Magnitudes":
         """Return the magnitudes of the motion that starts with the state y, (2 n + 2,)."""
-        n, K = system.n, system.K
+        n, K = system.n, Elements(system).drawn
         amplitude = y[:n] - system.q0 + y[n : 2 * n] / scales.rate
         turns = np.setdiff1d(np.arange(n), system.strains)
         angle = max(float(np.abs(amplitude[turns]).max()), NOMINAL_ANGLE_MIN)

@@ -56,12 +56,13 @@ def all_outputs(
     a, M, own = evaluation.a, evaluation.M, equations.compliant
     out: Outputs = {**motions(system, q, v, e)}
     out |= _stops(equations, t, y, e, evaluation)
+    out |= _springs(equations, e, v)
     force, moment = base_reaction(equations, q, v, a)
     out["base.force.x"], out["base.force.y"] = force.real, force.imag
     out["base.moment"] = moment
     out["energy.kinetic"] = kinetic_energy(M, v)
     contact_energy = own.energy(equations.gaps(t, e, extras)) if own.stops else 0.0
-    out["energy.elastic"] = forces.elastic_energy(system.K, q - system.rest) + contact_energy
+    out["energy.elastic"] = equations.elements.energy(q, e) + contact_energy
     out["energy.gravitational"] = forces.gravitational_energy(system, e)
     out["energy.dissipated"] = float(y[2 * n])
     out["energy.work"] = float(y[2 * n + 1])
@@ -115,6 +116,21 @@ def _stops(
         out[f"{stop.name}.point.displacement"] = -float(places[i]) - drawn
         out[f"{stop.name}.point.velocity"] = -float(speeds[i])
         out[f"{stop.name}.point.mobility"] = float(mobilities[i])
+    return out
+
+
+def _springs(equations: Equations, e: Complex, v: Real) -> dict[str, float]:
+    """Return the forces, lengths and rates of the springs."""
+    springs = equations.elements.springs
+    out: dict[str, float] = {}
+    if springs is None:
+        return out
+    now, rates = springs.state(e), springs.length_rates(e, v)
+    force = now.tension + springs.dampers * rates
+    for i, spring in enumerate(equations.system.mechanism.springs):
+        out[f"{spring.name}.force"] = float(force[i])
+        out[f"{spring.name}.length"] = float(now.length[i])
+        out[f"{spring.name}.length_rate"] = float(rates[i])
     return out
 
 

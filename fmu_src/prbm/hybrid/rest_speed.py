@@ -8,7 +8,7 @@ from ..base.errors import PrbmError
 from ..base.tolerances import REST_AMPLITUDE_RTOL, REST_SPEED_RTOL
 from ..mechanics.arrays import Real
 from ..mechanics.start import start_shape
-from ..mechanics.statics import equilibrium, release_velocity
+from ..mechanics.statics import release_velocity, resting
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import value
 from .configuration import Configuration
@@ -56,7 +56,7 @@ def of_stops(mechanism: Mechanism) -> list[float]:
         return system.gap_rows.values(system.directions(q))
 
     walls = np.array([value(stop, "position", values) for stop in mechanism.stops])
-    rest = gaps(equilibrium(system).q)
+    rest = gaps(resting(system)[0].q)
     swing, reach = np.abs(gaps(released) - rest), np.abs(rest + walls)
     amplitude = np.maximum(swing, np.where(reach <= scales.length, reach, 0.0))
     rates = np.abs(system.gap_rows.rates(system.directions(released), v))

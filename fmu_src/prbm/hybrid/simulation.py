@@ -332,7 +332,7 @@ class Simulation:
             self.k1 = equations.rate(front.time, front.y)
         step, controller = take_step(configuration, front, self.k1, self.controller, self.fastest)
         if step.h > STABLE_STEP_WATCH_FACTOR * self.fastest.longest_step(equations):
-            self.fastest = self.fastest.refined(equations, step.last.factors)
+            self.fastest = self.fastest.refined(equations, step.last)
         n, before = equations.n, last.start_before(step.h) if last else None
         arc = Arc(front.time, step.h, front.time + step.h, front.y, step.k, n, before)
         view = StepView(configuration.scales, equations, arc, step.forces)

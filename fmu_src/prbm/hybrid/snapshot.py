@@ -140,12 +140,12 @@ def event_of(plain: Any) -> Event | None:
 
 def plain_fastest(mode: FastestMode) -> Plain:
     """Return the fastest mode as plain values."""
-    return {"direction": mode.direction.tolist(), "rate": mode.rate}
+    return {"direction": mode.direction.tolist(), "rate": mode.rate, "decay": mode.decay}
 
 
 def fastest_of(plain: Mapping[str, Any]) -> FastestMode:
     """Return the fastest mode from plain values, the inverse of :func:`plain_fastest`."""
-    return FastestMode(np.array(plain["direction"]), plain["rate"])
+    return FastestMode(np.array(plain["direction"]), plain["rate"], plain["decay"])
 
 
 def plain_array(x: Real | None) -> list[float] | None:
@@ -324,7 +324,7 @@ def _conditions(found: Mapping[str, Any]) -> dict[str, bool]:
         "tolerance": TOLERANCE_MIN <= configuration.tolerance <= TOLERANCE_USED_MAX,
         "frequency": configuration.frequency >= 0.0,
         "step": configuration.step is None or configuration.step > 0.0,
-        "fastest": fastest.rate >= 0.0,
+        "fastest": fastest.rate >= 0.0 and fastest.decay >= 0.0,
         "arc": arc is None or (arc.h > 0.0 and arc.n == n and _before(arc) <= arc.start),
         "time": front.time >= found["time"],
     }

@@ -2,8 +2,9 @@
 
 A step is stable if its size times the rate of the fastest mode is below 4.4, with any damping of
 that mode.  In longer steps round-off grows until the error of the step reaches the tolerance.
-The mode is computed with the springs, the mass matrix and the active constraints; the stiffness
-from loads is neglected.
+The mode is computed with the elements, the mass matrix and the active constraints; the stiffness
+from loads, and negative ones, are neglected.  The damping of springs adds the sum of the rates at
+which each alone would stop a motion, which is at least the largest rate of all together.
 """
 
 import math
@@ -19,8 +20,8 @@ from ..base.tolerances import (
     STABLE_STEP_FACTOR,
 )
 from ..mechanics.arrays import Real
-from ..mechanics.constraints import Factors, solve_saddle
-from ..mechanics.dynamics import Equations
+from ..mechanics.constraints import solve_saddle
+from ..mechanics.dynamics import Equations, Evaluation
 
 
 @dataclass(frozen=True)
@@ -33,10 +34,13 @@ class FastestMode:
         Changes of the coordinates; the largest magnitude is 1 after an iteration.
     rate : float
         Angular frequency, from below [rad/s]; 0: not known, or there are no springs.
+    decay : float
+        Rate of the damping of springs, from above [1/s].
     """
 
     direction: Real
     rate: float = 0.0
+    decay: float = 0.0
 
     @classmethod
     def at(cls, equations: Equations, t: float, y: Real) -> "FastestMode":
@@ -48,37 +52,42 @@ class FastestMode:
             If the equations are singular.
         """
         n = equations.n
-        factors = equations.at(t, y).factors
+        evaluation = equations.at(t, y)
         mode = cls(1.0 / np.arange(1.0, n + 1.0))
         for _ in range(FASTEST_ITERATIONS_MAX):
-            last, mode = mode.rate, mode.refined(equations, factors)
+            last, mode = mode.rate, mode.refined(equations, evaluation)
             if not abs(mode.rate - last) > FASTEST_RATE_RTOL * max(mode.rate, last):
                 break
         return mode
 
-    def refined(self, equations: Equations, factors: Factors) -> "FastestMode":
+    def refined(self, equations: Equations, evaluation: Evaluation) -> "FastestMode":
         """Return the mode after one power iteration with the factors of an evaluation.
 
         The direction w becomes the accelerations by the torques K w, of which the rate is the
         Rayleigh quotient.
         """
-        torques = equations.system.K @ self.direction
+        n, elements, factors = equations.n, equations.elements, evaluation.factors
+        torques = elements.stiffness(evaluation.e) @ self.direction
         right = np.zeros(len(factors[0]))
-        right[: equations.n] = torques
-        x = solve_saddle(factors, right)[: equations.n]
+        right[:n] = torques
+        x = solve_saddle(factors, right)[:n]
         energy, response = float(self.direction @ torques), float(x @ torques)
         rate = math.sqrt(response / energy) if energy > 0.0 and response > 0.0 else 0.0
         longest = float(np.abs(x).max())
-        return FastestMode(x / longest if longest > 0.0 else self.direction, rate)
+        decay, C = 0.0, elements.viscous(evaluation.e)
+        if C is not None:
+            stopped = solve_saddle(factors, np.vstack([C, np.zeros((len(right) - n, n))]))
+            decay = max(float(np.trace(stopped[:n])), 0.0)
+        return FastestMode(x / longest if longest > 0.0 else self.direction, rate, decay)
 
     def longest_step(self, equations: Equations) -> float:
         """Return the longest stable step [s]; infinite without springs.
 
         The bound is ``STABLE_STEP_FACTOR`` over the magnitude of the larger root of
-        s^2 + (beta omega^2 + 2 zeta omega_1) s + omega^2 = 0.
+        s^2 + (beta omega^2 + 2 zeta omega_1 + decay) s + omega^2 = 0.
         """
         rate = self.rate
-        damping = equations.beta * (rate * rate) + equations.mass_damping
+        damping = equations.beta * (rate * rate) + equations.mass_damping + self.decay
         if damping > 2.0 * rate:
             rate = 0.5 * (damping + math.sqrt(damping * damping - 4.0 * (rate * rate)))
         return STABLE_STEP_FACTOR / rate if rate > 0.0 else math.inf

@@ -62,6 +62,9 @@ def dependencies(mechanism: Mechanism, interface: NativeInterface) -> Dependenci
         found |= {f"{stop}.point.{output}": shape for output in ("displacement", "mobility")}
         found[f"{stop}.point.velocity"] = moving
         found[f"{stop}.impact"] = moving + walls
+    for spring in (s.name for s in mechanism.springs):
+        found |= {f"{spring}.force": moving, f"{spring}.length": shape}
+        found[f"{spring}.length_rate"] = moving
     for stop in (s.name for s in mechanism.stops if s.compliant):
         found |= {f"{stop}.{output}": () for output in COMPLIANT_OUTPUTS}
     for flexure in (mechanism.flexures[i].name for i in stressed(mechanism)):

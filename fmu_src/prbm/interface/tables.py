@@ -29,6 +29,7 @@ from ..mechanism.parts import (
     Part,
     Point,
     Release,
+    Spring,
     body_of,
     field_of,
     fields_of,
@@ -44,13 +45,14 @@ from .variables import (
     LATCHED,
     PEAK_OUTPUTS,
     PROBE_OUTPUTS,
+    SPRING_OUTPUTS,
     STOP_OUTPUTS,
     STRESS_OUTPUTS,
     Variable,
 )
 
 FILE = "mechanism.bin"
-MAGIC, VERSION = b"PRBM", 9
+MAGIC, VERSION = b"PRBM", 10
 HEAD = 16  # Bytes before those that the checksum covers.
 DIMENSIONS = (
     "end_thickness", "end_width", "notch_radius", "notch_depth", "waist_length", "curvature",
@@ -63,13 +65,13 @@ COORDINATES_MAX = 512  # The mass matrix then has 2 MB.
 DIRECTIONS_MAX = 1024  # The mass matrix of the directions then has 16 MB.
 DIRECTION_MAP_MAX = 16384  # Changes of directions with coordinates.
 STOPS_MAX = 64  # Largest number of stops, and of friction points.
-PLACES_MAX = 1024  # Largest number of forces, and of probes.
+PLACES_MAX = 1024  # Largest number of forces, of probes, and of springs.
 GROUND_POINTS_MAX = 4096  # The kernel computes the distance of every pair of points.
 GROUND_NUMBER = 0  # Bodies are counted from 1.
 SLOT_GROUPS = (
-    "parameters", "inputs", "bodies", "stops", "base", "energies", "latched", "compliant", "links",
-    "stretches", "probes", "stresses", "frequency", "calculated", "derivatives", "indicators",
-    "time",
+    "parameters", "inputs", "bodies", "stops", "springs", "base", "energies", "latched",
+    "compliant", "links", "stretches", "probes", "stresses", "frequency", "calculated",
+    "derivatives", "indicators", "time",
 )  # fmt: skip
 """The groups of values in the order of the vector of all values."""
 FIXED_NAMES = ("gravity.x", "gravity.y", "solver.tolerance", "damping.zeta", "damping.beta")
@@ -126,6 +128,7 @@ def check_size(mechanism: Mechanism) -> None:
             np.count_nonzero(system.Phi.Phi),
             DIRECTION_MAP_MAX,
         ),
+        ("springs", len(m.springs), PLACES_MAX),
         ("stops", len(m.stops), STOPS_MAX),
         ("frictions", len(m.frictions), STOPS_MAX),
         ("forces", len(m.forces), PLACES_MAX),
@@ -164,6 +167,7 @@ def _groups(mechanism: Mechanism, independent: Sequence[int]) -> dict[str, Itera
         "inputs": input_names(mechanism),
         "bodies": [f"{body.name}.{output}" for body in mechanism.bodies for output in BODY_OUTPUTS],
         "stops": [f"{stop}.{output}" for stop in stops for output in STOP_OUTPUTS],
+        "springs": [f"{s.name}.{output}" for s in mechanism.springs for output in SPRING_OUTPUTS],
         "base": BASE_OUTPUTS,
         "energies": ENERGIES,
         "latched": [f"{stop}.{output}" for stop in stops for output in LATCHED],
@@ -250,7 +254,7 @@ class _Writer:
         yield from self._variables()
 
     def _members(self) -> Iterator[bytes]:
-        """Yield bodies, types of flexures, flexures and joints."""
+        """Yield bodies, types of flexures, flexures, joints and springs."""
         m = self.mechanism
         for body in m.bodies:
             yield _text(body.name) + self._fields(body) + self._point(body.centre)
@@ -262,6 +266,9 @@ class _Writer:
         for joint in m.joints:
             yield _text(joint.name) + self._between(joint)
             yield _u32(joint.stiffness is not None) + self._fields(joint)
+        for spring in m.springs:
+            yield _text(spring.name) + self._between(spring)
+            yield _u32(spring.free_length is not None) + self._fields(spring)
 
     def _contacts(self) -> Iterator[bytes]:
         """Yield stops, friction points, forces and probes."""
@@ -288,9 +295,9 @@ class _Writer:
     def _counts(self) -> tuple[int, ...]:
         m = self.mechanism
         parts: tuple[Mapping[str, object] | Sequence[object], ...] = (
-            self.parameters, m.bodies, m.flexure_types, m.flexures, m.joints, m.stops, m.frictions,
-            m.forces, m.probes, m.ground, self.bounds, self.variables, self.independent,
-            self.inputs,
+            self.parameters, m.bodies, m.flexure_types, m.flexures, m.joints, m.springs, m.stops,
+            m.frictions, m.forces, m.probes, m.ground, self.bounds, self.variables,
+            self.independent, self.inputs,
         )  # fmt: skip
         return tuple(map(len, parts))
 
@@ -338,7 +345,7 @@ class _Writer:
         numbers += _u32(PROFILES.index(kind.profile), given)
         return _text(kind.name) + numbers + self._fields(kind) + b"".join(coefficients)
 
-    def _between(self, part: Flexure | Joint) -> bytes:
+    def _between(self, part: Flexure | Joint | Spring) -> bytes:
         return b"".join(
             _u32(self.body[body_of(end)]) + self._point(self.mechanism.point(end, part.name))
             for end in (part.start, part.end)
@@ -353,8 +360,8 @@ class _Writer:
     def _bounds(self) -> Iterator[bytes]:
         """Yield the bounds of the fields that are expressions."""
         m = self.mechanism
-        parts: tuple[Part, ...] = (*m.flexure_types, *m.bodies, *m.joints, *m.frictions, *m.stops)
-        for part in (*parts, m.release):
+        parts: tuple[Part, ...] = (*m.flexure_types, *m.bodies, *m.joints, *m.springs)
+        for part in (*parts, *m.frictions, *m.stops, m.release):
             for name, (unit, _, minimum, maximum, *_) in fields_of(part).items():
                 quantity = _given(part, name)
                 if isinstance(quantity, str):

@@ -19,7 +19,7 @@ from ..mechanics.stress import stressed
 from ..mechanism.description import Mechanism
 from ..mechanism.expressions import affine
 from ..mechanism.parameters import Parameter
-from ..mechanism.parts import GROUND, Force, Stop
+from ..mechanism.parts import GROUND, Force, Spring, Stop
 from .units import QUANTITIES, Quantity
 
 Number = float | int | bool
@@ -33,6 +33,7 @@ PROBE_OUTPUTS = ("x", "y", "vx", "vy")
 STOP_OUTPUTS = (
     "gap", "gap_rate", "force", "point.displacement", "point.velocity", "point.mobility",
 )  # fmt: skip
+SPRING_OUTPUTS = ("force", "length", "length_rate")
 BASE_OUTPUTS = (f"{BASE}.force.x", f"{BASE}.force.y", f"{BASE}.moment")
 STORED = ("energy.dissipated", "energy.work")  # Energies that are integrated, hence states.
 ENERGIES = ("energy.kinetic", "energy.elastic", "energy.gravitational", *STORED)
@@ -280,8 +281,10 @@ def _variables(
     for stop in mechanism.stops:
         rigid = _stop(stop.name, nominal)
         yield from _of_compliant_stop(rigid, stop.name, nominal) if stop.compliant else rigid
+    for spring in mechanism.springs:
+        yield from _spring(spring, nominal)
     yield from _base(nominal)
-    yield from _energies(nominal)
+    yield from _energies(nominal, -math.inf if mechanism.springs else 0.0)
     yield from _flexures(sample, nominal)
     for i in stressed(mechanism):
         yield from _stress(mechanism.flexures[i].name, nominal)
@@ -491,6 +494,19 @@ def _stop(stop: str, nominal: Scales) -> Iterator[Variable]:
     yield last("impulse_sum", "N.s", "Sum of all impulses of the wall, including captures", 0.0)
 
 
+def _spring(spring: Spring, nominal: Scales) -> Iterator[Variable]:
+    name, ends = spring.name, f"{spring.start} and {spring.end}"
+    yield _output(
+        f"{name}.force", "N", f"Force of the spring and its damper between {ends}, positive in "
+        "tension", nominal,
+    )  # fmt: skip
+    yield _output(f"{name}.length", "m", f"Distance of {ends}", nominal, minimum=0.0)
+    yield _output(
+        f"{name}.length_rate", "m/s", f"Rate of the distance of {ends}", nominal,
+        derivative_of=f"{name}.length",
+    )  # fmt: skip
+
+
 COMPLIANT_DESCRIPTIONS = {
     "force": "Force of the wall on the body",
     "contact": "Whether the body touches the wall",
@@ -550,12 +566,13 @@ def _base(nominal: Scales) -> Iterator[Variable]:
     )  # fmt: skip
 
 
-def _energies(nominal: Scales) -> Iterator[Variable]:
+def _energies(nominal: Scales, least: float) -> Iterator[Variable]:
+    """Yield the energies; ``least`` is the lower bound of the elastic energy [J]."""
     yield _output("energy.kinetic", "J", "Kinetic energy", nominal, minimum=0.0)
     yield _output(
         "energy.elastic", "J",
-        "Elastic energy of the flexures and of compliant stops, 0 in the straight shape", nominal,
-        minimum=0.0,
+        "Elastic energy of flexures, joints, springs and compliant stops; 0 without a force",
+        nominal, minimum=least,
     )  # fmt: skip
     yield _output(
         "energy.gravitational", "J", "Potential energy of gravity, 0 in the straight shape", nominal

@@ -70,6 +70,9 @@ enum { EVENTS_MAX = 1000 };
 #define WALL_MOBILITY_MAX 1e+100
 enum { EVENTS_AT_ONCE_MAX = 16 };
 enum { IMPACT_COUNT_MAX = 2147483647 };
+#define SPRING_LENGTH_RTOL 1e-09
+#define SPRING_APART_RTOL 1e-06
+#define SPRING_IDLE_RTOL 1e-09
 #define DAMPING_ELASTIC_MIN 0.9999
 #define DAMPING_PLASTIC_MAX 0.03
 enum { DAMPING_BISECTIONS = 60 };
@@ -207,7 +210,7 @@ typedef enum {
 
 /* --- prbm.interface.tables ---------------------------------------------------------------------- */
 
-enum { TABLES_VERSION = 9 };
+enum { TABLES_VERSION = 10 };
 enum { TABLES_HEAD = 16 };
 enum { COORDINATES_MAX = 512 };
 enum { DIRECTIONS_MAX = 1024 };
@@ -221,20 +224,21 @@ typedef enum {
     SLOTS_INPUTS = 1,
     SLOTS_BODIES = 2,
     SLOTS_STOPS = 3,
-    SLOTS_BASE = 4,
-    SLOTS_ENERGIES = 5,
-    SLOTS_LATCHED = 6,
-    SLOTS_COMPLIANT = 7,
-    SLOTS_LINKS = 8,
-    SLOTS_STRETCHES = 9,
-    SLOTS_PROBES = 10,
-    SLOTS_STRESSES = 11,
-    SLOTS_FREQUENCY = 12,
-    SLOTS_CALCULATED = 13,
-    SLOTS_DERIVATIVES = 14,
-    SLOTS_INDICATORS = 15,
-    SLOTS_TIME = 16,
-    SLOTS_GROUPS = 17,
+    SLOTS_SPRINGS = 4,
+    SLOTS_BASE = 5,
+    SLOTS_ENERGIES = 6,
+    SLOTS_LATCHED = 7,
+    SLOTS_COMPLIANT = 8,
+    SLOTS_LINKS = 9,
+    SLOTS_STRETCHES = 10,
+    SLOTS_PROBES = 11,
+    SLOTS_STRESSES = 12,
+    SLOTS_FREQUENCY = 13,
+    SLOTS_CALCULATED = 14,
+    SLOTS_DERIVATIVES = 15,
+    SLOTS_INDICATORS = 16,
+    SLOTS_TIME = 17,
+    SLOTS_GROUPS = 18,
 } SlotGroup;
 typedef enum {
     REAL = 0,
@@ -290,6 +294,12 @@ typedef enum {
     STOP_POINT_MOBILITY = 5,
 } StopOutput;
 enum { PER_STOP = 6 };
+typedef enum {
+    SPRING_FORCE = 0,
+    SPRING_LENGTH = 1,
+    SPRING_LENGTH_RATE = 2,
+} SpringOutput;
+enum { PER_SPRING = 3 };
 typedef enum {
     BASE_FORCE_X = 0,
     BASE_FORCE_Y = 1,

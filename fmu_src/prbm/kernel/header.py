@@ -32,6 +32,7 @@ from ..interface.variables import (
     LINK_OUTPUTS,
     PEAK_OUTPUTS,
     PROBE_OUTPUTS,
+    SPRING_OUTPUTS,
     STOP_OUTPUTS,
     STRESS_OUTPUTS,
     STRETCH_OUTPUTS,
@@ -177,6 +178,7 @@ def _groups() -> Iterator[str]:
     for name, outputs in (
         ("BODY", BODY_OUTPUTS),
         ("STOP", STOP_OUTPUTS),
+        ("SPRING", SPRING_OUTPUTS),
         ("BASE", tuple(output.partition(".")[2] for output in BASE_OUTPUTS)),
         ("ENERGY", tuple(energy.partition(".")[2] for energy in ENERGIES)),
         ("LATCHED", LATCHED),

@@ -32,6 +32,7 @@
 #include "core/constraints.h"
 #include "core/factors.h"
 #include "core/forces.h"
+#include "core/elements.h"
 #include "core/contact_state.h"
 #include "core/compliance.h"
 #include "core/equations.h"

@@ -145,7 +145,7 @@ static void measure_motion(Simulation *sim) {
         angle = m->coordinates[j].strain < 0 ? greater(angle, fabs(amplitude[j])) : angle;
     }
     for (int j = 0; j < n; j++) {
-        energy += amplitude[j] * dot(n, system->K + j * n, amplitude) / 2.0;
+        energy += amplitude[j] * dot(n, system->stiffness + j * n, amplitude) / 2.0;
     }
     sim->state.angle = angle;
     sim->state.energy = greater(energy, scales->energy * (NOMINAL_ANGLE_MIN * NOMINAL_ANGLE_MIN));
@@ -158,7 +158,7 @@ static double typical_strain(const Simulation *sim) {
     double stiffest = 0.0;
     for (int j = 0; j < system->n; j++) {
         bool stretches = system->mechanism->coordinates[j].strain >= 0;
-        stiffest = stretches ? greater(stiffest, system->K[j * system->n + j]) : stiffest;
+        stiffest = stretches ? greater(stiffest, system->stiffness[j * system->n + j]) : stiffest;
     }
     return square_root(2.0 * NOMINAL_STRAIN_FACTOR * sim->state.energy / stiffest);
 }

@@ -5,6 +5,7 @@
 #include "hybrid/present.h"
 #include "dependents.h"
 #include "tangent_contact.h"
+#include "tangent_elements.h"
 #include "tangent_indicators.h"
 #include "tangent_rows.h"
 #include "tangent_stress.h"
@@ -148,18 +149,6 @@ static void arm_load_change(const Tangent *t, const Complex *dw, const double *d
             load.re += dmoment[j] - eq->mass_damping * eq->system->J[j] * t->dw[j].re;
             Complex lost = scaled(-eq->mass_damping, momentum_change(t, j));
             t->pull[j] = plus(plus(load, inertial_change(t, j)), lost);
-        }
-    }
-}
-
-/* Add the change of the loads of the springs and their damping. */
-static void spring_change(const Tangent *t) {
-    const Equations *eq = t->eq;
-    const System *system = eq->system;
-    int n = system->n;
-    for (int i = 0; i < n; i++) {
-        for (int j = 0; j < n; j++) {
-            t->dx[i] -= system->K[i * n + j] * (t->dq[j] + eq->beta * t->dv[j]);
         }
     }
 }
@@ -324,16 +313,11 @@ static double kinetic_change(const Tangent *t) {
 
 static void energy_changes(const Tangent *t, const double *dx, double *out) {
     const System *system = t->eq->system;
-    int n = system->n, count = system->mechanism->independent_count;
+    int count = system->mechanism->independent_count;
     out[ENERGY_KINETIC] = kinetic_change(t);
-    for (int i = 0; i < n; i++) {
-        for (int j = 0; j < n; j++) {
-            out[ENERGY_ELASTIC] += (t->y[i] - system->rest[i]) * system->K[i * n + j] * t->dq[j];
-        }
-    }
     Complex moved = along_arms(system->d, system->S, t->dE);
     out[ENERGY_GRAVITATIONAL] = -product(conjugate(system->gravity), moved).re;
-    out[ENERGY_ELASTIC] += contact_energy_change(t);
+    out[ENERGY_ELASTIC] = element_energy_change(t) + contact_energy_change(t);
     out[ENERGY_DISSIPATED] = dx[2 * count];
     out[ENERGY_WORK] = dx[2 * count + 1];
 }
@@ -392,13 +376,7 @@ static double dissipation_change(const Tangent *t) {
     const Equations *eq = t->eq;
     const System *system = eq->system;
     Rows walls = slide_rows(system);
-    int n = system->n;
-    double sum = 2.0 * eq->mass_damping * kinetic_change(t);
-    for (int i = 0; i < n; i++) {
-        for (int j = 0; j < n; j++) {
-            sum += 2.0 * eq->beta * t->v[i] * system->K[i * n + j] * t->dv[j];
-        }
-    }
+    double sum = 2.0 * eq->mass_damping * kinetic_change(t) + element_loss_change(t);
     for (int k = eq->slipping_stops; k < eq->slipping_count; k++) {
         int contact = eq->slipping[k], i;
         Rows rows = tangential_rows(system, contact, &i);
@@ -451,6 +429,7 @@ static void all_changes(const Tangent *t, const double *dx, const Complex *dw,
     probe_changes(t, out + slots->probes);
     link_changes(t, out + slots->links, out + slots->stretches);
     stop_changes(t, out + slots->stops);
+    spring_changes(t, out + slots->springs);
     base_changes(t, out + slots->base);
     energy_changes(t, dx, out + slots->energies);
     stress_changes(t, out + slots->stresses);
@@ -516,7 +495,7 @@ PRBM bool exchange_directional(Simulation *simulation, const double *dx, const d
     if (ok) {
         load_row_change(&t, dw, dmoment);
         arm_load_change(&t, dw, dmoment);
-        spring_change(&t);
+        element_change(&t);
         pressure_changes(&t);
         rub_change(&t);
         row_change(&t);

@@ -4,6 +4,7 @@
 #include "core/sections.h"
 #include "core/vectors.h"
 #include "tangent_contact.h"
+#include "tangent_elements.h"
 #include "tangent_stress.h"
 
 /* Compute the changes of the loads of all mass points. */
@@ -91,6 +92,7 @@ static SectionState state_change(const Tangent *t) {
     }
     stop_pull_changes(t, change.on);
     pull_changes(t, change.on);
+    spring_pull_changes(t, change.on);
     transmit(system, t->dlam, &change);
     return change;
 }

@@ -179,6 +179,7 @@ class _Assembler(Collection):
             Phi=Phi,
             arm=arm,
             floats=np.array(self.floats, int),
+            floating=np.array(self.floating, int),
             placed=np.array(self.placed, int),
             H=spread.conj().T @ (m[:, None] * spread),
             J=np.array(self.J),
@@ -187,6 +188,7 @@ class _Assembler(Collection):
             c=np.array([place.c for place, _ in self.masses]),
             m=m,
             **self.loop_arrays(d),
+            **self.span_arrays(d),
             **self.stop_arrays(d, e0),
             **self.friction_arrays(d, e0),
             release=along_release,
@@ -206,10 +208,18 @@ class _Assembler(Collection):
 
     def loop_arrays(self, d: int) -> dict[str, Any]:
         """Return the rows of the loop closures and their constants."""
-        closures = [place for _, place in self.loops]
-        rows = np.array([r for p in closures for r in (p.row(d), -1j * p.row(d))])
-        constants = np.array([x for p in closures for x in (p.c.real, p.c.imag)])
-        return {"loops": rows.reshape(-1, d), "loops_c": constants}
+        rows, constants = components([place for _, place in self.loops], d)
+        return {"loops": rows, "loops_c": constants}
+
+    def span_arrays(self, d: int) -> dict[str, Any]:
+        """Return the rows of the vectors along the springs and their constants."""
+        springs = self.mechanism.springs
+        spans = [self.span(spring) for spring in springs]
+        rows, constants = components(spans, d)
+        for spring in springs:
+            ends = [self.on(body_of(z), self.end(spring, z)) for z in (spring.start, spring.end)]
+            self.lines.append((spring.name, "spring", ends, NO_THICKNESS))
+        return {"spans": rows, "spans_c": constants}
 
     def stop_arrays(self, d: int, e0: Complex) -> dict[str, Any]:
         """Return the rows of gaps and of displacements along the walls, and their constants."""
@@ -275,6 +285,13 @@ class _Assembler(Collection):
                 if body_of(end) == GROUND:
                     return self.at(self.mechanism.point(end, flexure.name))
         return 0j
+
+
+def components(places: Sequence[Place], d: int) -> tuple[Complex, Real]:
+    """Return rows (2 k, d) and constants (2 k,) of the components along x and y of k vectors."""
+    rows = np.array([r for p in places for r in (p.row(d), -1j * p.row(d))], complex)
+    constants = np.array([x for p in places for x in (p.c.real, p.c.imag)])
+    return rows.reshape(-1, d), constants
 
 
 def calculated(mechanism: Mechanism, values: Mapping[str, float]) -> dict[str, float]:

@@ -6,9 +6,11 @@ from functools import cached_property
 
 import numpy as np
 
+from ..base.errors import ParameterError
+from ..base.tolerances import SPRING_APART_RTOL
 from ..mechanism.description import Mechanism
 from ..mechanism.expressions import affine
-from ..mechanism.parts import GROUND, Flexure, Joint, Point
+from ..mechanism.parts import GROUND, Flexure, Joint, Point, Spring, body_of
 from .arrays import Real
 from .direction_map import DirectionMap
 from .free_body import Connection, FreeBody
@@ -46,7 +48,8 @@ class Collection:
         self.index: dict[str, int | None] = {GROUND: None}  # Directions of the bodies.
         self.links: list[int] = []
         self.floats: list[int] = []  # Arms that float.
-        self.placed: list[int] = []  # Coordinates of the bodies on them.
+        self.floating: list[int] = []  # Coordinates of the bodies on them.
+        self.placed: list[int] = []  # Those of bodies that springs do not hold, either.
         self.link_count = 0
         self.owners: list[str] = []
         self.lines: list[tuple[str, str, list[Place], Real]] = []
@@ -63,13 +66,28 @@ class Collection:
         """Return the drawn position of a point [m]."""
         return complex(self.number(point[0]), self.number(point[1]))
 
-    def end(self, part: Flexure | Joint, reference: str) -> complex:
+    def end(self, part: Flexure | Joint | Spring, reference: str) -> complex:
         """Return the drawn position of an end of a part [m]."""
         return self.at(self.mechanism.point(reference, part.name))
 
     def length(self, flexure: Flexure) -> float:
         """Return the length of a flexure as drawn [m]."""
         return abs(self.end(flexure, flexure.end) - self.end(flexure, flexure.start))
+
+    def check_apart(self, spring: Spring) -> None:
+        """Reject a spring whose ends are drawn at the same place: it has no direction.
+
+        Raises
+        ------
+        ParameterError
+            If the ends coincide.
+        """
+        apart = abs(self.end(spring, spring.end) - self.end(spring, spring.start))
+        if not apart > SPRING_APART_RTOL * self.size:
+            raise ParameterError(
+                f"spring {spring.name} from {spring.start} to {spring.end} has the length "
+                f"{apart:.4g} m, so that its direction is undefined: draw its ends apart"
+            )
 
     @cached_property
     def size(self) -> float:
@@ -138,7 +156,7 @@ class Collection:
         return self.direction({self.coordinate(owner): 1.0})
 
     def set_free(self, body: str) -> None:
-        """Add a body that nothing connects to the ground: its displacements and its rotation."""
+        """Add a body without flexures or joints to the ground: its displacements, its rotation."""
         drawn = self.at(next(b for b in self.mechanism.bodies if b.name == body).centre)
         shifts = self.coordinate(body), self.coordinate(body)
         arm, size = self.direction({}), self.size
@@ -148,7 +166,10 @@ class Collection:
         self.reach(body, Place(drawn, {arm: 1.0 + 0.0j}), drawn, turn)
         self.depth[body] = 0
         self.floats.append(arm)
-        self.placed += [*shifts, *self.changes[turn]]
+        place = [*shifts, *self.changes[turn]]
+        self.floating += place
+        if body in self.mechanism.free_bodies:
+            self.placed += place
 
     def angle(self, j: int | None) -> int | None:
         """Return the coordinate that is a direction of a body or a link; None: the ground."""
@@ -163,6 +184,14 @@ class Collection:
         loop = len(self.loops) - 1 if known else None
         self.depth.setdefault(far, self.depth[near] + 1)
         self.connections.append(Connection(near, far, loop, flexure))
+
+    def span(self, spring: Spring) -> Place:
+        """Return the vector from the start to the end of a spring."""
+        self.check_apart(spring)
+        start, end = (
+            self.on(body_of(end), self.end(spring, end)) for end in (spring.start, spring.end)
+        )
+        return end.minus(start)
 
     def close(self, name: str, place: Place, other: Place) -> None:
         """Close a loop: require that two places coincide."""

@@ -1,8 +1,9 @@
 r"""The equations of motion for one state of the contacts.
 
-    M a - R^T lam = Phi^T (Re(w e) + Im(Hq w^2)) - K (q - rest + beta v),    R a = Re(B e w^2)
+    M a - R^T lam = Phi^T (Re(w e) + Im(Hq w^2)) + P,    R a = Re(B e w^2)
 
-M is the mass matrix, a the accelerations and lam the multipliers.  R has the rows of the loops, of
+M is the mass matrix, a the accelerations, lam the multipliers, and P the forces of flexures, joints
+and springs with their damping (:mod:`prbm.mechanics.elements`).  R has the rows of the loops, of
 the held stops and of the sticking contacts.  Mass matrix, forces and rows are formed for the
 directions e with the rates w of the arms (:mod:`prbm.mechanics.system`), and pulled back to the
 coordinates by Phi (:mod:`prbm.mechanics.direction_map`).  Forces of friction, of inputs and of
@@ -20,6 +21,7 @@ from . import constraints, forces
 from .arrays import Complex, Real
 from .compliant_stops import CompliantState, CompliantStops, Pressure
 from .contact_state import ContactMode, ContactState
+from .elements import Elements
 from .inputs import Inputs
 from .kinetics import kinetic_energy, mass_accelerations, turned_moments
 from .system import FIXED, Rows, System
@@ -39,6 +41,8 @@ class Evaluation(NamedTuple):
         Mass matrix [kg m^2].
     factors : Factors
         Factors of the equations, for :meth:`Equations.project_near`.
+    e : (d,) complex
+        Directions.
     pressure : Pressure or None
         Forces of the pressed compliant stops, if there are any.
     """
@@ -47,6 +51,7 @@ class Evaluation(NamedTuple):
     lam: Real
     M: Real
     factors: constraints.Factors
+    e: Complex
     pressure: Pressure | None = None
 
 
@@ -81,6 +86,7 @@ class Equations:
         self.system, self.inputs, self.contacts, self.omega = system, inputs, contacts, omega
         values, mechanism = system.values, system.mechanism
         self.n = system.n
+        self.elements = Elements(system)
         self.beta = values["damping.beta"]
         self.mass_damping = 2.0 * values["damping.zeta"] * omega
         self.stop_friction = [value(s, "friction", values) for s in mechanism.stops]
@@ -185,7 +191,7 @@ class Equations:
         Hq = turned_moments(system.H, e)
         M = system.Phi.congruence(Hq.real) + system.inertia
         Q = system.Phi.pull(forces.generalised(self.w, e) + Hq.dot(w * w).imag)
-        Q -= system.K.dot(q - system.rest + self.beta * v)
+        Q += self.elements.motion_force(q, e, v, self.beta)
         R, bent = self.rows.terms(e, v)
         kkt = constraints.saddle(M, R, R)
         if self.moving_walls:
@@ -207,7 +213,7 @@ class Equations:
             kkt[: self.n, self.n + self.hold_row(i)] -= share * self.slip_row(i, e)
         factors = constraints.factor_saddle(kkt, self.n, system.length, self.scale)
         x = constraints.solve_saddle(factors, np.concatenate([Q, bent]))
-        return Evaluation(x[: self.n], -x[self.n :], M, factors, pressure)
+        return Evaluation(x[: self.n], -x[self.n :], M, factors, e, pressure)
 
     # -- rates of the state --
 
@@ -220,7 +226,7 @@ class Equations:
         n = self.n
         q, v, extras = y[:n], y[n : 2 * n], y[2 * n + 2 :]
         evaluation = self.evaluate(t, q, v, extras)
-        loss, power = self.beta * v.dot(self.system.K.dot(v)), 0.0
+        loss, power = self.elements.loss(evaluation.e, v, self.beta), 0.0
         if self.mass_damping:
             loss += 2.0 * self.mass_damping * kinetic_energy(evaluation.M, v)
         if self.slipping_points or self.slipping_stops:

@@ -2,10 +2,11 @@ r"""The linear equations of small motions about a static shape, or a resting con
 
 With the rows R of the loops, of the closed stops and of the sticking contacts, small changes obey
 
-    M a + C v + K_t q - R^T l = F u,      R q = 0,      C = 2 zeta omega_1 M + beta K.
+    M a + C v + K_t q - R^T l = F u,      R q = 0,      C = 2 zeta omega_1 M + beta K + C_s.
 
-The tangent stiffness K_t has the dead loads and the forces of the rows.  Products of rates vanish
-at rest.  The columns Z of the modes on R q = 0 have Z^T M Z = 1, so that q = Z x and
+The tangent stiffness K_t has the dead loads and the forces of the rows; C_s is the damping of
+springs.  Products of rates vanish at rest.  The columns Z of the modes on R q = 0 have
+Z^T M Z = 1, so that q = Z x and
 
     x'' = -Z^T K_t Z x - Z^T C Z x' + Z^T F u.
 
@@ -22,6 +23,7 @@ from ..base.names import unknown
 from ..base.tolerances import ROW_RTOL
 from ..mechanism.parts import value
 from .arrays import Complex, Real
+from .elements import Elements
 from .forces import field_row, load_rows, normal_force
 from .inputs import BASE_AXES, LOADS
 from .modal import Modes, fundamental_frequency, vibrations
@@ -138,14 +140,16 @@ class _SmallMotions:
         self.system, self.shape, self.loads, self.stops = system, shape, loads, list(stops)
         self.e = system.directions(shape.q)
         self.rows, self.contacts = self._rows()
+        elements = Elements(system)
         self.K_t = tangent_stiffness(
-            system.K, shape.load, shape.B, shape.lam, self.e, system.arm, system.Phi
+            elements.tangent(self.e), shape.load, shape.B, shape.lam, self.e, system.arm, system.Phi
         )
         self.modes = vibrations(system.mass_matrix(self.e), self.K_t, self.rows)
         values = system.values
         share = 2.0 * values["damping.zeta"]
         omega = 2.0 * np.pi * fundamental_frequency(system) if share else 0.0
-        self.damping = share * omega * self.modes.M + values["damping.beta"] * system.K
+        own = elements.damping(self.e, values["damping.beta"])
+        self.damping = share * omega * self.modes.M + own
 
     def _rows(self) -> tuple[Real, tuple[tuple[str, str], ...]]:
         """Return the rows that hold, and the contacts among them.

@@ -14,8 +14,9 @@ from ..base.tolerances import (
 from ..mechanism.parts import value
 from . import constraints
 from .arrays import Complex, Real
-from .forces import field_row, springs
-from .statics import Equilibrium, equilibrium, tangent_stiffness
+from .elements import Elements
+from .forces import field_row
+from .statics import Equilibrium, resting, tangent_stiffness
 from .system import System
 
 
@@ -69,7 +70,8 @@ def _modes(system: System, e: Complex, M: Real, B: Complex, lam: Real, w: Comple
     Bodies that nothing connects to the ground do not move.
     The tangent stiffness K_t is that of the loads w and of the multipliers lam along B.
     """
-    K_t = tangent_stiffness(system.K, w, B, lam, e, system.arm, system.Phi)
+    K = Elements(system).tangent(e)
+    K_t = tangent_stiffness(K, w, B, lam, e, system.arm, system.Phi)
     still = np.eye(system.n)[system.placed]
     return vibrations(M, K_t, np.vstack([system.loop_rows.jacobian(e), still]))
 
@@ -142,15 +144,15 @@ def moved_by(system: System, q: Real, phi: Real) -> Real:
     return np.where(np.abs(moved) > RELEASE_MODE_RTOL * system.length * turn, moved, 0.0)
 
 
-def damping(system: System, found: Modes) -> tuple[Real, Real]:
+def damping(system: System, found: Modes, q: Real) -> tuple[Real, Real]:
     """Return damping ratios [-] and decay times [s] of modes, (k,) each.
 
-    The damping is 2 zeta omega_1 M + beta K, with the parameters ``damping.zeta`` and
-    ``damping.beta``, the fundamental angular frequency omega_1 about the equilibrium under gravity
-    and the stiffness K of the springs.  Of a mode phi only phi^T C phi counts; couplings of modes
-    by beta K are neglected.  The amplitude falls to 1/e in the decay time; above the damping ratio
-    1 it is that of the slower of both motions.  Both are NaN for modes that do not vibrate, and the
-    decay time is infinite without damping.
+    The damping is C = 2 zeta omega_1 M + beta K, and that of springs, with the parameters
+    ``damping.zeta`` and ``damping.beta``, the fundamental angular frequency omega_1 about the
+    equilibrium under gravity and the stiffness K of flexures and joints.  Of a mode phi only
+    phi^T C phi counts; couplings of modes by C are neglected.  The amplitude falls to 1/e in the
+    decay time; above the damping ratio 1 it is that of the slower of both motions.  Both are NaN
+    for modes that do not vibrate, and the decay time is infinite without damping.
 
     Parameters
     ----------
@@ -158,12 +160,12 @@ def damping(system: System, found: Modes) -> tuple[Real, Real]:
         The mechanism.
     found : Modes
         Its modes, as :func:`modes` returns them.
+    q : (n,)
+        Their shape.
     """
     omega_1, phi = 2 * math.pi * fundamental_frequency(system), found.shape
-    springs_only = np.einsum("ik,ij,jk->k", phi, system.K, phi)
-    rates = 2.0 * system.values["damping.zeta"] * omega_1 + (
-        system.values["damping.beta"] * springs_only
-    )
+    C = Elements(system).damping(system.directions(q), system.values["damping.beta"])
+    rates = 2.0 * system.values["damping.zeta"] * omega_1 + np.einsum("ik,ij,jk->k", phi, C, phi)
     omega = 2 * math.pi * found.frequency
     ratios, times = np.full((2, len(omega)), math.nan)
     for k in np.flatnonzero(found.frequency > found.rounding):
@@ -179,11 +181,26 @@ def damping(system: System, found: Modes) -> tuple[Real, Real]:
 def fundamental_frequency(system: System) -> float:
     """Return the fundamental frequency about the equilibrium under gravity [Hz].
 
-    It is zero if that equilibrium is unstable, or if a motion deforms no spring.
+    It is zero if that equilibrium is unstable or is not found, or if a motion deforms no element.
+    Such motions of bodies that only springs connect to the ground are left out.
     """
-    found = modes(system, equilibrium(system))
-    lowest = float(found.frequency[0]) if len(found.frequency) else 0.0
+    shape, balanced = resting(system)
+    if not balanced:
+        return 0.0
+    found = modes(system, shape)
+    lowest = float(found.frequency[first_acting(system, found)]) if len(found.frequency) else 0.0
     return lowest if lowest > found.rounding else 0.0
+
+
+def first_acting(system: System, found: Modes) -> int:
+    """Return the index of the fundamental mode, which is the first that no round-off makes.
+
+    Without bodies that only springs connect to the ground it is 0.
+    """
+    if len(system.floating) == len(system.placed):
+        return 0
+    acting = np.flatnonzero(np.abs(found.frequency) > found.rounding)
+    return int(acting[0]) if len(acting) else 0
 
 
 def slow_rates(system: System) -> tuple[float, float]:
@@ -197,7 +214,7 @@ def slow_rates(system: System) -> tuple[float, float]:
     The second is the scale of times: the same, or the lowest angular frequency if it is larger and
     the mechanism is not unstable.
     """
-    found = modes(system, equilibrium(system))
+    found = modes(system, resting(system)[0])
     frequency, least = found.frequency, found.rounding
     if len(frequency) and frequency[0] < -least:
         return (-2 * math.pi * float(frequency[0]),) * 2
@@ -222,7 +239,7 @@ def fundamental_at(system: System, q: Real) -> tuple[Real, Real]:
     found = modes_at(system, q)
     if not len(found.frequency):
         return np.zeros(system.n), found.M
-    return found.shape[:, 0], found.M
+    return found.shape[:, first_acting(system, found)], found.M
 
 
 def modes_at(system: System, q: Real) -> Modes:
@@ -238,7 +255,7 @@ def modes_at(system: System, q: Real) -> Modes:
     B = np.vstack([system.loops, system.holding_row(q)])
     rows = system.gradient(B, e)
     w = field_row(system.spread(system.S), system.gravity)
-    load = springs(system.K, q - system.rest) + system.Phi.pull((w * e).real)
+    load = Elements(system).force(q, e) + system.Phi.pull((w * e).real)
     right = np.concatenate([load, np.zeros(len(B))])
     kkt = constraints.saddle(M, rows, rows)
     lam = -constraints.solve(kkt, right, system.n, system.length)[system.n :]

@@ -3,7 +3,7 @@ r"""Static shapes that rest on stops, and the rows that hold them.
 The loads are those of an equilibrium without stops, in which the hit points lie behind their walls.
 The gaps are raised to zero from there in steps, and Newton's method balances
 
-    K (q - q0) - Phi^T Re(w e) - Q - R^T lam = 0,      R = (loops, gaps of the stops).
+    P(q) + Phi^T Re(w e) + Q + R^T lam = 0,      R = (loops, gaps of the stops).
 """
 
 import math
@@ -23,7 +23,7 @@ from ..base.tolerances import (
 from ..mechanism.parts import value
 from . import constraints
 from .arrays import Complex, Real
-from .forces import springs
+from .elements import Elements
 from .statics import Equilibrium, tangent_stiffness
 from .system import FIXED, System
 
@@ -115,7 +115,7 @@ def _balanced(
     system: System, B: Complex, c: Real, w: Complex, moment: Real, start: Real
 ) -> Real | None:
     """Return coordinates and multipliers on the rows Re(B E) + c = 0; None: not found."""
-    n, state, turn = system.n, start, math.inf
+    n, state, turn, elements = system.n, start, math.inf, Elements(system)
     for _ in range(STATICS_ITERATIONS_MAX):
         q, lam = state[:n], state[n:]
         e = system.directions(q)
@@ -125,8 +125,8 @@ def _balanced(
         ):
             return state
         loads = system.Phi.pull((w * e).real) + moment
-        torque = springs(system.K, q - system.q0) + loads + lam @ rows
-        K_t = tangent_stiffness(system.K, w, B, lam, e, system.arm, system.Phi)
+        torque = elements.force(q, e) + loads + lam @ rows
+        K_t = tangent_stiffness(elements.tangent(e), w, B, lam, e, system.arm, system.Phi)
         kkt = constraints.saddle(K_t, rows, rows)
         try:
             right = np.concatenate([torque, -open_by])

@@ -28,6 +28,7 @@ from ..mechanism.parts import GROUND
 from .arrays import Complex, Real
 from .contact_state import ContactMode
 from .dynamics import Equations, Evaluation, sliding_friction
+from .elements import Elements
 from .free_body import SectionLoads
 from .inputs import checked_loads
 from .kinetics import mass_accelerations
@@ -110,6 +111,8 @@ def section_loads(
     e, deflection = system.directions(q), q - system.rest
     loads = point_loads(equations, e, v, found.a)
     pulls = [*_inputs(equations), *contact_forces(equations, e, found)]
+    if equations.elements.springs is not None:
+        pulls += equations.elements.springs.pulls(e, v)
     strained = deflection + equations.beta * v
     return connection_loads(system, e, deflection, strained, loads, pulls, found.lam)
 
@@ -142,6 +145,9 @@ def static_section_loads(
         release = mechanism.release
         pulls.append((release.body, shape.force * unit(release.direction)))
     e, deflection = system.directions(shape.q), shape.q - system.rest
+    springs = Elements(system).springs
+    if springs is not None:
+        pulls += springs.pulls(e)
     loads = (system.m * system.gravity).astype(complex)
     return connection_loads(system, e, deflection, deflection, loads, pulls, shape.lam)[0]
 

@@ -10,7 +10,7 @@ from ..mechanism.parts import value
 from .arrays import Real
 from .constraints import project_positions
 from .modal import modes, moved_by, unstable_directions
-from .statics import equilibrium
+from .statics import equilibrium, resting, with_bodies_placed
 from .system import Rows, System
 
 
@@ -55,17 +55,21 @@ def instability(system: System, values: Mapping[str, float]) -> Instability:
     EquilibriumError
         If no equilibrium under gravity, or with the displacement or the angle, is found.
     """
-    release, rest = system.mechanism.release, modes(system, equilibrium(system))
+    release, (rest, balanced) = system.mechanism.release, resting(system)
     held = 0
     if not release.mode:
-        shape = equilibrium(system, value(release, release.start, values))
-        found = modes(system, shape)
-        held = unstable_directions(found.frequency, moved_by(system, shape.q, found.shape))
-    return Instability(unstable_directions(rest.frequency), held)
+        placed = with_bodies_placed(system)
+        shape = equilibrium(placed, value(release, release.start, values))
+        found = modes(placed, shape)
+        held = unstable_directions(found.frequency, moved_by(placed, shape.q, found.shape))
+    unstable = unstable_directions(modes(system, rest).frequency) if balanced else 0
+    return Instability(unstable, held)
 
 
 def start_shape(system: System, values: Mapping[str, float], fraction: float = 1.0) -> Real:
     """Return the coordinates of the released shape, (n,).
+
+    Bodies without flexures and joints are placed, those on springs too.
 
     Parameters
     ----------
@@ -87,7 +91,7 @@ def start_shape(system: System, values: Mapping[str, float], fraction: float = 1
     amount = fraction * value(release, release.start, values)
     if release.mode:
         return mode_shape(system, release.mode, amount)
-    return equilibrium(system, amount).q
+    return equilibrium(with_bodies_placed(system), amount).q
 
 
 def mode_shape(system: System, mode: int, amplitude: float) -> Real:

@@ -2,20 +2,22 @@ r"""Static equilibrium under gravity, loads and a holding force, and the tangent
 
 At rest the torques balance,
 
-    K (q - q0) - Phi^T Re(w e) - Q - J^T lam - r^T F = 0,
+    P(q) + Phi^T Re(w e) + Q + J^T lam + r^T F = 0,
 
-with the springs K, the row w of gravity and the forces, the moments Q (those of initial strains
-included), the Jacobian J of the loops and their forces lam, the Jacobian r of the held displacement
-and the holding force F.  Second derivatives by the directions couple at most the angle and the
-stretch of one arm, because every position is linear in the arms.
+with the forces P of flexures, joints and springs (:mod:`prbm.mechanics.elements`), the row w of
+gravity and the forces, the moments Q, the Jacobian J of the loops and their forces lam, the
+Jacobian r of the held displacement and the holding force F.  Second derivatives by the directions
+couple at most the angle and the stretch of one arm, because every position is linear in the arms.
 
 Bodies that nothing connects to the ground are placed: no balance determines their displacements and
-rotations.  They are as drawn, or at the displacement or rotation of the release.
+rotations.  They are as drawn, or at the displacement or rotation of the release.  Bodies that only
+springs connect to it may have motions without stiffness and load, which do not occur.
 """
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,6 +25,7 @@ from ..base.errors import EquilibriumError, ParameterError, SimulationError
 from ..base.tolerances import (
     RELEASE_LEVER_RTOL,
     ROW_RTOL,
+    SPRING_IDLE_RTOL,
     STATICS_CLOSE_SHARE,
     STATICS_CONSTRAINT_RTOL,
     STATICS_FORCE_RTOL,
@@ -42,12 +45,20 @@ from ..base.tolerances import (
 from . import constraints
 from .arrays import Complex, Real, Whole
 from .direction_map import DirectionMap
-from .forces import field_row, force_row, springs
+from .elements import Elements, geometric_stiffness
+from .forces import field_row, force_row
 from .inputs import checked_loads
 from .system import System, values
 from .system import unit as unit_vector
 
-_Given = tuple[float | None, Complex, Real]  # Displacement, row of the loads, moments.
+
+class _Given(NamedTuple):
+    """What is given: displacement, row and moments of the loads, share of strains, pretension."""
+
+    held: float | None
+    w: Complex
+    moment: Real
+    share: float
 
 
 @dataclass(frozen=True)
@@ -90,7 +101,7 @@ def tangent_stiffness(
     Parameters
     ----------
     K : (n, n)
-        Torsion springs [N m/rad].
+        Tangent stiffness of the elements [N m/rad].
     w : (d,) complex
         Row of the dead loads, Q = Phi^T Re(w e) [N m].
     B, lam : (r, d) complex, (r,)
@@ -112,15 +123,7 @@ def tangent_stiffness(
     >>> tangent_stiffness(np.zeros((1, 1)), w, none, np.zeros(0), np.array([-1j])).item()
     6.0
     """
-    pull = (lam @ B - 1j * w) * e
-    D: Real = np.diag(pull.real)
-    if arm is not None:
-        k = np.flatnonzero(arm != np.arange(len(arm)))
-        a = arm[k]
-        turns = 1.0 if Phi is None else Phi.Phi[a].any(axis=1) * 1.0  # Not displacements.
-        D[k, k] = -turns * pull[a].real
-        D[k, a] = D[a, k] = turns * pull[a].imag
-    return K + (D if Phi is None else Phi.congruence(D))
+    return K + geometric_stiffness((lam @ B - 1j * w) * e, arm, Phi)
 
 
 def equilibrium(
@@ -161,8 +164,10 @@ def equilibrium(
         turns about the point that is to be displaced.
     """
     w, moment = load_row(system, loads or {})
+    drawn = system.directions(system.q0)
     loaded = bool(displacement) or np.any(w) or np.any(moment)
-    open_by = system.loop_rows.values(system.directions(system.q0))
+    loaded = loaded or np.any(Elements(system).force(system.q0, drawn))
+    open_by = system.loop_rows.values(drawn)
     closed = np.abs(open_by).max(initial=0.0) <= STATICS_CONSTRAINT_RTOL * system.length
     if closed and near is None and not loaded:
         return Equilibrium(system.q0, np.zeros(len(system.loops)), 0.0, w)
@@ -178,14 +183,17 @@ def equilibrium(
     unit = _holding_unit(system)
 
     def from_straight(share: float) -> _Given:
-        return None if displacement is None else share * displacement, share * w, share * moment
+        held = None if displacement is None else share * displacement
+        return _Given(held, share * w, share * moment, share)
 
     done = 0.0
     if near is not None and displacement is not None and holding:
         begin = system.amount(near.q)
         change = displacement - begin
         state = np.concatenate([near.q, near.lam, [near.force / unit]])
-        state, done = _follow(system, lambda share: (begin + share * change, w, moment), state)
+        state, done = _follow(
+            system, lambda share: _Given(begin + share * change, w, moment, 1.0), state
+        )
     if done < 1.0:
         straight = np.concatenate([system.q0, np.zeros(r + holding)])
         state, done = _load_fully(system, from_straight, straight)
@@ -193,6 +201,34 @@ def equilibrium(
         raise EquilibriumError(_unreachable(system, displacement, bool(loads), done))
     force = unit * float(state[n + r]) if holding else 0.0
     return Equilibrium(state[:n], state[n : n + r], force, w)
+
+
+def with_bodies_placed(system: System) -> System:
+    """Return a system in which bodies without flexures and joints are placed, springs or not.
+
+    They are as drawn, or at the displacement or rotation of the release, where a motion begins.
+    """
+    if len(system.placed) == len(system.floating):
+        return system
+    return replace(system, placed=system.floating)
+
+
+def resting(system: System) -> tuple[Equilibrium, bool]:
+    """Return the shape under gravity, and whether it is an equilibrium.
+
+    If slow loading reaches none, bodies that only springs connect to the ground are as drawn.
+
+    Raises
+    ------
+    EquilibriumError
+        If there is no equilibrium, and there are no such bodies.
+    """
+    try:
+        return equilibrium(system), True
+    except EquilibriumError:
+        if len(system.placed) == len(system.floating):
+            raise
+        return equilibrium(with_bodies_placed(system)), False
 
 
 def _load_fully(
@@ -229,9 +265,10 @@ def _follow(
     done : float
         Share that is reached; below 1 if no equilibrium was found beyond it.
     """
+    stiffness = Elements(system).drawn
     # Only bodies without a spring, for instance on a pin, may turn far in one load step.  If
     # another coordinate jumps, slow loading does not reach the shape.
-    bent = sorted({*system.links, *np.flatnonzero(np.diag(system.K) > 0.0).tolist()})
+    bent = sorted({*system.links, *np.flatnonzero(np.diag(stiffness) > 0.0).tolist()})
     done, step, growth = 0.0, 1.0, STATICS_GROWTH_MAX
     part = STATICS_CLOSE_SHARE if closely else 1.0
     sign = _determinant_sign(system, given(0.0), state) if closely else 0
@@ -240,10 +277,10 @@ def _follow(
         # The difference of target and done may be rounded to more than the smallest step.
         step, turn, ratio = min(step, 1.0 - done), math.inf, STATICS_SHRINK
         smallest, crossed = step <= STATICS_LOAD_STEP_MIN, 0
-        held, w, moment = given(target)
-        trial = _newton(system, held, (w, moment), state)
-        if trial is not None and _holds(system, held, trial):
-            crossed = _determinant_sign(system, (held, w, moment), trial) if closely else 0
+        now = given(target)
+        trial = _newton(system, now, state)
+        if trial is not None and _holds(system, now.held, trial):
+            crossed = _determinant_sign(system, now, trial) if closely else 0
             if smallest or sign * crossed >= 0:
                 turn = float(np.abs((trial - state)[bent]).max(initial=0.0))
                 ratio = part * STATICS_TURN_AIM / max(turn, STATICS_TURN_MIN)
@@ -260,17 +297,23 @@ def _follow(
 
 def _determinant_sign(system: System, given: _Given, state: Real) -> int:
     """Return the sign of the determinant of the balance in a state; 0 if it is singular."""
-    held, w, _ = given
-    B = _holding_rows(system, held)[0]
-    kkt = _linear_balance(system, state[: system.n], w, B, state[system.n :])
+    B = _holding_rows(system, given.held)[0]
+    kkt = _linear_balance(system, state[: system.n], (given.w, given.share), B, state[system.n :])
     return constraints.determinant_sign(kkt, system.n, system.length)
 
 
-def _linear_balance(system: System, q: Real, w: Complex, B: Complex, lam: Real) -> Real:
-    """Return [[K_t, rows^T], [rows, 0]] for a row w of loads and constraints B with multipliers."""
+def _linear_balance(
+    system: System, q: Real, given: tuple[Complex, float], B: Complex, lam: Real
+) -> Real:
+    """Return [[K_t, rows^T], [rows, 0]] for loads and constraints B with multipliers.
+
+    What is given is the row w of the loads, and the share of strains and pretension.
+    """
+    w, share = given
     e = system.directions(q)
     rows = system.gradient(B, e)
-    K_t = tangent_stiffness(system.K, w, B, lam, e, system.arm, system.Phi)
+    K = Elements(system).tangent(e, share)
+    K_t = tangent_stiffness(K, w, B, lam, e, system.arm, system.Phi)
     return _placed(system, constraints.saddle(K_t, rows, rows))
 
 
@@ -314,12 +357,9 @@ def _holding_unit(system: System) -> float:
 
 
 def load_row(system: System, loads: Mapping[str, float]) -> tuple[Complex, Real]:
-    """Return the spread row w of gravity and the given forces, and the given moments [N m].
-
-    The torques of the initial strains in the drawn shape are among the moments.
-    """
+    """Return the spread row w of gravity and the given forces, and the given moments [N m]."""
     given = checked_loads(system.mechanism, loads)
-    w, moment = field_row(system.S, system.gravity), system.K @ (system.rest - system.q0)
+    w, moment = field_row(system.S, system.gravity), np.zeros(system.n)
     for force, frame in zip(system.mechanism.forces, system.pushed, strict=True):
         x, y, turning = (given[f"{force.name}.{what}"] for what in ("x", "y", "moment"))
         w = w + force_row(frame.A, complex(x, y))
@@ -333,17 +373,17 @@ def free_displacement(system: System) -> float:
     It is the displacement of the released point from the straight shape along the release [m], or
     the rotation of the body [rad] if the release is by an angle.
     """
-    return system.amount(equilibrium(system).q)
+    return system.amount(resting(system)[0].q)
 
 
-def _newton(
-    system: System, held: float | None, load: tuple[Complex, Real], start: Real
-) -> Real | None:
-    """Find the equilibrium under a load (row w, moments); None without convergence."""
-    n = system.n
-    w, moment = load
+def _newton(system: System, given: _Given, start: Real) -> Real | None:
+    """Find the equilibrium with what is given; None without convergence."""
+    n, elements = system.n, Elements(system)
+    held, w, moment, share = given
     B, c = _holding_rows(system, held)
-    springs_scale = STATICS_FORCE_RTOL * float(np.abs(system.K).max())
+    stiffest = float(np.abs(elements.drawn).max())
+    springs_scale = STATICS_FORCE_RTOL * stiffest
+    sprung = np.setdiff1d(system.floating, system.placed)
     state, turn = start.copy(), math.inf
     state[system.placed] = _places(system, held or 0.0)
     for _ in range(STATICS_ITERATIONS_MAX):
@@ -351,7 +391,7 @@ def _newton(
         e = system.directions(q)
         rows = system.gradient(B, e)
         loads = system.Phi.pull((w * e).real) + moment
-        torque = springs(system.K, q - system.q0) + loads + lam @ rows
+        torque = elements.force(q, e, share) + loads + lam @ rows
         torque[system.placed] = 0.0
         open_by = values(B, c, e)
         closed = (
@@ -363,7 +403,9 @@ def _newton(
         balanced = closed and np.abs(torque).max() <= scale
         if balanced and turn <= STATICS_STEP_ATOL:
             return state
-        K_t = tangent_stiffness(system.K, w, B, lam, e, system.arm, system.Phi)
+        K = elements.tangent(e, share)
+        K_t = tangent_stiffness(K, w, B, lam, e, system.arm, system.Phi)
+        K_t[sprung, sprung] += SPRING_IDLE_RTOL * stiffest
         kkt = _placed(system, constraints.saddle(K_t, rows, rows))
         try:
             right = np.concatenate([torque, -open_by])
@@ -415,7 +457,7 @@ def _unreachable(system: System, displacement: float | None, loaded: bool, done:
         )
         return f"{where}; release closer to the straight shape{pins}"
     limp = abs(system.gravity) * float(np.abs(system.S).max()) > STATICS_LIMP_RATIO * float(
-        np.abs(system.K).max()
+        np.abs(Elements(system).drawn).max()
     )
     units = "; or check the units of youngs_modulus and thickness" if limp else ""
     return (
@@ -453,7 +495,7 @@ def turns_about_point(system: System) -> bool:
     row = system.gradient(system.release, e)
     loops = system.loop_rows.jacobian(e)
     try:
-        kkt = constraints.saddle(system.K, loops, loops)
+        kkt = constraints.saddle(Elements(system).drawn, loops, loops)
         right = np.append(row, np.zeros(len(loops)))
         response = constraints.solve(kkt, right, system.n, system.length)[: system.n]
     except SimulationError:  # A body without a spring, for instance on a pin.
@@ -530,6 +572,7 @@ def holding_stiffness(system: System, shape: Equilibrium) -> float:
     """
     unit = _holding_unit(system)
     kkt = balance_matrix(system, shape, held=True)
+    pin_idle(system, kkt)
     right = np.zeros(len(kkt))
     right[-1] = unit
     try:
@@ -546,8 +589,25 @@ def balance_matrix(system: System, shape: Equilibrium, held: bool) -> Real:
     """
     B = np.vstack([system.loops, system.holding_row(shape.q)])
     lam = np.append(shape.lam, shape.force / _holding_unit(system))
-    kkt = _linear_balance(system, shape.q, shape.load, B, lam)
+    kkt = _linear_balance(system, shape.q, (shape.load, 1.0), B, lam)
     return kkt if held else kkt[:-1, :-1]
+
+
+def pin_idle(system: System, kkt: Real) -> None:
+    """Let bodies that springs hold keep coordinates of which no element and constraint depends.
+
+    Parameters
+    ----------
+    kkt : (n + r, n + r)
+        Linear balance, which is changed.
+    """
+    n = system.n
+    largest = float(np.abs(kkt[:n, :n]).max())
+    for j in np.setdiff1d(system.floating, system.placed):
+        acting = np.abs(kkt[j])
+        if acting[:n].max() <= SPRING_IDLE_RTOL * largest and not np.any(acting[n:]):
+            kkt[j], kkt[:, j] = 0.0, 0.0
+            kkt[j, j] = largest
 
 
 def _left_by_loops(system: System, e: Complex, rows: Real) -> float:

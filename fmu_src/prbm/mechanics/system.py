@@ -120,7 +120,7 @@ class Outline:
     Parameters
     ----------
     name, kind : str
-        Name of the part; ``"flexure"``, ``"joint"`` or ``"body"``.
+        Name of the part; ``"flexure"``, ``"joint"``, ``"spring"`` or ``"body"``.
     c, A : (p,) complex, (p, d) complex
         The places of its corners, z = c + A E [m].
     thickness : (p,)
@@ -291,18 +291,23 @@ class System:
         Index of the arm that a direction turns, stretches or displaces.
     floats : (b,) int
         Arms that float.
-    placed : (3 b,) int
+    floating : (3 b,) int
         The coordinates of the bodies on these arms: displacements along x and y, and rotation.
+    placed : (3 b,) int
+        Those of the bodies that springs do not hold, either: no balance determines them.
     H : (d, d) complex
         A^H diag(m) A with the columns of A spread, Hermitian [kg m^2].
     J : (d,)
         Rotary inertia of each body about the mass centres of its parts [kg m^2].
     K : (n, n)
-        Springs: elastic energy (q - rest)^T K (q - rest) / 2 [N m/rad], [N m].
+        Flexures and joints: elastic energy (q - rest)^T K (q - rest) / 2 [N m/rad], [N m].  All
+        elements with energy are in :class:`prbm.mechanics.elements.Elements`.
     A, c, m : (p, d) complex, (p,) complex, (p,)
         Mass points z = c + A E [m] and their masses [kg].
     loops, loops_c : (r, d) complex, (r,)
         Loop closures Phi = Re(loops E) + loops_c [m].
+    spans, spans_c : (2 c, d) complex, (2 c,)
+        Components along x and y of the vectors from start to end of the c springs [m].
     gaps, gaps_c, gaps_z : (s, d) complex, (s,), (s,) complex
         Gaps of the stops, without the wall's position [m]: gap = wall + Re(f (gaps E + gaps_z)) +
         gaps_c, with f = 1 for a wall on the ground, and f = conj(E) for a wall on a body.
@@ -347,6 +352,7 @@ class System:
     Phi: DirectionMap
     arm: Whole
     floats: Whole
+    floating: Whole
     placed: Whole
     H: Complex
     J: Real
@@ -356,6 +362,8 @@ class System:
     m: Real
     loops: Complex
     loops_c: Real
+    spans: Complex
+    spans_c: Real
     gaps: Complex
     gaps_c: Real
     gaps_z: Complex
@@ -451,7 +459,7 @@ class System:
     def variables(self) -> tuple[tuple[str, str], ...]:
         """The names of each coordinate and its rate, such as link[1].angle and link[1].omega."""
         kinds = dict.fromkeys(self.strains.tolist(), STRAIN)
-        for place in self.placed.reshape(-1, 3).tolist():
+        for place in self.floating.reshape(-1, 3).tolist():
             kinds |= zip(place, SHIFTS, strict=False)
         return tuple(
             (f"{owner}.{x}", f"{owner}.{rate}")
@@ -466,7 +474,7 @@ class System:
         It is the size for displacements [m], which are coordinates over the size, otherwise 1.
         """
         result = np.ones(self.n)
-        result[self.placed.reshape(-1, 3)[:, :2]] = self.length
+        result[self.floating.reshape(-1, 3)[:, :2]] = self.length
         return result
 
     @cached_property

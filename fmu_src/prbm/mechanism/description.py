@@ -59,6 +59,7 @@ from .parts import (
     Point,
     Probe,
     Release,
+    Spring,
     Stop,
     body_of,
     field_of,
@@ -86,7 +87,7 @@ class Mechanism:
         Identifier of the FMU, title of one line, description of a paragraph.
     ground : mapping
         Fixed points, by name [m].
-    bodies, flexure_types, flexures, joints, stops, frictions, forces, probes : tuples of parts
+    bodies, flexure_types, flexures, joints, stops, frictions, forces, probes, springs : tuples
         Parts of each kind.
     release : Release
         Start of the motion.
@@ -118,6 +119,7 @@ class Mechanism:
     flexures: tuple[Flexure, ...]
     release: Release
     joints: tuple[Joint, ...] = ()
+    springs: tuple[Spring, ...] = ()
     stops: tuple[Stop, ...] = ()
     frictions: tuple[Friction, ...] = ()
     forces: tuple[Force, ...] = ()
@@ -150,8 +152,8 @@ class Mechanism:
         if self.damping_zeta and self.free_bodies:
             raise MechanismError(
                 f"damping_zeta = {self.damping_zeta:g}: damping in proportion to mass would slow "
-                f"the flight of {', '.join(self.free_bodies)}, which no flexures or joints connect "
-                "to the ground; use damping_beta, or connect them"
+                f"the flight of {', '.join(self.free_bodies)}, which no flexures, joints or "
+                "springs connect to the ground; use damping_beta, or connect them"
             )
         self._check_names()
         known = {p.name: p for p in self.parameters}
@@ -187,7 +189,7 @@ class Mechanism:
                     yield Parameter(
                         f"{kind.name}.{c.name}", value, "", c.description, c.minimum, c.maximum
                     )
-        jointed: tuple[Part, ...] = (*self.bodies, *self.joints)
+        jointed: tuple[Part, ...] = (*self.bodies, *self.joints, *self.springs)
         for part in jointed:
             yield from _fields(part)
         for axis, g in zip("xy", self.gravity, strict=True):
@@ -262,13 +264,22 @@ class Mechanism:
     def _parts(self) -> tuple[Part, ...]:
         """Return the parts whose fields are parameters or expressions."""
         parts: tuple[Part, ...] = (*self.flexure_types, *self.bodies, *self.joints)
+        parts = (*parts, *self.springs)
         return (*parts, *self.frictions, *self.stops, self.release)
 
     @cached_property
-    def free_bodies(self) -> tuple[str, ...]:
+    def floating_bodies(self) -> tuple[str, ...]:
         """Names of the bodies that no flexures or joints connect to the ground."""
+        return self._apart((*self.flexures, *self.joints))
+
+    @cached_property
+    def free_bodies(self) -> tuple[str, ...]:
+        """Names of the bodies that no flexures, joints or springs connect to the ground."""
+        return self._apart((*self.flexures, *self.joints, *self.springs))
+
+    def _apart(self, parts: tuple[Flexure | Joint | Spring, ...]) -> tuple[str, ...]:
+        """Return the names of the bodies that parts do not connect to the ground."""
         neighbours: dict[str, list[str]] = {}
-        parts: tuple[Flexure | Joint, ...] = (*self.flexures, *self.joints)
         for part in parts:
             ends = body_of(part.start), body_of(part.end)
             for one, other in (ends, ends[::-1]):
@@ -288,7 +299,7 @@ class Mechanism:
         # A flexure may share its name with its type.
         own = [f.name for f in self.flexures if f.type != f.name]
         parts: tuple[Part, ...] = (*self.bodies, *self.flexure_types, *self.joints, *self.stops)
-        parts = (*parts, *self.frictions, *self.forces, *self.probes)
+        parts = (*parts, *self.springs, *self.frictions, *self.forces, *self.probes)
         for name in (*(part.name for part in parts), *own):
             if name in seen:
                 raise MechanismError(
@@ -316,6 +327,8 @@ class Mechanism:
             self._check_flexure(flexure, types)
         for joint in self.joints:
             self._check_connection("joint", joint)
+        for spring in self.springs:
+            self._check_connection("spring", spring)
         for probe in self.probes:
             self.point(probe.point, probe.name)
         self._check_attached({body.name: body for body in self.bodies})
@@ -432,8 +445,8 @@ class Mechanism:
                 f"cannot stretch; choose another model than {kind.model}, or axial = false"
             )
 
-    def _check_connection(self, kind: str, part: Flexure | Joint) -> None:
-        """Reject a flexure or joint between undefined points, or points of one body."""
+    def _check_connection(self, kind: str, part: Flexure | Joint | Spring) -> None:
+        """Reject a flexure, joint or spring between undefined points, or points of one body."""
         for end in (part.start, part.end):
             self.point(end, part.name)
         if body_of(part.start) == body_of(part.end):
@@ -473,13 +486,32 @@ class Mechanism:
         Raises
         ------
         MechanismError
-            If no flexures or joints connect a body to the ground.
+            If no flexures, joints or springs connect a body to the ground.
         """
         if self.free_bodies:
             raise MechanismError(
-                f"{use} has no bodies that fly freely: no flexures or joints connect "
-                f"{', '.join(self.free_bodies)} to the ground; connect them, or simulate the "
-                "mechanism"
+                f"{use} has no bodies that fly freely: no flexures, joints or springs "
+                f"connect {', '.join(self.free_bodies)} to the ground; connect them, or simulate "
+                "the mechanism"
+            )
+
+    def check_springless(self, use: str) -> None:
+        """Reject springs, for a computation that has flexures and joints only.
+
+        Parameters
+        ----------
+        use : str
+            The computation, with an article.
+
+        Raises
+        ------
+        MechanismError
+            If there is a spring.
+        """
+        if self.springs:
+            raise MechanismError(
+                f"{use} has no springs: remove {', '.join(s.name for s in self.springs)}, or "
+                "simulate the mechanism"
             )
 
     def point(self, reference: str, user: str) -> Point:

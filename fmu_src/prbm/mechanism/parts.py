@@ -191,6 +191,38 @@ class Joint:
 
 
 @dataclass(frozen=True)
+class Spring:
+    """A coil spring and a damper side by side between two points, each ``body.point``.
+
+    The spring pulls both points together with the force k x + k3 x^3 + c l', positive in tension,
+    for the elongation x = l - l0 of the distance l of the points.
+
+    Parameters
+    ----------
+    name : str
+        Prefix of its parameters and outputs, for instance ``spring``.
+    start, end : str
+        Its ends, on two bodies or on a body and the ground.
+    stiffness : Quantity
+        Stiffness k [N/m].
+    free_length : Quantity or None
+        Length l0 without a force [m]; None: the distance of the ends as drawn.
+    cubic_stiffness : Quantity
+        Coefficient k3 of the cube of the elongation [N/m^3]; negative if the spring softens.
+    damping : Quantity
+        Coefficient c of viscous damping [N s/m].
+    """
+
+    name: str
+    start: str
+    end: str
+    stiffness: Quantity
+    free_length: Quantity | None = None
+    cubic_stiffness: Quantity = 0.0
+    damping: Quantity = 0.0
+
+
+@dataclass(frozen=True)
 class Stop:
     """A contact of a point of a body with a wall, fixed to the ground or to another body.
 
@@ -350,7 +382,7 @@ class Release:
         return self.angle is not None
 
 
-Part = Body | FlexureType | Flexure | Joint | Stop | Friction | Force | Probe | Release
+Part = Body | FlexureType | Flexure | Joint | Spring | Stop | Friction | Force | Probe | Release
 
 LENGTH_MIN = 1e-9  # m; smallest dimension of a mechanism.
 MASS_MIN = 1e-15  # kg; half the mass of a cubic micrometre of silicon.
@@ -416,6 +448,14 @@ FIELDS: dict[type, dict[str, tuple[str, str, float, float, float | None, bool]]]
         "stiffness": _meta(
             "N.m/rad", "Torsional stiffness, without a moment in the drawn shape", 0.0, 1e12, 1.0
         ),
+    },
+    Spring: {
+        "stiffness": _meta("N/m", "Stiffness", 0.0, 1e15, 1e3),
+        "free_length": _meta("m", "Length without a force", 0.0, LENGTH_MAX, 1e-2),
+        "cubic_stiffness": _meta(
+            "N/m3", "Coefficient of the cube of the elongation in the force", -1e18, 1e18, 1e6
+        ),
+        "damping": _meta("N.s/m", "Coefficient of viscous damping", 0.0, 1e12, 1.0),
     },
     Stop: {
         "position": _meta(

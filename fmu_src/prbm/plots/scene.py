@@ -101,8 +101,8 @@ class Scene:
 
     Attributes
     ----------
-    links, curves, edges, bodies, hits, walls : dict of str to artist
-        Moving artists by the names of flexures, bodies and stops, in the unit of the axes.
+    links, curves, edges, springs, bodies, hits, walls : dict of str to artist
+        Moving artists by the names of flexures, springs, bodies and stops, in the unit of the axes.
         Flexures with a profile are in ``edges``, all others in ``links``.
     """
 
@@ -212,6 +212,9 @@ class Scene:
                 set_stress(self.coloured[name], z, position, found[name], self.factor)
 
     def _set_bodies(self) -> None:
+        self.springs = {
+            outline.name: self._moving_line(LINK, 1.3, zorder=3.2) for outline in self.shapes.coils
+        }
         self.bodies: dict[str, PathPatch] = {}
         self.centres: dict[str, Line2D] = {}
         for name in self.system.bodies:
@@ -274,6 +277,7 @@ class Scene:
             q, walls = self.motion.shape(float(t))
             E = self.shapes.arms(q)
             places += [line.drawn(E) for line in self.shapes.flexures]
+            places += self.shapes.springs(E)
             places += [self.shapes.body(name, E) for name in self.system.bodies]
             places += [self.shapes.wall(i, float(wall), E) for i, wall in enumerate(walls)]
         places += [
@@ -358,6 +362,8 @@ class Scene:
             if name in self.curves:
                 self._move(self.curves[name], line.centre_line(E))
         self._colour(t, E)
+        for coil, z in zip(self.springs.values(), self.shapes.springs(E), strict=True):
+            self._move(coil, z)
         for name, patch in self.bodies.items():
             patch.set_path(area(self.shapes.areas(name, E), self.factor))
             self._move(self.centres[name], np.array([self.shapes.centre(name, E)]))

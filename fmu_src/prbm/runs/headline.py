@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from ..base.unit_text import frequency_unit, length_unit, prefixed_unit, time_unit
 from ..mechanics.assembly import assemble
 from ..mechanics.modal import modes
-from ..mechanics.statics import equilibrium, free_displacement
+from ..mechanics.statics import free_displacement, resting
 from ..mechanics.stress import stressed
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
@@ -265,7 +265,10 @@ def _free(columns: Columns, system: System) -> list[str]:
     """Return the lines about the equilibrium without stops."""
     frequency = column(columns, FREQUENCY)[0]
     if frequency == 0.0:
-        found = modes(system, equilibrium(system))
+        shape, balanced = resting(system)
+        if not balanced:
+            return ["fundamental          none: without stops, slow loading reaches no equilibrium"]
+        found = modes(system, shape)
         if not len(found.frequency):
             return ["fundamental          none: all bodies fly freely"]
         if found.frequency[0] >= -found.rounding:

@@ -20,6 +20,7 @@ from ...mechanism.parts import (
     Joint,
     Part,
     Point,
+    Spring,
     Stop,
     body_of,
     field_of,
@@ -90,6 +91,9 @@ def content(
         "flexures": _flexures(mechanism, system),
         "joints": [
             {"name": joint.name, "ends": _ends(mechanism, joint)} for joint in mechanism.joints
+        ],
+        "springs": [
+            {"name": spring.name, "ends": _ends(mechanism, spring)} for spring in mechanism.springs
         ],
         "stops": [_stop(stop, mechanism) for stop in mechanism.stops],
         "probes": [
@@ -221,6 +225,7 @@ def _expressions(mechanism: Mechanism) -> str:
         "bodies",
         "flexure_types",
         "joints",
+        "springs",
         "stops",
         "frictions",
         "forces",
@@ -246,7 +251,7 @@ def _stop(stop: Stop, mechanism: Mechanism) -> dict[str, Json]:
     }
 
 
-def _ends(mechanism: Mechanism, part: Flexure | Joint) -> list[dict[str, Json]]:
+def _ends(mechanism: Mechanism, part: Flexure | Joint | Spring) -> list[dict[str, Json]]:
     return [
         {"body": body_of(end), "point": _point(mechanism.point(end, part.name))}
         for end in (part.start, part.end)

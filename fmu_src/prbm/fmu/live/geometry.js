@@ -5,6 +5,9 @@ const CURVE_POINTS = 40; // Points of the drawn curve of a flexure.
 const SPLINE_POINTS = 8; // Points of the drawn curve between two nodes of a beam.
 const CURVED_CORNERS_MAX = 11; // More corners are joined by straight lines, not by a curve.
 const COINCIDENT_RTOL = 1e-9; // A shorter step between points, over the length of the line, is none.
+const SPRING_WIDTH = 0.05; // Of the size of the mechanism: width of the zigzag of a spring.
+const COILS = 6; // Corners of this zigzag on each side.
+const COILED = 0.7; // Share of the length of a spring that is coiled.
 const BODY_THICKNESS_MIN = 0.04; // Of the size of the mechanism.
 
 const plus = ([a, b], [c, d]) => [a + c, b + d];
@@ -39,6 +42,18 @@ function evaluated(expression, values) {
     (sum, [name, factor]) => sum + factor * values.get(name),
     constant,
   );
+}
+
+// Return the line of a coil spring between two points.
+function zigzag([start, end], size) {
+  const along = minus(end, start);
+  const across = times((0.5 * SPRING_WIDTH * size) / (norm(along) || 1), turned([0, 1], along));
+  const coils = Array.from({ length: 2 * COILS + 2 }, (_, k) => {
+    const share = 0.5 + COILED * (k / (2 * COILS + 1) - 0.5);
+    const side = k === 0 || k === 2 * COILS + 1 ? 0 : k % 2 === 0 ? 1 : -1;
+    return plus(plus(start, times(share, along)), times(side, across));
+  });
+  return [start, ...coils, end];
 }
 
 const pointOf = (point, values) => point.map((x) => evaluated(x, values));

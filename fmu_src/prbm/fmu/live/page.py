@@ -60,9 +60,12 @@ def live_part(content: dict[str, Any], tables: bytes, module: bytes) -> LivePart
 
 @cache
 def script() -> str:
-    """Return the script of the live part: all files in one function, without comment lines."""
-    lines = "\n".join(_text(name) for name in SCRIPTS).split("\n")
-    joined = "\n".join(line for line in lines if not line.lstrip().startswith("//"))
+    """Return the script of the live part: all files in one function, without comments and indents.
+
+    No text of the script extends over several lines.
+    """
+    lines = [line.lstrip(" ") for name in SCRIPTS for line in _text(name).split("\n")]
+    joined = "\n".join(line for line in lines if not line.startswith("//"))
     return f'(() => {{\n"use strict";\n{joined}\n}})();'
 
 

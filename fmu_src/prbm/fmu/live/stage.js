@@ -59,6 +59,7 @@ class Stage {
       return node;
     });
     this.centres = bodies.map(() => add("bodies", "path", { class: "centre" }));
+    this.springs = add("bodies", "path", { class: "spring" });
     this.pins = add("bodies", "path", { class: "pin" });
     this.probes = add("marks", "path", { class: "probe" });
     this.walls = stops.map(() => add("walls", "path", { class: "wall" }));
@@ -164,6 +165,11 @@ class Stage {
           line.curve.at(-1),
         ]),
       );
+      points.push(
+        ...this.description.springs.flatMap(({ ends }) =>
+          ends.map((end) => shapes.carried(end.body, end.point, shape.poses)),
+        ),
+      );
       points.push(...this.bodies.flatMap((_, k) => shapes.body(k, shape.poses)));
     }
     const poses = shapes.drawn;
@@ -266,6 +272,18 @@ class Stage {
         parts.push(this.hatched(point, [0, -1], 0.08 * shapes.size));
       }
     }
+    for (const { ends } of this.description.springs) {
+      const [start, end] = ends.map((one) => pointOf(one.point, shapes.values));
+      const along = times(1 / norm(minus(end, start)), minus(end, start));
+      [
+        [start, times(-1, along)],
+        [end, along],
+      ].forEach(([point, into], side) => {
+        if (ends[side].body === GROUND) {
+          parts.push(this.hatched(point, into, 0.08 * shapes.size));
+        }
+      });
+    }
     this.ground.setAttribute("d", parts.join(""));
     this.drawScale(width, height);
   }
@@ -308,6 +326,10 @@ class Stage {
       const [x, y] = this.screen(shape.poses.get(body.name).centre);
       this.centres[k].setAttribute("d", `M${x - 5},${y}h10M${x},${y - 5}v10`);
     });
+    const springs = description.springs.map(({ ends }) =>
+      zigzag(ends.map((end) => shapes.carried(end.body, end.point, shape.poses)), shapes.size),
+    );
+    this.springs.setAttribute("d", springs.map((line) => this.path(line)).join(""));
     const pins = [
       ...description.joints.map((joint) => joint.ends[0]),
       ...description.flexures.flatMap((f) => f.ends.filter((_, side) => !f.guided[side])),

@@ -17,6 +17,7 @@ from ...mechanism.parts import (
     Joint,
     Probe,
     Release,
+    Spring,
     Stop,
 )
 
@@ -26,6 +27,7 @@ PARTS: dict[str, Callable[..., Any]] = {
     "flexure_types": FlexureType,
     "flexures": Flexure,
     "joints": Joint,
+    "springs": Spring,
     "stops": Stop,
     "frictions": Friction,
     "forces": Force,

@@ -7,6 +7,7 @@
 #include "core/assembly.h"
 #include "core/branches.h"
 #include "core/constraints.h"
+#include "core/elements.h"
 #include "core/flexure.h"
 #include "core/flexures.h"
 #include "core/matrix.h"
@@ -594,6 +595,50 @@ static void clear(System *system) {
     }
 }
 
+/* Set the vector along a coil spring and its law. */
+static bool add_coil(System *system, int k, Scratch *scratch, Problem *problem) {
+    const Coil *coil = &system->mechanism->coils[k];
+    const Connection *c = &coil->between;
+    const double *values = system->values;
+    Place start = new_place(system, scratch), end = new_place(system, scratch);
+    Complex from = at_point(system, c->start_point), to = at_point(system, c->end_point);
+    double apart = modulus(minus(to, from));
+    if (!(apart > SPRING_APART_RTOL * system->length)) {
+        return fail(problem,
+                    "spring %s has the length %.4g m, so that its direction is undefined: draw its "
+                    "ends apart",
+                    coil->name, apart);
+    }
+    on_body(system, c->start, from, &start);
+    on_body(system, c->end, to, &end);
+    for (int j = 0; j < system->d; j++) {
+        system->spans[k * system->d + j] = minus(end.A[j], start.A[j]);
+    }
+    system->spans_c[k] = minus(end.c, start.c);
+    SpringLaw law = {evaluate(coil->stiffness, values), evaluate(coil->cubic_stiffness, values),
+                     evaluate(coil->damping, values), 0.0, 0.0};
+    system->laws[k] = law;
+    law.drawn_length = spring_state(system, k, system->e0, 1.0).length;
+    law.free_length =
+        coil->pretensioned ? evaluate(coil->free_length, values) : law.drawn_length;
+    system->laws[k] = law;
+    return true;
+}
+
+/* Add the coil springs, and compute the stiffness of the drawn shape. */
+static bool add_coils(System *system, Scratch *scratch, Problem *problem) {
+    bool ok = true;
+    for (int k = 0; ok && k < system->coil_count; k++) {
+        size_t mark = scratch->used;
+        ok = add_coil(system, k, scratch, problem);
+        scratch->used = mark;
+    }
+    if (ok && system->coil_count > 0) {
+        element_stiffness(system, system->e0, system->stiffness, scratch);
+    }
+    return ok;
+}
+
 static void add_arrays(System *system, Scratch *scratch) {
     const Release *release = &system->mechanism->release;
     Complex *e0 = system->e0;
@@ -625,7 +670,8 @@ PRBM bool assemble(System *system, const double *values, Scratch *scratch, Probl
     bool ok = stubs(system, scratch, problem) && walk_all(system, scratch, problem);
     if (ok) {
         add_arrays(system, scratch);
-        ok = check_loops(system, system->e0, scratch, problem) &&
+        ok = add_coils(system, scratch, problem) &&
+             check_loops(system, system->e0, scratch, problem) &&
              check_masses(system, system->e0, scratch, problem);
     }
     scratch->used = mark;

@@ -4,6 +4,7 @@
 
 #include "core/branch_terms.h"
 #include "core/branches.h"
+#include "core/elements.h"
 #include "core/evaluation.h"
 #include "core/forces.h"
 #include "core/gaps.h"
@@ -645,6 +646,10 @@ SHARED bool motion_of_length(int even, const Equations *eq, const Reference *nea
         rows_dispatch(even, eq, &result->at, result->rows, result->lam);
     }
     add_springs(even, eq, result);
+    if (eq->system->coil_count > 0) {
+        result->spring_loss += add_coil_forces(eq->system, result->at.e, result->at.speed, result->a,
+                                               result->row);
+    }
     if (eq->contacts_or_walls) {
         add_contacts_and_walls(eq, result);
     }

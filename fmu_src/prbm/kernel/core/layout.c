@@ -55,12 +55,18 @@ static const Connection *connection(const Mechanism *m, int i) {
     return i < m->flexure_count ? &m->flexures[i].between : &m->joints[i - m->flexure_count].between;
 }
 
-/* Mark what parts connect to a marked body. */
-static void mark_connected(const Mechanism *m, bool *marked) {
+/* Return what part i connects: the flexures come first, then the joints and the coil springs. */
+static const Connection *attachment(const Mechanism *m, int i) {
+    int parts = m->flexure_count + m->joint_count;
+    return i < parts ? connection(m, i) : &m->coils[i - parts].between;
+}
+
+/* Mark what the first parts connect to a marked body. */
+static void mark_connected(const Mechanism *m, int parts, bool *marked) {
     for (bool more = true; more;) {
         more = false;
-        for (int i = 0; i < m->flexure_count + m->joint_count; i++) {
-            const Connection *c = connection(m, i);
+        for (int i = 0; i < parts; i++) {
+            const Connection *c = attachment(m, i);
             if (marked[c->start] != marked[c->end]) {
                 more = marked[c->start] = marked[c->end] = true;
             }
@@ -71,6 +77,7 @@ static void mark_connected(const Mechanism *m, bool *marked) {
 /* Return the number of bodies that are free: the first one of each group of bodies that parts
  * connect to each other, but not to the ground. */
 static int free_count(Reader *reader, const Mechanism *m) {
+    const int parts = m->flexure_count + m->joint_count;
     size_t b = (size_t)m->body_count;
     bool *marked = kept(reader, b + 1, sizeof *marked);
     int count = 0;
@@ -79,15 +86,21 @@ static int free_count(Reader *reader, const Mechanism *m) {
     }
     memset(marked, 0, (b + 1) * sizeof *marked);
     marked[GROUND] = true;
-    mark_connected(m, marked);
+    mark_connected(m, parts, marked);
     for (int body = 1; body <= m->body_count; body++) {
         if (!marked[body]) {
             count++;
             marked[body] = true;
-            mark_connected(m, marked);
+            mark_connected(m, parts, marked);
         }
     }
     return count;
+}
+
+static bool too_many_places(const Mechanism *m) {
+    return m->coil_count > PLACES_MAX || m->stop_count > STOPS_MAX ||
+           m->friction_count > STOPS_MAX || m->force_count > PLACES_MAX ||
+           m->probe_count > PLACES_MAX || m->ground_count > GROUND_POINTS_MAX;
 }
 
 PRBM void count_coordinates(Reader *reader, Mechanism *m) {
@@ -126,9 +139,7 @@ PRBM void count_coordinates(Reader *reader, Mechanism *m) {
     }
     if (!reader->wrong &&
         (!few || n > COORDINATES_MAX || arms + stretching + shifts > DIRECTIONS_MAX ||
-         map > DIRECTION_MAP_MAX || r >= n || m->stop_count > STOPS_MAX || m->friction_count > STOPS_MAX ||
-         m->force_count > PLACES_MAX || m->probe_count > PLACES_MAX ||
-         m->ground_count > GROUND_POINTS_MAX)) {
+         map > DIRECTION_MAP_MAX || r >= n || too_many_places(m))) {
         reader->wrong = "more parts than the kernel supports, or loops that leave no degree of "
                         "freedom";
     } else if (!reader->wrong && b < 1) {
@@ -155,12 +166,14 @@ PRBM void count_coordinates(Reader *reader, Mechanism *m) {
  * directions added so far. */
 typedef struct {
     bool *held, *walked;
+    bool *hung; /* (b + 1,) whether parts or coil springs connect a body to the ground */
     int *body; /* (b + 1,) coordinates of the bodies */
     int *depth; /* (b + 1,) numbers of parts between the bodies and the ground */
     Coordinate *coordinates;
-    int *links, *strains, *arms, *stretches, *shifts, *placed;
+    int *links, *strains, *arms, *stretches, *shifts, *placed, *floating;
     DirectionMap map;
-    int added, link_count, strain_count, directed, stretch_count, shift_count, placed_count;
+    int added, link_count, strain_count, directed, stretch_count, shift_count, placed_count,
+        floating_count;
 } Walk;
 
 static int add_angle(Walk *walk) {
@@ -225,10 +238,18 @@ static void add_body_direction(Walk *walk, int coordinate) {
     depend(walk, coordinate);
 }
 
+/* List a coordinate of a body without flexures and joints to the ground, which springs may hold. */
+static void list_free(Walk *walk, int body, int coordinate) {
+    walk->floating[walk->floating_count++] = coordinate;
+    if (!walk->hung[body]) {
+        walk->placed[walk->placed_count++] = coordinate;
+    }
+}
+
 /* Add a displacement of a free body. */
 static int add_shift(Walk *walk, int body, int axis) {
     Coordinate coordinate = {-1, -1, body, axis};
-    walk->placed[walk->placed_count++] = walk->added;
+    list_free(walk, body, walk->added);
     walk->coordinates[walk->added] = coordinate;
     return walk->added++;
 }
@@ -242,7 +263,7 @@ static void add_free_body(Walk *walk, int body) {
         depend(walk, shifts[k]);
     }
     int turn = add_body_angle(walk, body);
-    walk->placed[walk->placed_count++] = turn;
+    list_free(walk, body, turn);
     add_body_direction(walk, turn);
 }
 
@@ -362,19 +383,23 @@ PRBM void lay_out_coordinates(Reader *reader, Mechanism *m) {
     DirectionMap map = {false, kept(reader, d + 1, sizeof(int)),
                         kept(reader, (size_t)m->map.count, sizeof(int)), 0};
     Walk walk = {kept(reader, b + 1, sizeof(bool)), kept(reader, parts, sizeof(bool)),
+                 kept(reader, b + 1, sizeof(bool)),
                  kept(reader, b + 1, sizeof(int)), kept(reader, b + 1, sizeof(int)),
                  kept(reader, n, sizeof(Coordinate)),
                  kept(reader, n, sizeof(int)), kept(reader, n, sizeof(int)),
                  kept(reader, d, sizeof(int)), kept(reader, d, sizeof(int)),
                  kept(reader, (size_t)m->shift_count, sizeof(int)),
-                 kept(reader, (size_t)m->placed_count, sizeof(int)), map, 0, 0, 0, 0, 0, 0, 0};
+                 kept(reader, (size_t)m->placed_count, sizeof(int)),
+                 kept(reader, (size_t)m->placed_count, sizeof(int)), map, 0, 0, 0, 0, 0, 0, 0, 0};
     Step *steps = kept(reader, all, sizeof *steps);
     if (reader->wrong) {
         return;
     }
     memset(walk.held, 0, (b + 1) * sizeof *walk.held);
     memset(walk.walked, 0, parts * sizeof *walk.walked);
-    walk.held[GROUND] = true;
+    memset(walk.hung, 0, (b + 1) * sizeof *walk.hung);
+    walk.held[GROUND] = walk.hung[GROUND] = true;
+    mark_connected(m, m->flexure_count + m->joint_count + m->coil_count, walk.hung);
     walk.depth[GROUND] = 0;
     walk.map.first[0] = 0;
     for (size_t i = 0; i < all; i++) {
@@ -392,6 +417,9 @@ PRBM void lay_out_coordinates(Reader *reader, Mechanism *m) {
     m->stretches = walk.stretches;
     m->shifts = walk.shifts;
     m->placed = walk.placed;
+    m->placed_count = walk.placed_count;
+    m->floating = walk.floating;
+    m->floating_count = walk.floating_count;
     walk.map.mapped = walk.map.mapped || walk.directed != walk.added;
     m->map = walk.map;
 }
@@ -436,6 +464,7 @@ PRBM void lay_out_slots(Mechanism *m) {
         [SLOTS_INPUTS] = m->input_count,
         [SLOTS_BODIES] = PER_BODY * m->body_count,
         [SLOTS_STOPS] = PER_STOP * m->stop_count,
+        [SLOTS_SPRINGS] = PER_SPRING * m->coil_count,
         [SLOTS_BASE] = PER_BASE,
         [SLOTS_ENERGIES] = PER_ENERGY,
         [SLOTS_LATCHED] = PER_LATCHED * m->stop_count,
@@ -457,6 +486,7 @@ PRBM void lay_out_slots(Mechanism *m) {
         .inputs = at[SLOTS_INPUTS],
         .bodies = at[SLOTS_BODIES],
         .stops = at[SLOTS_STOPS],
+        .springs = at[SLOTS_SPRINGS],
         .base = at[SLOTS_BASE],
         .energies = at[SLOTS_ENERGIES],
         .latched = at[SLOTS_LATCHED],

@@ -66,6 +66,14 @@ typedef struct {
     Expression stiffness;
 } Joint;
 
+/* A coil spring and a damper between two points. */
+typedef struct {
+    const char *name;
+    Connection between;
+    bool pretensioned; /* Whether its free length is given. */
+    Expression stiffness, free_length, cubic_stiffness, damping;
+} Coil;
+
 typedef struct {
     const char *name;
     int body, on; /* The stopped body, and the body or GROUND that carries the wall. */
@@ -121,7 +129,7 @@ typedef struct {
 
 /* The first slot of each group in the vector of all values. */
 typedef struct {
-    int parameters, inputs, bodies, stops, base, energies, latched, compliant, links, stretches,
+    int parameters, inputs, bodies, stops, springs, base, energies, latched, compliant, links, stretches,
         probes, stresses, frequency, calculated, derivatives, indicators, time, count;
 } Slots;
 
@@ -167,7 +175,7 @@ typedef struct {
 
 typedef struct {
     const char *token, *name;
-    int parameter_count, body_count, type_count, flexure_count, joint_count, stop_count,
+    int parameter_count, body_count, type_count, flexure_count, joint_count, coil_count, stop_count,
         friction_count, force_count, probe_count, ground_count, bound_count, variable_count,
         independent_count, input_count;
     const Parameter *parameters;
@@ -175,6 +183,7 @@ typedef struct {
     const FlexureType *types;
     const Flexure *flexures;
     const Joint *joints;
+    const Coil *coils;
     const Stop *stops;
     const Friction *frictions;
     const Force *forces;
@@ -188,7 +197,9 @@ typedef struct {
     const Step *steps;             /* Flexures, joints, free bodies in the order of the assembly. */
     const Coordinate *coordinates; /* (coordinate_count,) */
     const int *links, *strains;    /* Coordinates that are angles and strains of flexures. */
-    const int *placed;             /* Coordinates of the free bodies: along x and y, rotation. */
+    const int *floating;           /* Coordinates of bodies without flexures and joints to the ground:
+                                    * along x and y, rotation. */
+    const int *placed;             /* Those of bodies that springs do not hold, either. */
     const int *arms;               /* (direction_count,) arm that a direction turns, stretches or
                                     * displaces */
     const int *stretches;          /* Directions that are stretches. */
@@ -200,7 +211,7 @@ typedef struct {
     double default_step; /* Step of the default experiment [s]; 0: unknown. */
     /* Sizes of the assembled system. */
     int coordinate_count, direction_count, loop_count, link_count, strain_count, stretch_count,
-        shift_count, placed_count, step_count, mass_count, spring_count, corner_count;
+        shift_count, placed_count, floating_count, step_count, mass_count, spring_count, corner_count;
     int compliant_count; /* Number of compliant stops. */
     int first_extra;     /* 2 n + 2: position of the states of compliant stops in a state. */
     int state_count;     /* Size of a state: 2 n + 2, and 4 of each compliant stop. */

@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "core/constraints.h"
+#include "core/elements.h"
 #include "core/forces.h"
 #include "core/matrix.h"
 #include "core/modal.h"
@@ -86,7 +87,7 @@ static void gravity_row(const System *system, Complex *w) {
 }
 
 PRBM int mode_count(const System *system) {
-    return system->n - system->r - system->mechanism->placed_count;
+    return system->n - system->r - system->placed_count;
 }
 
 /* Compute a basis Z (n, k) of the motions that the loops allow, without those of free bodies.  It is orthonormal in coordinates of
@@ -94,14 +95,13 @@ PRBM int mode_count(const System *system) {
 static void tangent_space(const System *system, const Complex *e, const double *M, double *Z,
                           Scratch *scratch) {
     size_t used = scratch->used;
-    const Mechanism *m = system->mechanism;
     int n = system->n, k = mode_count(system), r = n - k;
     double *rows = take_matrix(scratch, r, n);
     Rows loops = plain_rows(system, system->r, system->loops, system->loops_c);
     jacobian(&loops, e, rows);
-    zeros(m->placed_count * n, rows + system->r * n);
-    for (int i = 0; i < m->placed_count; i++) {
-        rows[(system->r + i) * n + m->placed[i]] = 1.0;
+    zeros(system->placed_count * n, rows + system->r * n);
+    for (int i = 0; i < system->placed_count; i++) {
+        rows[(system->r + i) * n + system->placed[i]] = 1.0;
     }
     for (int j = 0; j < n; j++) {
         double scale = 1.0 / square_root(M[j * n + j]);
@@ -132,7 +132,7 @@ static bool modes_about(const System *system, const Complex *e, const double *M,
     double *K_z = take_matrix(scratch, k, k), *M_z = take_matrix(scratch, k, k);
     double *reduced = take_matrix(scratch, k, k);
     gravity_row(system, w);
-    tangent_stiffness(system, r, w, B, lam, e, K_t);
+    tangent_stiffness(system, 1.0, r, w, B, lam, e, K_t, scratch);
     tangent_space(system, e, M, Z, scratch);
     congruent(n, k, Z, K_t, K_z, scratch);
     congruent(n, k, Z, M, M_z, scratch);
@@ -210,14 +210,28 @@ PRBM void moved_by(const System *system, const double *q, const double *phi, dou
     scratch->used = used;
 }
 
-/* Compute the frequencies (k,) about the equilibrium under gravity. */
-static bool resting_frequencies(const System *system, double *frequencies, Scratch *scratch,
-                                Problem *problem) {
+/* Return the index of the fundamental mode: if bodies that only springs connect to the ground have
+ * motions that deform no element, it is the first one that round-off does not make. */
+static int first_acting(const System *system, const double *frequencies) {
+    int k = mode_count(system), i = 0;
+    double least = ZERO_FREQUENCY_RTOL * largest(k, frequencies);
+    if (system->placed_count == system->mechanism->floating_count) {
+        return 0;
+    }
+    while (i < k && fabs(frequencies[i]) <= least) {
+        i++;
+    }
+    return i < k ? i : 0;
+}
+
+/* Compute the frequencies (k,) about the shape under gravity, which may not be balanced. */
+static bool resting_frequencies(const System *system, double *frequencies, bool *balanced,
+                                Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
     int n = system->n, r = system->r;
     Equilibrium shape = {take(scratch, (size_t)n), take(scratch, (size_t)r), 0.0};
     double *phi = take_matrix(scratch, n, mode_count(system));
-    bool found = equilibrium(system, false, 0.0, &shape, scratch, problem) &&
+    bool found = resting(system, &shape, balanced, scratch, problem) &&
                  modes(system, &shape, frequencies, phi, scratch, problem);
     scratch->used = used;
     return found;
@@ -229,10 +243,10 @@ PRBM bool fundamental_frequency(const System *system, double *frequency, Scratch
     size_t used = scratch->used;
     int k = mode_count(system);
     double *frequencies = take(scratch, (size_t)k);
-    bool found = resting_frequencies(system, frequencies, scratch, problem);
+    bool balanced, found = resting_frequencies(system, frequencies, &balanced, scratch, problem);
     if (found) {
-        bool bends = k > 0 && frequencies[0] > ZERO_FREQUENCY_RTOL * largest(k, frequencies);
-        *frequency = bends ? frequencies[0] : 0.0;
+        double lowest = balanced && k > 0 ? frequencies[first_acting(system, frequencies)] : 0.0;
+        *frequency = lowest > ZERO_FREQUENCY_RTOL * largest(k, frequencies) ? lowest : 0.0;
     }
     scratch->used = used;
     return found;
@@ -246,7 +260,7 @@ PRBM bool slow_rates(const System *system, double *rate, double *fast, Scratch *
     size_t used = scratch->used;
     int k = mode_count(system), j = 0;
     double *frequencies = take(scratch, (size_t)k);
-    bool found = resting_frequencies(system, frequencies, scratch, problem);
+    bool balanced, found = resting_frequencies(system, frequencies, &balanced, scratch, problem);
     if (found) {
         double least = ZERO_FREQUENCY_RTOL * largest(k, frequencies);
         double speed = fabs(evaluate(system->mechanism->release.velocity, system->values));
@@ -276,14 +290,11 @@ static bool resting_multipliers(const System *system, const double *q, const Com
     int n = system->n, r = system->r + 1, size = n + r;
     Complex *w = take_complex(scratch, 1, system->d);
     double *rows = take_matrix(scratch, r, n), *kkt = take_matrix(scratch, size, size);
-    double *right = take(scratch, (size_t)size), *turned = take(scratch, (size_t)n);
+    double *right = take(scratch, (size_t)size);
     Rows held = plain_rows(system, r, B, NULL);
     jacobian(&held, e, rows);
     gravity_row(system, w);
-    for (int j = 0; j < n; j++) {
-        turned[j] = q[j] - system->rest[j];
-    }
-    springs(n, system->K, turned, right);
+    element_forces(system, q, e, 1.0, right, scratch);
     add_loads(system, w, e, right);
     zeros(r, right + n);
     saddle(n, r, M, rows, rows, kkt);
@@ -309,7 +320,7 @@ PRBM bool fundamental_at(const System *system, const double *q, double *phi, dou
     bool found = resting_multipliers(system, q, e, M, B, lam, scratch, problem) &&
                  modes_about(system, e, M, r, B, lam, frequency, all, scratch, problem);
     for (int i = 0; found && i < n; i++) {
-        phi[i] = k > 0 ? all[i * k] : 0.0;
+        phi[i] = k > 0 ? all[i * k + first_acting(system, frequency)] : 0.0;
     }
     scratch->used = used;
     return found;

@@ -36,6 +36,19 @@ static void place_contacts(System *system, Memory *memory) {
     system->lifts_c = place(memory, f, sizeof(double));
 }
 
+/* Place the vectors along coil springs and their laws. */
+static void place_coils(System *system, Memory *memory) {
+    const Mechanism *m = system->mechanism;
+    size_t n = (size_t)system->n, d = (size_t)system->d, coils = (size_t)m->coil_count;
+    system->placed_count = m->placed_count;
+    system->placed = m->placed;
+    system->coil_count = m->coil_count;
+    system->spans = place(memory, coils * d, sizeof(Complex));
+    system->spans_c = place(memory, coils, sizeof(Complex));
+    system->laws = place(memory, coils, sizeof(SpringLaw));
+    system->stiffness = coils > 0 ? place(memory, n * n, sizeof(double)) : system->K;
+}
+
 PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memory) {
     const Mechanism *m = mechanism;
     size_t n = (size_t)m->coordinate_count, r = (size_t)m->loop_count;
@@ -63,6 +76,7 @@ PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memor
     result.S = place(memory, d, sizeof(Complex));
     result.loops = place(memory, r * d, sizeof(Complex));
     result.loops_c = place(memory, r, sizeof(double));
+    place_coils(&result, memory);
     place_contacts(&result, memory);
     result.release = place(memory, d, sizeof(Complex));
     result.released.A = place(memory, d, sizeof(Complex));

@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/elements.h"
+#include "core/matrix.h"
 #include "core/sections.h"
 #include "core/vectors.h"
 
@@ -75,6 +77,23 @@ PRBM void add_contact_pulls(const Equations *eq, const Complex *e, const Evaluat
     }
 }
 
+/* Let springs pull their bodies and the ground. */
+static void add_spring_pulls(const System *system, const Complex *e, const double *v, Complex *on,
+                             Scratch *scratch) {
+    size_t mark = scratch->used;
+    double *row = take(scratch, (size_t)system->n);
+    for (int k = 0; k < system->coil_count; k++) {
+        const Connection *c = &system->mechanism->coils[k].between;
+        SpringState now = spring_state(system, k, e, 1.0);
+        length_gradient(system, k, e, row);
+        double force = now.tension + system->laws[k].damping * dot(system->n, row, v);
+        Complex pull = scaled(force / now.length, now.along);
+        pull_body(on, c->start, pull);
+        pull_body(on, c->end, scaled(-1.0, pull));
+    }
+    scratch->used = mark;
+}
+
 /* Return the sum of the loads of mass points i to end - 1. */
 static Complex sum_loads(const Complex *loads, int i, int end) {
     Complex sum = {0.0, 0.0};
@@ -144,6 +163,7 @@ PRBM SectionState section_state(const Equations *eq, const Complex *e, const dou
         pull_body(at.on, m->forces[i].body, complex_of(given[0], given[1]));
     }
     add_contact_pulls(eq, e, found, at.on);
+    add_spring_pulls(system, e, v, at.on, scratch);
     transmit(system, found->lam, &at);
     return at;
 }

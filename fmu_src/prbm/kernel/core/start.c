@@ -73,12 +73,14 @@ PRBM bool start_shape(const System *system, const double *values, double *q, Scr
     }
     size_t used = scratch->used;
     Equilibrium shape = {q, take(scratch, (size_t)system->r + 1), 0.0};
-    bool found = equilibrium(system, true, amount, &shape, scratch, problem);
+    System placed = with_bodies_placed(system);
+    bool found = equilibrium(&placed, true, amount, &shape, scratch, problem);
     scratch->used = used;
     return found;
 }
 
-/* Count the unstable directions of the shape under gravity that is held at an amount, or free. */
+/* Count the unstable directions of the shape under gravity that is held at an amount, or free.  There
+ * are none if the shape is not balanced. */
 static bool unstable_shape(const System *system, bool held, double amount, int *count,
                            Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
@@ -86,11 +88,13 @@ static bool unstable_shape(const System *system, bool held, double amount, int *
     Equilibrium shape = {take(scratch, (size_t)n), take(scratch, (size_t)system->r + 1), 0.0};
     double *frequency = take(scratch, (size_t)k), *phi = take_matrix(scratch, n, k);
     double *moved = take(scratch, (size_t)k);
-    bool found = equilibrium(system, held, amount, &shape, scratch, problem) &&
+    bool balanced = true;
+    bool found = (held ? equilibrium(system, true, amount, &shape, scratch, problem)
+                       : resting(system, &shape, &balanced, scratch, problem)) &&
                  modes(system, &shape, frequency, phi, scratch, problem);
     if (found) {
         moved_by(system, shape.q, phi, moved, scratch);
-        *count = unstable_directions(k, frequency, held ? moved : NULL);
+        *count = balanced ? unstable_directions(k, frequency, held ? moved : NULL) : 0;
     }
     scratch->used = used;
     return found;
@@ -100,8 +104,9 @@ PRBM bool instability(const System *system, const double *values, int *rest, int
                       Scratch *scratch, Problem *problem) {
     const Release *given = &system->mechanism->release;
     bool held = given->start != START_AMPLITUDE;
+    System placed = with_bodies_placed(system);
     *release = 0;
     return unstable_shape(system, false, 0.0, rest, scratch, problem) &&
-           (!held || unstable_shape(system, true, evaluate(given->amount, values), release, scratch,
+           (!held || unstable_shape(&placed, true, evaluate(given->amount, values), release, scratch,
                                     problem));
 }

@@ -1,11 +1,12 @@
 /* Static equilibrium under gravity and a holding force: the twin of mechanics/statics.py.
  *
- * At rest the torques of springs, gravity, loops and the holding force F balance:
- * -K (q - q0) + Re(w e) + J^T lam + r^T F = 0, with the row r of the released body.
+ * At rest the forces P of the elements, gravity, loops and the holding force F balance:
+ * P + Re(w e) + J^T lam + r^T F = 0, with the row r of the released body.
  */
 #include <math.h>
 
 #include "core/constraints.h"
+#include "core/elements.h"
 #include "core/forces.h"
 #include "core/matrix.h"
 #include "core/statics.h"
@@ -50,18 +51,24 @@ PRBM void stack_holding_at(const System *system, const double *q, Complex *B, do
 /* --- free bodies ------------------------------------------------------------------------------ */
 
 PRBM bool released_free(const System *system) {
-    const Mechanism *m = system->mechanism;
     bool found = false;
-    for (int k = 0; k < m->placed_count; k++) {
-        found = found || m->placed[k] == system->released.j;
+    for (int k = 0; k < system->placed_count; k++) {
+        found = found || system->placed[k] == system->released.j;
     }
     return found;
 }
 
+PRBM System with_bodies_placed(const System *system) {
+    System result = *system;
+    result.placed_count = system->mechanism->floating_count;
+    result.placed = system->mechanism->floating;
+    return result;
+}
+
 PRBM void place_bodies(const System *system, double amount, double *q) {
     const Mechanism *m = system->mechanism;
-    for (int k = 0; k < m->placed_count; k += PLACED_EACH) {
-        const int *place = m->placed + k, turn = place[SHIFTS_EACH];
+    for (int k = 0; k < system->placed_count; k += PLACED_EACH) {
+        const int *place = system->placed + k, turn = place[SHIFTS_EACH];
         for (int i = 0; i < PLACED_EACH; i++) {
             q[place[i]] = system->q0[place[i]];
         }
@@ -77,20 +84,19 @@ PRBM void place_bodies(const System *system, double amount, double *q) {
 
 /* Set the elements of the coordinates that are placed to zero. */
 static void clear_placed(const System *system, double *x) {
-    for (int k = 0; k < system->mechanism->placed_count; k++) {
-        x[system->mechanism->placed[k]] = 0.0;
+    for (int k = 0; k < system->placed_count; k++) {
+        x[system->placed[k]] = 0.0;
     }
 }
 
 /* Remove the coordinates that are placed from a balance (size, size): their changes are zero. */
 static void remove_placed(const System *system, int size, double *kkt) {
-    const Mechanism *m = system->mechanism;
     double scale = 0.0;
-    for (int i = 0; m->placed_count > 0 && i < system->n; i++) {
+    for (int i = 0; system->placed_count > 0 && i < system->n; i++) {
         scale = greater(scale, largest(system->n, kkt + i * size));
     }
-    for (int k = 0; k < m->placed_count; k++) {
-        int j = m->placed[k];
+    for (int k = 0; k < system->placed_count; k++) {
+        int j = system->placed[k];
         for (int i = 0; i < size; i++) {
             kkt[i * size + j] = kkt[j * size + i] = 0.0;
         }
@@ -100,37 +106,24 @@ static void remove_placed(const System *system, int size, double *kkt) {
 
 /* --- stiffness -------------------------------------------------------------------------------- */
 
-/* Add an element of the stiffness of the directions to that of the coordinates. */
-static void stiffen(const System *system, int i, int j, double x, double *K_t) {
-    if (system->mapped) {
-        pull_both(system, i, j, x, K_t);
-    } else {
-        K_t[i * system->n + j] += x;
-    }
-}
-
-/* K_t is K + Phi^T diag(Re(p)) Phi, with the pull p = (lam^T B - i w) e of each arm.  The diagonal
- * element of a stretch is -Re(p) of its arm; those of a stretch and the arm's angle are Im(p). */
-PRBM void tangent_stiffness(const System *system, int r, const Complex *w, const Complex *B,
-                            const double *lam, const Complex *e, double *K_t) {
+/* K_t is that of the elements plus Phi^T diag(Re(p)) Phi, with the pull p = (lam^T B - i w) e of each
+ * arm. */
+PRBM void tangent_stiffness(const System *system, double share, int r, const Complex *w,
+                            const Complex *B, const double *lam, const Complex *e, double *K_t,
+                            Scratch *scratch) {
+    size_t mark = scratch->used;
     int d = system->d;
-    copy(system->n * system->n, system->K, K_t);
+    Complex *pulled = take_complex(scratch, d, 1);
+    element_tangent(system, e, share, K_t, scratch);
     for (int j = 0; j < d; j++) {
-        int a = arm_of(system, j);
-        Complex row = complex_of(w[a].im, -w[a].re);
+        Complex row = complex_of(w[j].im, -w[j].re);
         for (int i = 0; i < r; i++) {
-            row = plus(row, scaled(lam[i], B[i * d + a]));
+            row = plus(row, scaled(lam[i], B[i * d + j]));
         }
-        Complex stress = product(row, e[a]);
-        if (is_shift(system, j)) {
-            continue; /* Positions are linear in displacements. */
-        }
-        stiffen(system, j, j, a == j ? stress.re : -stress.re, K_t);
-        if (a != j) {
-            stiffen(system, j, a, stress.im, K_t);
-            stiffen(system, a, j, stress.im, K_t);
-        }
+        pulled[j] = product(row, e[j]);
     }
+    add_geometric_stiffness(system, pulled, K_t);
+    scratch->used = mark;
 }
 
 static double largest_modulus(int count, const Complex *x) {
@@ -146,21 +139,15 @@ typedef struct {
     const System *system;
     Rows rows;
     Complex *w; /* (d,) spread */
-    double fraction; /* of the initial strains */
+    double fraction; /* of the initial strains and of the pretension of springs */
 } Balance;
 
 /* Compute the residual torques and constraints at (q, lam), and the constraint rows. */
 static void unbalanced(const Balance *balance, const double *state, const Complex *e,
                        double *torque, double *open_by, double *rows, Scratch *scratch) {
     const System *system = balance->system;
-    size_t used = scratch->used;
     int n = system->n, r = balance->rows.count;
-    double *turned = take(scratch, (size_t)n);
-    for (int j = 0; j < n; j++) {
-        double strain = system->rest[j] - system->q0[j];
-        turned[j] = state[j] - system->q0[j] - balance->fraction * strain;
-    }
-    springs(n, system->K, turned, torque);
+    element_forces(system, state, e, balance->fraction, torque, scratch);
     add_loads(system, balance->w, e, torque);
     jacobian(&balance->rows, e, rows);
     for (int j = 0; j < n; j++) {
@@ -170,25 +157,39 @@ static void unbalanced(const Balance *balance, const double *state, const Comple
     }
     clear_placed(system, torque);
     scalars(&balance->rows, e, open_by);
-    scratch->used = used;
+}
+
+/* Add a stiffness that is round-off beside that of the springs to the coordinates of bodies that only
+ * springs hold, which have motions without stiffness and load. */
+static void hold_idle(const System *system, double *K_t) {
+    const Mechanism *m = system->mechanism;
+    int n = system->n;
+    bool sprung = m->floating_count > system->placed_count;
+    double least = sprung ? SPRING_IDLE_RTOL * largest(n * n, system->stiffness) : 0.0;
+    for (int k = 0; sprung && k < m->floating_count; k++) {
+        K_t[m->floating[k] * n + m->floating[k]] += least;
+    }
 }
 
 /* Make one Newton step, limited to STATICS_TURN_MAX [rad]; false if the system is singular. */
 static bool newton_step(const Balance *balance, const Complex *e, double *torque, double *open_by,
                         const double *rows, double *state, double *turned, Scratch *scratch) {
     size_t used = scratch->used;
-    int n = balance->system->n, r = balance->rows.count, size = n + r;
+    const System *system = balance->system;
+    int n = system->n, r = balance->rows.count, size = n + r;
     double *K_t = take_matrix(scratch, n, n), *kkt = take_matrix(scratch, size, size);
     double *change = take(scratch, (size_t)size);
     Problem ignored;
-    tangent_stiffness(balance->system, r, balance->w, balance->rows.B, state + n, e, K_t);
+    tangent_stiffness(system, balance->fraction, r, balance->w, balance->rows.B, state + n, e, K_t,
+                      scratch);
+    hold_idle(system, K_t);
     saddle(n, r, K_t, rows, rows, kkt);
-    remove_placed(balance->system, size, kkt);
+    remove_placed(system, size, kkt);
     copy(n, torque, change);
     for (int i = 0; i < r; i++) {
         change[n + i] = -open_by[i];
     }
-    bool solved = solve(n, r, kkt, change, balance->system->length, scratch, &ignored);
+    bool solved = solve(n, r, kkt, change, system->length, scratch, &ignored);
     double turn = solved ? largest(n, change) : HUGE_VAL;
     double share = lesser(1.0, STATICS_TURN_MAX / greater(turn, STATICS_TURN_MIN));
     for (int i = 0; solved && i < size; i++) {
@@ -217,7 +218,7 @@ static bool balance_out(const Balance *balance, double *state, Scratch *scratch)
     Complex *e = take_complex(scratch, 1, system->d);
     double *torque = take(scratch, (size_t)n), *open_by = take(scratch, (size_t)r);
     double *rows = take_matrix(scratch, r, n);
-    double springs_scale = STATICS_FORCE_RTOL * largest(n * n, system->K);
+    double springs_scale = STATICS_FORCE_RTOL * largest(n * n, system->stiffness);
     double turn = HUGE_VAL;
     bool going = true, balanced = false, done = false;
     for (int step = 0; step < STATICS_ITERATIONS_MAX && going && !done; step++) {
@@ -269,7 +270,7 @@ static int sign_at(const System *system, bool held, double displacement, double 
     double *rows = take_matrix(scratch, r, n);
     directions(system, state, e);
     jacobian(&balance.rows, e, rows);
-    tangent_stiffness(system, r, balance.w, balance.rows.B, state + n, e, K_t);
+    tangent_stiffness(system, fraction, r, balance.w, balance.rows.B, state + n, e, K_t, scratch);
     saddle(n, r, K_t, rows, rows, kkt);
     remove_placed(system, size, kkt);
     int sign = determinant_sign(n, r, kkt, system->length, scratch);
@@ -284,7 +285,7 @@ static double jump(const System *system, const double *from, const double *to) {
     for (int j = 0; j < system->n; j++) {
         double turn = to[j] - from[j];
         bool link = system->mechanism->coordinates[j].link >= 0;
-        bool bends = link || system->K[j * system->n + j] > 0.0;
+        bool bends = link || system->stiffness[j * system->n + j] > 0.0;
         top = bends ? greater(top, largest(1, &turn)) : top;
     }
     return top;
@@ -300,7 +301,7 @@ static bool turns_about_point(const System *system, Scratch *scratch) {
     stack_release(system, B, response);
     Rows held = plain_rows(system, r + 1, B, NULL);
     jacobian(&held, system->e0, rows);
-    saddle(n, r, system->K, rows, rows, kkt);
+    saddle(n, r, system->stiffness, rows, rows, kkt);
     remove_placed(system, size, kkt);
     clear_placed(system, rows + r * n);
     zeros(size, response);
@@ -331,10 +332,14 @@ static bool heavy(const System *system) {
     return system->gravity.re != 0.0 || system->gravity.im != 0.0;
 }
 
+/* Return whether initial strains or the pretension of springs load the drawn shape. */
 static bool strained(const System *system) {
     bool found = false;
     for (int j = 0; j < system->n; j++) {
         found = found || system->rest[j] != system->q0[j];
+    }
+    for (int k = 0; k < system->coil_count; k++) {
+        found = found || system->laws[k].free_length != system->laws[k].drawn_length;
     }
     return found;
 }
@@ -342,7 +347,7 @@ static bool strained(const System *system) {
 /* Return whether the weight is far beyond what the springs can carry. */
 static bool limp(const System *system) {
     double weight = modulus(system->gravity) * largest_modulus(system->d, system->S);
-    return weight > STATICS_LIMP_RATIO * largest(system->n * system->n, system->K);
+    return weight > STATICS_LIMP_RATIO * largest(system->n * system->n, system->stiffness);
 }
 
 static bool unreachable(const System *system, bool held, double displacement, double done,
@@ -480,6 +485,18 @@ PRBM bool equilibrium(const System *system, bool held, double displacement, Equi
     shape->force = turns(system) ? system->length * state[n + r] : state[n + r];
     scratch->used = used;
     return found;
+}
+
+PRBM bool resting(const System *system, Equilibrium *shape, bool *balanced, Scratch *scratch,
+                  Problem *problem) {
+    bool sprung = system->placed_count < system->mechanism->floating_count;
+    Problem ignored;
+    *balanced = equilibrium(system, false, 0.0, shape, scratch, sprung ? &ignored : problem);
+    if (*balanced || !sprung) {
+        return *balanced;
+    }
+    System placed = with_bodies_placed(system);
+    return equilibrium(&placed, false, 0.0, shape, scratch, problem);
 }
 
 PRBM bool release_velocity(const System *system, const double *q, double speed, double *v,

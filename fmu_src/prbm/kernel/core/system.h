@@ -27,6 +27,12 @@ typedef struct {
     int a, b;
 } Spring;
 
+/* The law of a coil spring: stiffness [N/m], coefficient of the cube of the elongation [N/m^3], damping
+ * [N s/m], and its length without a force and as drawn [m]. */
+typedef struct {
+    double stiffness, cubic_stiffness, damping, free_length, drawn_length;
+} SpringLaw;
+
 /* The index TURNED - j stands for an arm that turns with coordinate j. */
 enum { TURNED = -2 };
 
@@ -105,6 +111,13 @@ typedef struct {
     Complex *S;               /* (d,) first mass moments */
     Complex *loops;           /* (r, d) */
     double *loops_c;          /* (r,) */
+    int placed_count;         /* Coordinates that no balance determines: those of the mechanism, or, */
+    const int *placed;        /* where a motion begins, of all bodies that float. */
+    int coil_count;
+    Complex *spans, *spans_c; /* (coils, d), (coils,) vectors from start to end of the springs */
+    SpringLaw *laws;          /* (coils,) */
+    double *stiffness;        /* (n, n) of all elements as drawn, without negative parts: K, if there
+                               * are no coils */
     Complex *gaps, *slides;   /* (s, d) */
     double *gaps_c;           /* (s,) */
     Complex *gaps_z, *slides_z; /* (s,) */
@@ -127,7 +140,7 @@ typedef struct {
     int corner_count;
     Complex *corners, *corners_c; /* (corners, d), (corners,): flexures, for drawings */
     int spring_count;
-    Spring *spring;           /* the springs between two coordinates */
+    Spring *spring;           /* the springs between two coordinates: of flexures and joints */
     double *grounded;         /* (even,) rates of the springs between a coordinate and the ground;
                                * K is the sum of both */
     int block_count;

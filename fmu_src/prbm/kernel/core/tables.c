@@ -7,7 +7,7 @@
 
 enum {
     ROOM = 8,                /* Bytes of memory per byte of the tables, an upper bound. */
-    ROOM_OF_COORDINATE = 32, /* Bytes of memory per coordinate. */
+    ROOM_OF_COORDINATE = 40, /* Bytes of memory per coordinate. */
     ROOM_OF_DIRECTION = 16,  /* Bytes of memory per direction. */
     ROOM_OF_CHANGE = 8,      /* Bytes of memory per element of the map to the directions. */
 };
@@ -182,6 +182,22 @@ static void read_joints(Reader *reader, Mechanism *m) {
     m->joints = joints;
 }
 
+static void read_coils(Reader *reader, Mechanism *m) {
+    Coil *coils = kept(reader, (size_t)m->coil_count, sizeof *coils);
+    for (int i = 0; i < m->coil_count && !reader->wrong; i++) {
+        coils[i].name = read_text(reader);
+        coils[i].between = read_connection(reader, m);
+        coils[i].pretensioned = read_flag(reader);
+        coils[i].stiffness = read_expression(reader, m);
+        if (coils[i].pretensioned) {
+            coils[i].free_length = read_expression(reader, m);
+        }
+        coils[i].cubic_stiffness = read_expression(reader, m);
+        coils[i].damping = read_expression(reader, m);
+    }
+    m->coils = coils;
+}
+
 static void read_stops(Reader *reader, Mechanism *m) {
     Stop *stops = kept(reader, (size_t)m->stop_count, sizeof *stops);
     for (int i = 0; i < m->stop_count && !reader->wrong; i++) {
@@ -348,6 +364,7 @@ static void read_mechanism(Reader *reader, Mechanism *m) {
     m->type_count = read_count(reader, 4);
     m->flexure_count = read_count(reader, 4);
     m->joint_count = read_count(reader, 4);
+    m->coil_count = read_count(reader, 4);
     m->stop_count = read_count(reader, 4);
     m->friction_count = read_count(reader, 4);
     m->force_count = read_count(reader, 4);
@@ -367,6 +384,7 @@ static void read_mechanism(Reader *reader, Mechanism *m) {
     read_types(reader, m);
     read_flexures(reader, m);
     read_joints(reader, m);
+    read_coils(reader, m);
     read_stops(reader, m);
     read_frictions(reader, m);
     read_forces(reader, m);

@@ -24,8 +24,8 @@ PRBM double release_penetration(const Configuration *configuration) {
 }
 
 /* The scale of rates is the fundamental angular frequency; if it is zero, the rate of a fall or of
- * the initial motion.  The scale of energies is the torque of the stiffest torsion spring at one
- * radian; without torsion springs, the largest inertia times the square of the rate. */
+ * the initial motion.  The scale of energies is the torque of the stiffest element at one radian,
+ * or at a displacement of the size; without elements, the largest inertia times the square of the rate. */
 /* Return the length of the arm of a direction in units of inertias: displacements have none. */
 static double arm_length(const System *system, int j) {
     return is_float(system, j) || is_shift(system, j) ? system->length : 1.0;
@@ -40,7 +40,7 @@ PRBM bool set_scales(Configuration *configuration, double frequency, Scratch *sc
     const Coordinate *coordinates = system->mechanism->coordinates;
     for (int i = 0; i < n * n; i++) {
         bool turns = coordinates[i / n].strain < 0 && coordinates[i % n].strain < 0;
-        torsion = turns ? greater(torsion, fabs(system->K[i])) : torsion;
+        torsion = turns ? greater(torsion, fabs(system->stiffness[i])) : torsion;
     }
     for (int i = 0; i < system->d * system->d; i++) {
         double lengths = arm_length(system, i / system->d) * arm_length(system, i % system->d);

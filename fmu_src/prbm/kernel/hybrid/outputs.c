@@ -1,6 +1,7 @@
 /* The outputs at the present state: the twin of hybrid/outputs.py. */
 #include <string.h>
 
+#include "core/elements.h"
 #include "core/gaps.h"
 #include "core/sections.h"
 #include "hybrid/access.h"
@@ -113,6 +114,22 @@ static void output_links(const Simulation *sim, double *links, double *stretches
     }
 }
 
+static void output_springs(Simulation *sim, double *out) {
+    const System *system = system_of(sim);
+    size_t mark = sim->scratch.used;
+    double *row = take(&sim->scratch, (size_t)system->n);
+    for (int k = 0; k < system->coil_count; k++) {
+        double *values = out + PER_SPRING * k;
+        SpringState now = spring_state(system, k, sim->present.e, 1.0);
+        length_gradient(system, k, sim->present.e, row);
+        double rate = dot(system->n, row, sim->present.y + system->n);
+        values[SPRING_FORCE] = now.tension + system->laws[k].damping * rate;
+        values[SPRING_LENGTH] = now.length;
+        values[SPRING_LENGTH_RATE] = rate;
+    }
+    sim->scratch.used = mark;
+}
+
 static void output_places(Simulation *sim) {
     const System *system = system_of(sim);
     const Slots *slots = &system->mechanism->slots;
@@ -121,6 +138,7 @@ static void output_places(Simulation *sim) {
     output_probes(sim, out + slots->probes);
     output_stops(sim, out + slots->stops);
     output_latched(sim, out + slots->latched);
+    output_springs(sim, out + slots->springs);
     if (system->mechanism->compliant_count > 0) {
         output_compliant(sim, out + slots->compliant, out + slots->latched);
     }
@@ -185,15 +203,10 @@ static void output_stresses(Simulation *sim) {
 }
 
 static void output_energies(Simulation *sim) {
-    size_t mark = sim->scratch.used;
     const System *system = system_of(sim);
-    int n = system->n;
     double *out = sim->present.outputs + system->mechanism->slots.energies;
-    double *deflection = take(&sim->scratch, (size_t)n);
-    for (int j = 0; j < n; j++) {
-        deflection[j] = sim->present.y[j] - system->rest[j];
-    }
-    out[ENERGY_ELASTIC] = elastic_energy(n, system->K, deflection);
+    out[ENERGY_ELASTIC] =
+        element_energy(system, sim->present.y, sim->present.e, &sim->scratch);
     for (int i = 0; system->mechanism->compliant_count > 0 && i < system->s; i++) {
         if (sim->state.touching[i].phase != PHASE_NONE) {
             double distance = gap(&sim->equations, i, sim->state.time, sim->present.e,
@@ -202,7 +215,6 @@ static void output_energies(Simulation *sim) {
         }
     }
     out[ENERGY_GRAVITATIONAL] = gravitational_energy(system, sim->present.e);
-    sim->scratch.used = mark;
 }
 
 static bool output_mobilities(Simulation *sim, Problem *problem) {
@@ -244,7 +256,7 @@ PRBM bool compute_outputs(Simulation *sim, int groups, bool near, Problem *probl
 /* Return the groups of outputs that must be computed for a value. */
 PRBM int output_groups(const Simulation *sim, int slot) {
     const Slots *slots = &sim->configuration.mechanism->slots;
-    bool of_stop = slot >= slots->stops && slot < slots->base;
+    bool of_stop = slot >= slots->stops && slot < slots->springs;
     bool force = of_stop && (slot - slots->stops) % PER_STOP == STOP_FORCE;
     if (force || slot == slots->energies + ENERGY_KINETIC) {
         return PLACES | MOTION;

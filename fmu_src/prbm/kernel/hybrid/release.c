@@ -42,6 +42,7 @@ PRBM void clear_progress(State *state, double start_time) {
     state->point = start_time;
     state->longest = state->arc.start = state->arc.h = state->arc.before.time = 0.0;
     state->step_size = state->log_of_error = state->fastest_rate = 0.0;
+    state->fastest_decay = 0.0;
     state->tolerance = state->frequency = state->angle = state->energy = 0.0;
     state->window_count = 0;
     state->pending = none;

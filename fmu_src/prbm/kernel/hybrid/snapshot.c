@@ -8,7 +8,7 @@
 #include "hybrid/snapshot.h"
 
 /* Numbers of a simulation, of a stop, and further ones of a compliant stop. */
-enum { SCALARS = 25, PER_STOP_STATE = 16, PER_CONTACT_STATE = 13 };
+enum { SCALARS = 26, PER_STOP_STATE = 16, PER_CONTACT_STATE = 13 };
 
 PRBM size_t simulation_state_count(const Simulation *simulation) {
     const Mechanism *m = simulation->configuration.mechanism;
@@ -58,7 +58,7 @@ PRBM void simulation_save(const Simulation *simulation, double *to) {
         state->step_size,    state->log_of_error,   state->front_time,   state->arc.start,
         state->arc.h,        state->window_since,   state->point,        state->longest,
         state->mode.lowest_bounce, state->angle,     state->energy,         state->fastest_rate,
-        state->arc.before.time,
+        state->arc.before.time, state->fastest_decay,
     };
     memcpy(to, scalars, sizeof scalars);
     to += SCALARS;
@@ -123,6 +123,7 @@ static void get_scalars(State *state, StateReader *reader) {
     state->energy = get_number(reader);
     state->fastest_rate = get_number(reader);
     state->arc.before.time = get_number(reader);
+    state->fastest_decay = get_number(reader);
 }
 
 static void get_contact(State *state, int i, StateReader *reader) {
@@ -200,6 +201,7 @@ static bool consistent(const Simulation *sim) {
     return !state->started ||
            (state->tolerance >= TOLERANCE_MIN && state->tolerance <= TOLERANCE_USED_MAX &&
             state->frequency >= 0.0 && state->fastest_rate >= 0.0 &&
+            state->fastest_decay >= 0.0 &&
             (!state->arc.valid ||
              (state->arc.h > 0.0 && state->arc.before.time <= state->arc.start)) &&
             state->front_time >= state->time &&

@@ -1,20 +1,26 @@
 /* The fastest mode and the longest stable step: the twin of hybrid/stability.py. */
 #include <math.h>
 
+#include "core/elements.h"
 #include "hybrid/access.h"
 #include "hybrid/stability.h"
 
-/* Set the torques (n,) of the springs, K w, for changes w of the coordinates. */
-static void spring_torques(const System *system, const double *w, double *torques) {
-    for (int j = 0; j < system->n; j++) {
-        torques[j] = system->grounded[j] * w[j];
+/* Return a bound of the rate of the damping of springs: the sum of those of each. */
+static double spring_decay(const Simulation *sim) {
+    const System *system = system_of(sim);
+    const Stepping *stepping = &sim->stepping;
+    double *x = stepping->response, *row = stepping->torques, sum = 0.0;
+    for (int k = 0; k < system->coil_count; k++) {
+        if (system->laws[k].damping > 0.0) {
+            length_gradient(system, k, stepping->evaluation.at.e, row);
+            zeros(system->even, x);
+            copy(system->n, row, x);
+            zeros(sim->equations.r, stepping->multipliers);
+            solve_again(&stepping->evaluation.factors, x, stepping->multipliers);
+            sum += system->laws[k].damping * dot(system->n, row, x);
+        }
     }
-    for (int k = 0; k < system->spring_count; k++) {
-        int a = system->spring[k].a, b = system->spring[k].b;
-        double torque = system->spring[k].rate * (w[a] - w[b]);
-        torques[a] += torque;
-        torques[b] -= torque;
-    }
+    return greater(sum, 0.0);
 }
 
 /* Make one power iteration with the factors of the equations.  The new direction is that of the
@@ -26,7 +32,7 @@ PRBM void refine_fastest(Simulation *sim) {
     const System *system = system_of(sim);
     int n = system->n;
     double *x = stepping->response;
-    spring_torques(system, state->fastest, stepping->torques);
+    element_torques(system, stepping->evaluation.at.e, state->fastest, stepping->torques, x);
     zeros(system->even, x);
     copy(n, stepping->torques, x);
     zeros(sim->equations.r, stepping->multipliers);
@@ -37,6 +43,7 @@ PRBM void refine_fastest(Simulation *sim) {
     for (int j = 0; j < n && longest > 0.0; j++) {
         state->fastest[j] = x[j] / longest;
     }
+    state->fastest_decay = spring_decay(sim);
 }
 
 PRBM bool find_fastest(Simulation *sim, Problem *problem) {
@@ -78,6 +85,7 @@ PRBM bool simulation_check_step(const Simulation *simulation, double step, Probl
 PRBM double stable_step(const Simulation *sim) {
     double rate = sim->state.fastest_rate;
     double damping = sim->equations.beta * (rate * rate) + sim->equations.mass_damping;
+    damping += sim->state.fastest_decay;
     if (damping > 2.0 * rate) {
         rate = 0.5 * (damping + square_root(damping * damping - 4.0 * (rate * rate)));
     }

@@ -96,6 +96,7 @@ typedef struct {
     double angle, energy; /* model exchange: magnitudes of the motion from the start [rad], [J] */
     double step_size, log_of_error; /* of the step size controller */
     double fastest_rate;            /* angular frequency of the fastest mode */
+    double fastest_decay;           /* bound of the rate of the damping of springs */
     double front_time;
     bool has_k1;          /* whether k1 has the rates of the front */
     Arc arc;

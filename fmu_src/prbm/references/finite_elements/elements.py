@@ -58,6 +58,7 @@ class FiniteElements:
         *,
         elements: int = 16,
     ) -> None:
+        mechanism.check_springless("a model of finite elements")
         mechanism.check_connected("a model of finite elements")
         self.model = ElementModel(mechanism, values, elements)
         self.equations = Equations(self.model)

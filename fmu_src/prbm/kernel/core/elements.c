@@ -1,0 +1,230 @@
+/* Elements with energy: the twin of mechanics/elements.py. */
+#include <string.h>
+
+#include "core/elements.h"
+#include "core/forces.h"
+#include "core/matrix.h"
+
+/* --- springs ---------------------------------------------------------------------------------- */
+
+PRBM double spring_tension(const SpringLaw *law, double x) {
+    return (law->stiffness + law->cubic_stiffness * (x * x)) * x;
+}
+
+PRBM double spring_slope(const SpringLaw *law, double x) {
+    return law->stiffness + 3.0 * law->cubic_stiffness * (x * x);
+}
+
+PRBM double spring_energy(const SpringLaw *law, double x) {
+    return (0.5 * law->stiffness + 0.25 * law->cubic_stiffness * (x * x)) * (x * x);
+}
+
+static const Complex *span_of_spring(const System *system, int k) {
+    return system->spans + k * system->d;
+}
+
+PRBM SpringState spring_state(const System *system, int k, const Complex *e, double share) {
+    const SpringLaw *law = &system->laws[k];
+    const Complex *A = span_of_spring(system, k);
+    double least = SPRING_LENGTH_RTOL * system->length, free_length = law->free_length;
+    SpringState now = {system->spans_c[k], 0.0, 0.0, 0.0};
+    for (int j = 0; j < system->d; j++) {
+        now.along = plus(now.along, product(A[j], e[j]));
+    }
+    double x = now.along.re, y = now.along.im;
+    if (share != 1.0) {
+        free_length = law->drawn_length + share * (law->free_length - law->drawn_length);
+    }
+    now.length = square_root(x * x + y * y + least * least);
+    now.elongation = now.length - free_length;
+    now.tension = spring_tension(law, now.elongation);
+    return now;
+}
+
+PRBM void span_gradient(const System *system, int k, Complex u, const Complex *e, double *row) {
+    const Complex *A = span_of_spring(system, k);
+    zeros(system->n, row);
+    for (int j = 0; j < system->d; j++) {
+        Complex arm = product(A[arm_of(system, j)], e[j]);
+        pull(system, j, -product(conjugate(u), arm).im, row);
+    }
+}
+
+PRBM void length_gradient(const System *system, int k, const Complex *e, double *row) {
+    SpringState now = spring_state(system, k, e, 1.0);
+    span_gradient(system, k, scaled(1.0 / now.length, now.along), e, row);
+}
+
+PRBM double add_coil_forces(const System *system, const Complex *e, const double *v, double *force,
+                            double *row) {
+    double loss = 0.0;
+    for (int k = 0; k < system->coil_count; k++) {
+        SpringState now = spring_state(system, k, e, 1.0);
+        span_gradient(system, k, scaled(1.0 / now.length, now.along), e, row);
+        double rate = dot(system->n, row, v), damper = system->laws[k].damping * rate;
+        add_scaled(system->n, -(now.tension + damper), row, force);
+        loss += damper * rate;
+    }
+    return loss;
+}
+
+/* Stiffnesses of a spring along and across it. */
+typedef struct {
+    double along, across;
+} Stiffnesses;
+
+static Stiffnesses stiffnesses(const SpringLaw *law, const SpringState *now) {
+    Stiffnesses result = {spring_slope(law, now->elongation), now->tension / now->length};
+    return result;
+}
+
+/* The same without negative parts. */
+static Stiffnesses positive_stiffnesses(const SpringLaw *law, const SpringState *now) {
+    Stiffnesses own = stiffnesses(law, now);
+    Stiffnesses result = {greater(own.along, 0.0), greater(own.across, 0.0)};
+    return result;
+}
+
+/* Add the product of a stiffness and row row^T to K (n, n). */
+static void add_outer(int n, double stiffness, const double *row, double *K) {
+    for (int i = 0; i < n; i++) {
+        add_scaled(n, stiffness * row[i], row, K + i * n);
+    }
+}
+
+/* Set row (n,) to one of the gradients g, dx/dq and dy/dq of a spring, and return its stiffness: their
+ * outer products with these stiffnesses are the stiffness without second derivatives of z. */
+static double stiffness_row(const System *system, int k, const SpringState *now, Stiffnesses own,
+                            const Complex *e, int which, double *row) {
+    Complex along = scaled(1.0 / now->length, now->along);
+    Complex u = which == 0 ? along : complex_of(which == 1, which == 2);
+    span_gradient(system, k, u, e, row);
+    return which == 0 ? own.along - own.across : own.across;
+}
+
+enum { STIFFNESS_ROWS = 3 };
+
+/* Add the stiffness of spring k without second derivatives of z to K (n, n). */
+static void add_stiffnesses(const System *system, int k, const SpringState *now, Stiffnesses own,
+                            const Complex *e, double *K, double *row) {
+    for (int i = 0; i < STIFFNESS_ROWS; i++) {
+        double stiffness = stiffness_row(system, k, now, own, e, i, row);
+        add_outer(system->n, stiffness, row, K);
+    }
+}
+
+/* --- geometric stiffness ---------------------------------------------------------------------- */
+
+/* Add an element of the stiffness of the directions to that of the coordinates. */
+static void stiffen(const System *system, int i, int j, double x, double *K_t) {
+    if (system->mapped) {
+        pull_both(system, i, j, x, K_t);
+    } else {
+        K_t[i * system->n + j] += x;
+    }
+}
+
+/* Positions are linear in displacements, which have no such stiffness. */
+PRBM void add_geometric_stiffness(const System *system, const Complex *pull_of, double *K_t) {
+    for (int j = 0; j < system->d; j++) {
+        int a = arm_of(system, j);
+        if (is_shift(system, j)) {
+            continue;
+        }
+        stiffen(system, j, j, a == j ? pull_of[a].re : -pull_of[a].re, K_t);
+        if (a != j) {
+            stiffen(system, j, a, pull_of[a].im, K_t);
+            stiffen(system, a, j, pull_of[a].im, K_t);
+        }
+    }
+}
+
+/* --- all elements ----------------------------------------------------------------------------- */
+
+/* Set the deflections (n,) of flexures and joints. */
+static void deflections(const System *system, const double *q, double share, double *turned) {
+    for (int j = 0; j < system->n; j++) {
+        double strain = system->rest[j] - system->q0[j];
+        turned[j] = share == 1.0 ? q[j] - system->rest[j] : q[j] - system->q0[j] - share * strain;
+    }
+}
+
+PRBM void element_forces(const System *system, const double *q, const Complex *e, double share,
+                         double *force, Scratch *scratch) {
+    size_t mark = scratch->used;
+    double *row = take(scratch, (size_t)system->n);
+    deflections(system, q, share, row);
+    springs(system->n, system->K, row, force);
+    for (int k = 0; k < system->coil_count; k++) {
+        SpringState now = spring_state(system, k, e, share);
+        span_gradient(system, k, scaled(1.0 / now.length, now.along), e, row);
+        add_scaled(system->n, -now.tension, row, force);
+    }
+    scratch->used = mark;
+}
+
+PRBM void element_tangent(const System *system, const Complex *e, double share, double *K_t,
+                          Scratch *scratch) {
+    size_t mark = scratch->used;
+    int d = system->d;
+    double *row = take(scratch, (size_t)system->n);
+    Complex *pulled = take_complex(scratch, d, 1);
+    copy(system->n * system->n, system->K, K_t);
+    for (int k = 0; k < system->coil_count; k++) {
+        SpringState now = spring_state(system, k, e, share);
+        Stiffnesses own = stiffnesses(&system->laws[k], &now);
+        Complex force = scaled(-own.across, conjugate(now.along));
+        add_stiffnesses(system, k, &now, own, e, K_t, row);
+        for (int j = 0; j < d; j++) {
+            pulled[j] = product(force, product(span_of_spring(system, k)[j], e[j]));
+        }
+        add_geometric_stiffness(system, pulled, K_t);
+    }
+    scratch->used = mark;
+}
+
+PRBM double element_energy(const System *system, const double *q, const Complex *e,
+                           Scratch *scratch) {
+    size_t mark = scratch->used;
+    double *turned = take(scratch, (size_t)system->n);
+    deflections(system, q, 1.0, turned);
+    double energy = elastic_energy(system->n, system->K, turned);
+    for (int k = 0; k < system->coil_count; k++) {
+        energy += spring_energy(&system->laws[k], spring_state(system, k, e, 1.0).elongation);
+    }
+    scratch->used = mark;
+    return energy;
+}
+
+PRBM void element_stiffness(const System *system, const Complex *e, double *K, Scratch *scratch) {
+    size_t mark = scratch->used;
+    double *row = take(scratch, (size_t)system->n);
+    copy(system->n * system->n, system->K, K);
+    for (int k = 0; k < system->coil_count; k++) {
+        SpringState now = spring_state(system, k, e, 1.0);
+        Stiffnesses own = positive_stiffnesses(&system->laws[k], &now);
+        add_stiffnesses(system, k, &now, own, e, K, row);
+    }
+    scratch->used = mark;
+}
+
+PRBM void element_torques(const System *system, const Complex *e, const double *w, double *torques,
+                          double *row) {
+    for (int j = 0; j < system->n; j++) {
+        torques[j] = system->grounded[j] * w[j];
+    }
+    for (int k = 0; k < system->spring_count; k++) {
+        int a = system->spring[k].a, b = system->spring[k].b;
+        double torque = system->spring[k].rate * (w[a] - w[b]);
+        torques[a] += torque;
+        torques[b] -= torque;
+    }
+    for (int k = 0; k < system->coil_count; k++) {
+        SpringState now = spring_state(system, k, e, 1.0);
+        Stiffnesses own = positive_stiffnesses(&system->laws[k], &now);
+        for (int i = 0; i < STIFFNESS_ROWS; i++) {
+            double stiffness = stiffness_row(system, k, &now, own, e, i, row);
+            add_scaled(system->n, stiffness * dot(system->n, row, w), row, torques);
+        }
+    }
+}

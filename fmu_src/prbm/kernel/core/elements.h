@@ -1,0 +1,47 @@
+/* Elements with energy: flexures and torsion at joints, and springs between points.  Statics, modes,
+ * the equations of motion, scales and the stable step read the sum of all. */
+#ifndef PRBM_ELEMENTS_H
+#define PRBM_ELEMENTS_H
+
+#include "core/system.h"
+
+/* A spring in one shape: the vector from its start to its end [m], its length and elongation [m], and
+ * its elastic force, positive in tension [N]. */
+typedef struct {
+    Complex along;
+    double length, elongation, tension;
+} SpringState;
+
+PRBM double spring_tension(const SpringLaw *law, double x);
+PRBM double spring_slope(const SpringLaw *law, double x);
+PRBM double spring_energy(const SpringLaw *law, double x);
+/* Return a vector and the length of a spring with a share of its pretension. */
+PRBM SpringState spring_state(const System *system, int k, const Complex *e, double share);
+/* Set row (n,) to the derivatives of the displacement of the end of spring k relative to its start,
+ * along a vector u: dz.u, with the unit vector along the spring those of its length. */
+PRBM void span_gradient(const System *system, int k, Complex u, const Complex *e, double *row);
+/* Set row (n,) to the derivatives of the length of spring k. */
+PRBM void length_gradient(const System *system, int k, const Complex *e, double *row);
+/* Add the forces of springs and dampers to force (n,), and return the power that they dissipate.
+ * row (n,) is working memory. */
+PRBM double add_coil_forces(const System *system, const Complex *e, const double *v, double *force,
+                            double *row);
+
+/* Compute the elastic forces (n,) of all elements along the coordinates.  share: that of the initial
+ * strains and of the pretension of springs. */
+PRBM void element_forces(const System *system, const double *q, const Complex *e, double share,
+                         double *force, Scratch *scratch);
+/* Set K_t (n, n) to minus the derivatives of these forces. */
+PRBM void element_tangent(const System *system, const Complex *e, double share, double *K_t,
+                          Scratch *scratch);
+PRBM double element_energy(const System *system, const double *q, const Complex *e,
+                           Scratch *scratch);
+/* Set K (n, n) to the stiffness without negative parts. */
+PRBM void element_stiffness(const System *system, const Complex *e, double *K, Scratch *scratch);
+/* Set torques (n,) to the product of this stiffness and w (n,); row (n,) is working memory. */
+PRBM void element_torques(const System *system, const Complex *e, const double *w, double *torques,
+                          double *row);
+/* Add the stiffness by forces that act on arms to K_t (n, n): pull (d,) of each arm, see the twin. */
+PRBM void add_geometric_stiffness(const System *system, const Complex *pull, double *K_t);
+
+#endif
