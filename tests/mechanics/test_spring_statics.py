@@ -5,6 +5,8 @@ import math
 import numpy as np
 import pytest
 
+import prbm
+from prbm.analysis.holding import described
 from prbm.analysis.linear_model import linearize
 from prbm.analysis.load_path import load_path
 from prbm.base.errors import EquilibriumError
@@ -12,6 +14,7 @@ from prbm.mechanics.assembly import assemble
 from prbm.mechanics.elements import Elements
 from prbm.mechanics.modal import damping, modes
 from prbm.mechanics.statics import equilibrium, holding_stiffness
+from prbm.sweeps.study import study
 from springs import oscillator, truss, web
 
 
@@ -129,3 +132,19 @@ def test_damping_is_the_derivative_of_the_forces_by_the_rates():
     C = elements.damping(e, 0.0)
     assert elements.motion_force(q, e, v, 0.0) - elements.force(q, e) == pytest.approx(-C @ v)
     assert elements.loss(e, v, 0.0) == pytest.approx(v @ C @ v)
+
+
+def test_motions_without_stiffness_are_neither_unstable_nor_the_fundamental_mode():
+    """The block of 2 kg moves freely across its spring of 200 N/m, and turns about its eye."""
+    guide, expected = oscillator(), math.sqrt(200.0 / 2.0) / (2.0 * math.pi)
+    shape = prbm.equilibrium(guide)
+    assert shape.modes.frequency[:2] == pytest.approx([0.0, 0.0], abs=shape.modes.rounding)
+    assert shape.stable
+    assert shape.fundamental == pytest.approx(expected)
+    assert repr(shape) == "<StaticShape of Oscillator: free at 0 m, stable>"
+    point = described(shape.system, 0.0, shape.shape)
+    assert point.unstable == 0
+    assert point.frequency == pytest.approx(expected)
+    found = study(guide, {"coil.stiffness": [200.0, 800.0]}, ["fundamental", "mode(1)"])
+    assert found.outputs["fundamental"] == pytest.approx([expected, 2.0 * expected])
+    assert found.outputs["mode(1)"] == pytest.approx([0.0, 0.0], abs=1e-6)

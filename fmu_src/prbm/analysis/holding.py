@@ -18,7 +18,7 @@ import numpy as np
 
 from ..base.progress import Progress
 from ..mechanics.arrays import Real, Whole
-from ..mechanics.modal import modes, moved_by, unstable_directions
+from ..mechanics.modal import first_acting, modes, moved_by, unstable_directions
 from ..mechanics.statics import Equilibrium, equilibrium, holding_stiffness
 from ..mechanics.system import System, unit
 from .equilibrium_curve import LoadPath, PathPoint
@@ -81,7 +81,8 @@ def described(system: System, displacement: float, shape: Equilibrium) -> Held:
     along = moved_by(system, shape.q, found.shape)
     return Held(
         displacement, shape.force, holding_stiffness(system, shape), moved.imag,
-        float(shape.q[frame.j]), float(frequency[0]) if len(frequency) else math.nan,
+        float(shape.q[frame.j]),
+        float(frequency[first_acting(system, found)]) if len(frequency) else math.nan,
         unstable_directions(found.frequency), unstable_directions(found.frequency, along),
     )  # fmt: skip
 

@@ -26,7 +26,7 @@ class Place(NamedTuple):
     angle: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class StaticShape:
     """A static shape under loads.
 
@@ -69,8 +69,21 @@ class StaticShape:
 
     @property
     def stable(self) -> bool:
-        """Whether the shape is stable under dead loads."""
-        return bool((self.modes.frequency[:1] > 0.0).all())
+        """Whether no direction is unstable under dead loads; motions without stiffness are not."""
+        return modal.unstable_directions(self.modes.frequency) == 0
+
+    @property
+    def fundamental(self) -> float:
+        """Frequency of the first mode that is not free [Hz]; negative if unstable, 0 without."""
+        found = self.modes
+        first = modal.first_acting(self.system, found)
+        return float(found.frequency[first]) if len(found.frequency) else 0.0
+
+    def __repr__(self) -> str:
+        name, kind = self.system.mechanism.name, "held" if self.held else "free"
+        unit = "rad" if self.system.mechanism.release.turns else "m"
+        stability = "stable" if self.stable else "unstable"
+        return f"<StaticShape of {name}: {kind} at {self.displacement:.6g} {unit}, {stability}>"
 
     @cached_property
     def positions(self) -> dict[str, Place]:

@@ -66,7 +66,7 @@ def _shapes(
     ]
     _print(head + load_text(loads), points, system)
     if not options.held and not math.isnan(points[0].frequency):
-        _print_rest(points[0].displacement, points[0].frequency > 0.0, system)
+        _print_rest(points[0].displacement, points[0].unstable == 0, system)
     output.table(f"{mechanism.name}-equilibrium.csv", _csv_head(unit), _rows(points))
     places = [
         [point.displacement, name, *place]
@@ -238,7 +238,7 @@ def _frequency(point: holding.Held) -> str:
     """Return the frequency as text; a star marks shapes that are unstable while they are held."""
     if math.isnan(point.frequency):  # No body is held.
         return "-"
-    text = f"{point.frequency:.5g}" if point.frequency > 0.0 else "unstable"
+    text = "unstable" if point.unstable else f"{point.frequency:.5g}"
     return f"{text}*" if point.unstable_held else text
 
 

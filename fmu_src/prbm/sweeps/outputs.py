@@ -117,6 +117,8 @@ class Output:
         if self.reduction == REST:
             body, _, what = self.variable.rpartition(".")
             return float(getattr(shape.positions[body], what))
+        if self.variable == FUNDAMENTAL:
+            return float(shape.fundamental)
         found, k = shape.modes.frequency, int(self.variable)
         if k > len(found):
             raise ParameterError(f"{self.column}: the mechanism has {len(found)} modes only")
@@ -206,7 +208,7 @@ def parse_output(text: str, known: Container[str], column: str | None = None) ->
     name = text if column is None else column
     static = None if text in known else _STATIC.fullmatch(text.strip())
     if text.strip() == FUNDAMENTAL and text not in known:
-        return Output(name, "1", MODE)
+        return Output(name, FUNDAMENTAL, MODE)
     if static is not None:
         return Output(name, (static[2] or static[4]).strip(), static[1] or static[3])
     if text not in known and text.strip() in QUANTITIES:
