@@ -148,3 +148,13 @@ def test_motions_without_stiffness_are_neither_unstable_nor_the_fundamental_mode
     found = study(guide, {"coil.stiffness": [200.0, 800.0]}, ["fundamental", "mode(1)"])
     assert found.outputs["fundamental"] == pytest.approx([expected, 2.0 * expected])
     assert found.outputs["mode(1)"] == pytest.approx([0.0, 0.0], abs=1e-6)
+
+
+def test_a_motion_without_stiffness_does_not_make_a_shape_unstable():
+    """The body at the apex turns freely; its lowest other frequency is sqrt(2 k sin(a)^2/m)."""
+    model = truss()
+    system = assemble(model, model.values())
+    point = described(system, 0.0, equilibrium(system))
+    assert point.unstable == 0
+    lowest = math.sqrt(2e3) * 0.05 / LENGTH / (2.0 * math.pi)
+    assert point.frequency == pytest.approx(lowest)

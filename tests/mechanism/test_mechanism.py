@@ -18,6 +18,7 @@ from prbm.mechanism.description import Mechanism
 from prbm.mechanism.expressions import affine
 from prbm.mechanism.parameters import Parameter
 from prbm.mechanism.parts import Body, Flexure, FlexureType, Force, Joint, Release, Stop
+from springs import oscillator
 from support import mechanism
 
 GUIDE = mechanism("PRBDM2R")
@@ -203,6 +204,18 @@ def test_bodies_that_nothing_connects_to_the_ground_are_free():
     assert changed().free_bodies == ()
     with pytest.raises(MechanismError, match=r"the closed form has no bodies .* connect loose to"):
         changed(bodies=(BODY, loose)).check_connected("the closed form")
+
+
+def test_a_computation_without_springs_names_them():
+    with pytest.raises(MechanismError, match="finite elements has no springs: remove coil, or"):
+        oscillator().check_springless("a model of finite elements")
+
+
+def test_a_body_on_springs_to_the_ground_does_not_fly_freely():
+    block = oscillator()
+    assert (block.floating_bodies, block.free_bodies) == (("block",), ())
+    block.check_connected("a linear model")
+    assert dataclasses.replace(block, damping_zeta=0.1).damping_zeta == 0.1
 
 
 def test_a_flexure_without_length_is_rejected():
