@@ -24,7 +24,7 @@ ROLES = {"input": "u", "output": "o", "local": "o", "calculatedParameter": "o"}
 ENDS = {
     "gap": "g", "impact_count": "n", "work": "w", "kinetic": "e", "elastic": "e",
     "gravitational": "e", "dissipated": "e", "tolerance": "a", "position": "m",
-    "displacement": "m", "velocity": "m",
+    "displacement": "m", "velocity": "m", "mobility": "m",
 }  # fmt: skip
 """Tags of variables by the end of their names; the driver's oracles read them."""
 
@@ -105,7 +105,8 @@ def _line(variable: Any, kind: str, ends: set[str]) -> str:
     """Return the line of a plan for a variable: reference, type, role, tag, start and bounds.
 
     The variables of the same part end with ``ends``.  The gap of a compliant stop, which has a
-    peak force, may be negative; what moves the wall of a stop has a tag.
+    peak force, may be negative; what moves the wall of a stop has a tag: its mobility, too, since
+    an impact moves a wall of finite mass.
     """
     v = variable
     role = ROLES.get(v.causality) or ("t" if v.variability == "tunable" else "p")
