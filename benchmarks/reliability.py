@@ -22,7 +22,7 @@ from reliability.report import Part
 
 PARTS = {
     # Name: size of the long run, size of the short run.
-    "calls": (5_200_000, 100_000),
+    "calls": (2_000_000, 100_000),
     "python_calls": (300, 40),
     "states": (20_000, 2_000),
     "draws": (2_000, 20),
