@@ -238,8 +238,8 @@ def _frequency(point: holding.Held) -> str:
     """Return the frequency as text; a star marks shapes that are unstable while they are held."""
     if math.isnan(point.frequency):  # No body is held.
         return "-"
-    text = f"{point.frequency:.5g}" if point.frequency > 0.0 else "free"
-    text = "unstable" if point.unstable else text
+    free = "unstable" if point.unstable else "free"
+    text = f"{point.frequency:.5g}" if point.frequency > 0.0 else free
     return f"{text}*" if point.unstable_held else text
 
 

@@ -111,18 +111,18 @@ class _Plot:
 
         ``x`` (n,) is the displacement or rotation of the released body at all rows, or its rate.
         """
-        amount, values = self.system.amount, []
-        for hit in self.impacts:
-            for change in (hit.before, hit.after):
-                if rate:
-                    h = RATE_ANGLE / (float(np.abs(change).max()) or 1.0)
-                    ends = amount(hit.q + h * change), amount(hit.q - h * change)
-                    values.append((ends[0] - ends[1]) / (2.0 * h))
-                else:
-                    values.append(amount(hit.q))
-        times = np.repeat([hit.time for hit in self.impacts], 2)
+        both = [(hit, change) for hit in self.impacts for change in (hit.before, hit.after)]
+        times = [hit.time for hit, _ in both]
+        values = [
+            self._rate(hit.q, change) if rate else self.system.amount(hit.q) for hit, change in both
+        ]
         rows = np.searchsorted(self.seconds, times)
         return self.factor * np.insert(self.seconds, rows, times), np.insert(x, rows, values)
+
+    def _rate(self, q: Real, v: Real) -> float:
+        """Return the rate of the displacement or rotation, by a central difference along v."""
+        h = RATE_ANGLE / (float(np.abs(v).max()) or 1.0)
+        return (self.system.amount(q + h * v) - self.system.amount(q - h * v)) / (2.0 * h)
 
     def draw_impacts(self, axes: Axes, time: Real, x: Real) -> None:
         """Mark the impacts on a curve."""
@@ -305,11 +305,11 @@ def _displacement(axes: Axes, plot: _Plot) -> None:
 
 def _rotation(axes: Axes, plot: _Plot) -> None:
     body = plot.mechanism.release.body
-    angle = np.degrees(plot.columns[f"{body}.angle"])
-    time, through = plot.through_impacts(np.radians(angle))
+    angle = plot.columns[f"{body}.angle"]
+    time, through = plot.through_impacts(angle)
     axes.plot(time, np.degrees(through), color=PAST, linewidth=1.4, label=body)
     plot.draw_impacts(axes, time, np.degrees(through))
-    _touched(axes, plot, angle)
+    _touched(axes, plot, np.degrees(angle))
     if len(axes.lines) > 1:
         axes.legend(loc="best", fontsize=9, frameon=False, ncols=3)
     axes.set_ylabel("rotation [deg]")
