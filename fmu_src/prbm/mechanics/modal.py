@@ -16,7 +16,7 @@ from . import constraints
 from .arrays import Complex, Real
 from .elements import Elements
 from .forces import field_row
-from .statics import Equilibrium, resting, tangent_stiffness
+from .statics import Equilibrium, resting, sprung, tangent_stiffness
 from .system import System
 
 
@@ -197,7 +197,7 @@ def first_acting(system: System, found: Modes) -> int:
 
     Without bodies that only springs connect to the ground it is 0.
     """
-    if len(system.floating) == len(system.placed):
+    if not len(sprung(system)):
         return 0
     acting = np.flatnonzero(np.abs(found.frequency) > found.rounding)
     return int(acting[0]) if len(acting) else 0

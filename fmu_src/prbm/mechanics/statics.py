@@ -203,12 +203,18 @@ def equilibrium(
     return Equilibrium(state[:n], state[n : n + r], force, w)
 
 
+def sprung(system: System) -> Whole:
+    """Return the coordinates of the bodies that only springs connect to the ground, (3 k,)."""
+    found: Whole = np.setdiff1d(system.floating, system.placed)
+    return found
+
+
 def with_bodies_placed(system: System) -> System:
     """Return a system in which bodies without flexures and joints are placed, springs or not.
 
     They are as drawn, or at the displacement or rotation of the release, where a motion begins.
     """
-    if len(system.placed) == len(system.floating):
+    if not len(sprung(system)):
         return system
     return replace(system, placed=system.floating)
 
@@ -226,7 +232,7 @@ def resting(system: System) -> tuple[Equilibrium, bool]:
     try:
         return equilibrium(system), True
     except EquilibriumError:
-        if len(system.placed) == len(system.floating):
+        if not len(sprung(system)):
             raise
         return equilibrium(with_bodies_placed(system)), False
 
@@ -383,7 +389,7 @@ def _newton(system: System, given: _Given, start: Real) -> Real | None:
     B, c = _holding_rows(system, held)
     stiffest = float(np.abs(elements.drawn).max())
     springs_scale = STATICS_FORCE_RTOL * stiffest
-    sprung = np.setdiff1d(system.floating, system.placed)
+    idle = sprung(system)
     state, turn = start.copy(), math.inf
     state[system.placed] = _places(system, held or 0.0)
     for _ in range(STATICS_ITERATIONS_MAX):
@@ -405,7 +411,7 @@ def _newton(system: System, given: _Given, start: Real) -> Real | None:
             return state
         K = elements.tangent(e, share)
         K_t = tangent_stiffness(K, w, B, lam, e, system.arm, system.Phi)
-        K_t[sprung, sprung] += SPRING_IDLE_RTOL * stiffest
+        K_t[idle, idle] += SPRING_IDLE_RTOL * stiffest
         kkt = _placed(system, constraints.saddle(K_t, rows, rows))
         try:
             right = np.concatenate([torque, -open_by])
@@ -603,7 +609,7 @@ def pin_idle(system: System, kkt: Real) -> None:
     """
     n = system.n
     largest = float(np.abs(kkt[:n, :n]).max())
-    for j in np.setdiff1d(system.floating, system.placed):
+    for j in sprung(system):
         acting = np.abs(kkt[j])
         if acting[:n].max() <= SPRING_IDLE_RTOL * largest and not np.any(acting[n:]):
             kkt[j], kkt[:, j] = 0.0, 0.0
