@@ -33,7 +33,7 @@ HIDDEN = ("defs", "symbol", "clipPath", "mask", "pattern", "metadata", "style", 
 PIECES_MAX = 4096  # Straight pieces of one curve.
 CURVE_POINTS = 9  # Points of a curve from which its size and bend are estimated.
 TEXT_MAX = 1 << 20  # Characters of one path.
-NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+NUMBER = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?")
 TRANSFORM = re.compile(r"(\w+)\s*\(([^()]{0,400})\)")
 
 
@@ -89,7 +89,7 @@ def _tag(element: ElementTree.Element) -> str:
 
 def _unit(root: ElementTree.Element, curves: Curves) -> float:
     """Return the length of a user unit from width and view box [m]."""
-    found = re.fullmatch(rf"\s*({NUMBER.pattern})\s*([a-z]*)\s*", root.get("width", ""))
+    found = re.fullmatch(rf"\s*({NUMBER.pattern})\s*+([a-z]*)\s*", root.get("width", ""))
     box = NUMBER.findall(root.get("viewBox", ""))
     if found and found[2] in UNITS:
         width = float(found[1]) * UNITS[found[2]]

@@ -11,9 +11,10 @@ from ..files.settings import PERCENT, UserMistake, has_unit, quantity, without_e
 from ..files.units import si_unit
 from ..mechanism.description import Mechanism
 
-PLUS_MINUS = re.compile(r"\s*(?:\+\s*/?\s*-|±)\s*")
+PLUS_MINUS = re.compile(r"\s*(?:\+\s*+(?:/\s*+)?-|±)\s*")
 WHERE = re.compile(
-    r"(?P<value>.*?)(?:\s+mode\s+(?P<mode>\d{1,9}))?(?:\s+at\s+(?P<at>.+))?\s*", re.DOTALL
+    r"(?P<value>.*?)(?:(?<!\s)\s+mode\s+(?P<mode>\d{1,9}))?(?:(?<!\s)\s+at\s+(?P<at>.+))?(?<!\s)\s*",
+    re.DOTALL,
 )
 
 

@@ -12,7 +12,7 @@ MISSING = frozenset(
     ("", "nan", "inf", "+inf", "-inf", "-", "--", "na", "n/a", "#n/a", "null", "none", "ol",
      "over", "overflow", "∞", "-∞", "1.#qnan", "#div/0!", "#wert!", "#value!")
 )  # fmt: skip
-NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
+NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eEdD][+-]?\d+)?")
 OPENING = {"]": "[", ")": "("}
 
 

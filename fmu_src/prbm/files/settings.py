@@ -210,7 +210,7 @@ def has_unit(text: str) -> bool:
 
 def _nonzero(text: str) -> bool:
     """Return whether a text is other than a zero without a unit."""
-    return re.fullmatch(r"[+-]?0*\.?0*", text) is None
+    return re.fullmatch(r"[+-]?0*(?:\.0*)?", text) is None
 
 
 def units_of(mechanism: Mechanism) -> dict[str, str]:

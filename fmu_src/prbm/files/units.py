@@ -64,11 +64,11 @@ DEFINITIONS = f"""{MECHANICAL}tera- = 1e12 = T-
 """  # Pint's own list is not used: some of its units are likely misprints of these.
 KNOWN = "m, g, s, N, Nm, Pa, J, W, Hz, rad, deg, with SI prefixes, joined as in kg/m3 or N.m"
 
-_NUMBER = r"(?>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"  # Atomic: 1e3 is not 1 with the unit e3.
+_NUMBER = r"(?>(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)"  # Atomic: 1e3 is not 1 with the unit e3.
 _POWER = r"[A-Za-zµμ°]+(?:\^?-?[0-9]+)?"
 _PRODUCT = rf"{_POWER}(?:(?:\s*[.*·⋅]\s*|\s+){_POWER})*"
 _UNIT = rf"{_PRODUCT}(?:\s*/\s*{_POWER})*"
-_PLAIN = re.compile(rf"([+-]?{_NUMBER})\s*((?:1?\s*/\s*)?{_UNIT})")
+_PLAIN = re.compile(rf"([+-]?{_NUMBER})\s*+((?:1?\s*+/\s*+)?{_UNIT})")
 _SYMBOL = r"[A-Za-zµμ]+"
 _STIFFNESS = re.compile(rf"([+-]?{_NUMBER})\s*({_SYMBOL})\s*/\s*({_SYMBOL})\^?([0-9]+\.?[0-9]*)?")
 _LITERAL = re.compile(rf"(?<![\w.\]])({_NUMBER})\s*({_UNIT})")
