@@ -327,3 +327,14 @@ def test_holes_are_not_filled() -> None:
     pixels = np.asarray(canvas.buffer_rgba())[::-1, :, 0]
     assert pixels[37, 37] == 255
     assert (pixels[12, 12], pixels[62, 62]) == (0, 0)
+
+
+@pytest.mark.parametrize("size", [1e-59, 1e-258, 5e-324])
+def test_the_smallest_outlines_have_a_mass_or_are_rejected(size: float) -> None:
+    """No squares of lengths are rounded to zero without a word."""
+    corners = points([0, size, size * 1j])
+    if size < 1e-60:
+        with pytest.raises(MechanismError, match="too short for a mass"):
+            plate("body", corners, [], 1.0, 1.0)
+    else:
+        assert plate("body", corners, [], 1.0, 1.0)["mass"] == pytest.approx(size**2 / 2)

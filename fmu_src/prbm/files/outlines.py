@@ -14,6 +14,7 @@ from ..mechanism.parts import Point
 from .images import same, written
 
 CORNERS_MAX = 1000  # Corners of an outline; every pair of its sides is checked.
+LENGTH_MIN = 1e-60  # m; the fourth powers of shorter lengths lose digits.
 TOUCHING_RTOL = 1e-9  # Sides that are nearer than this share of the size of an outline touch.
 
 
@@ -156,6 +157,11 @@ def _shape(key: str, corners: Sequence[Point], origin: Point) -> Complex:
         relative.append(complex(x.constant, y.constant))
     z = np.array(relative)
     lengths = np.abs(np.roll(z, -1) - z)
+    if 0.0 < lengths.max() < LENGTH_MIN:
+        raise MechanismError(
+            f"{key}: its longest side of {lengths.max():.3g} m is too short for a mass; write "
+            "lengths in metres, or with a unit"
+        )
     if not lengths.min() > TOUCHING_RTOL * lengths.max():
         twice = _place(z[int(np.argmin(lengths))], origin)
         raise MechanismError(f"{key} has the corner {twice} twice: remove one")
