@@ -140,3 +140,17 @@ def test_the_figure_contains_the_curve_of_the_fundamental() -> None:
         bottom, top = panel.get_ylim()
         assert bottom == 0.0 < top
         assert not any(point.frequency > 0.9 * top for point in force.points)
+
+
+def test_the_drawn_curve_passes_through_its_events_and_the_shading_ends_there() -> None:
+    """Between the two limit points the released shuttle is unstable."""
+    force = holding.curve(SYSTEM, np.linspace(-1e-3, 25e-3, 5))
+    assert (np.diff(force.displacements) >= 0.0).all()
+    for place in (*force.events, *force.points):
+        (k, *_) = np.flatnonzero(force.displacements == place.displacement)
+        assert force.forces[k] == pytest.approx(place.force)
+    limits = [event.displacement for event in force.events if event.kind == "limit point"]
+    for panel in holding_figure(force, "").axes:
+        (shade,) = panel.patches
+        left, right = shade.get_x(), shade.get_x() + shade.get_width()
+        assert [left, right] == pytest.approx([1e3 * x for x in limits])

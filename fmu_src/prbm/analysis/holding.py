@@ -144,7 +144,7 @@ class Event:
 
 @dataclass(frozen=True)
 class Branch:
-    """Shapes that branch off at a bifurcation.
+    """Shapes along a path, such as one that branches off at a bifurcation.
 
     Parameters
     ----------
@@ -153,11 +153,11 @@ class Branch:
     unstable : (k,) int
         Numbers of unstable directions under dead loads.
     rests : tuple of RestPosition
-        Rest positions, in the order of the branch.
+        Rest positions, in the order of the path.
     events : tuple of Event
-        Limit points and bifurcations, in the order of the branch.
+        Limit points and bifurcations, in the order of the path.
     ended : str or None
-        Why the branch ends within the range; None: it does not.
+        Why the path ends within the range; None: it does not.
     """
 
     displacements: Real
@@ -169,33 +169,25 @@ class Branch:
 
 
 @dataclass(frozen=True)
-class Curve:
+class Curve(Branch):
     """The holding force over a range of displacements.
 
     Parameters
     ----------
     points : tuple of Held
-        Points in the order of the path: at a displacement there are several if the path turns back.
-    rests : tuple of RestPosition
-        Rest positions, in the order of the path.
-    events : tuple of Event
-        Limit points and bifurcations, in the order of the path.
+        The points at the given displacements, in the order of the path: at a displacement there are
+        several if the path turns back.  The arrays have the other points of the path, too.
     snaps : tuple of (float, float)
         Displacement [m] and holding force [N] at which a growing load that moves the mechanism
         from a stable rest position towards a neighbouring one makes it snap: the first limit point
         or bifurcation.
     branches : tuple of Branch
         The branches at the bifurcations, if they have been followed.
-    ended : str or None
-        Why the curve ends before the last displacement; None: it does not.
     """
 
     points: tuple[Held, ...]
-    rests: tuple[RestPosition, ...]
-    events: tuple[Event, ...]
     snaps: tuple[tuple[float, float], ...]
-    branches: tuple["Branch", ...] = ()
-    ended: str | None = None
+    branches: tuple[Branch, ...]
 
 
 def curve(
@@ -226,25 +218,29 @@ def curve(
     followed = held_path(system, low, high, branches)
     shapes = followed.shapes(displacements)
     points = []
-    for k, (x, shape) in enumerate(shapes):
+    for k, (_, x, shape) in enumerate(shapes):
         points.append(described(system, x, shape))
         if progress is not None:
             progress((k + 1) / len(shapes))
-    path = followed.path
+    drawn, path = _branch(followed, followed.path), followed.path
+    places = np.concatenate([[place for place, _, _ in shapes], np.arange(len(path.points))])
+    order = np.argsort(places, kind="stable")
     return Curve(
-        tuple(points),
+        np.concatenate([[p.displacement for p in points], drawn.displacements])[order],
+        np.concatenate([[p.force for p in points], drawn.forces])[order],
+        np.concatenate([[p.unstable for p in points], drawn.unstable]).astype(int)[order],
+        drawn.rests, drawn.events, drawn.ended, tuple(points), _snaps(followed),
+        tuple(_branch(followed, one) for one in path.branches),
+    )  # fmt: skip
+
+
+def _branch(followed: HeldPath, path: LoadPath) -> Branch:
+    """Return the points, rest positions and events of a path."""
+    return Branch(
+        np.array([followed.amount(p) for p in path.points]),
+        np.array([followed.force(p) for p in path.points]),
+        np.array([p.unstable for p in path.points]),
         *_events(followed, path),
-        _snaps(followed),
-        tuple(
-            Branch(
-                np.array([followed.amount(p) for p in one.points]),
-                np.array([followed.force(p) for p in one.points]),
-                np.array([p.unstable for p in one.points]),
-                *_events(followed, one),
-                one.ended,
-            )
-            for one in path.branches
-        ),
         path.ended,
     )
 

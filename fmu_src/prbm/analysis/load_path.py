@@ -115,11 +115,12 @@ class HeldPath:
         loads = self.curve.loads[0]
         return replace(point.shape, force=self.unit * point.share, load=loads)
 
-    def shapes(self, amounts: Iterable[float]) -> list[tuple[float, Equilibrium]]:
-        """Return the shapes at displacements [m], [rad], in the order of the path.
+    def shapes(self, amounts: Iterable[float]) -> list[tuple[float, float, Equilibrium]]:
+        """Return places on the path, displacements [m], [rad], and the shapes at these.
 
-        There are several at a displacement if the path turns back, and none if the path does not
-        reach it.
+        A place is the number of the point before it, and the part of the way to the next one.
+        There are several shapes at a displacement if the path turns back, and none if the path does
+        not reach it.
         """
         points = self.path.points
         places = np.array([self.curve.amount(point) for point in points])
@@ -137,7 +138,8 @@ class HeldPath:
                     shape = self.curve.shape(state)
                     force = self.unit * float(state[-1])
                     held = replace(shape, force=force, load=self.curve.loads[0])
-                    found.append((float(x), held))
+                    part = float((x - start) / (end - start)) if end != start else 0.0
+                    found.append((k + part, float(x), held))
         return found
 
 

@@ -33,11 +33,11 @@ def holding_figure(curve: Curve, title: str, turns: bool = False) -> Figure:
         drawn.subplots(3, 1, sharex=True, gridspec_kw={"height_ratios": [2, 1, 1]})
     )
     force, across, frequency = every
+    _shade_unstable(every, curve, factor)
     _draw_force(force, curve, factor, turns)
     force.set_title(title, fontsize=11, loc="left")
     _draw_across(across, curve, factor)
     _draw_frequency(frequency, curve, factor)
-    _shade_unstable(every, factor * x, _frequencies(curve))
     frequency.set_xlabel(label)
     for axes in every:
         plain(axes)
@@ -53,23 +53,15 @@ def amount_axis(amounts: Real, turns: bool) -> tuple[float, str]:
     return factor, f"displacement [{name}]"
 
 
-def _frequencies(curve: Curve) -> Real:
-    return np.array([point.frequency for point in curve.points])
-
-
 def _draw_force(axes: Axes, curve: Curve, factor: float, turns: bool) -> None:
     """Draw the holding force, the rest positions and the points of snap-through."""
-    scale, newton = _force_unit(max(abs(point.force) for point in curve.points))
-    x = np.array([factor * p.displacement for p in curve.points])
-    y = np.array([scale * p.force for p in curve.points])
-    for branch in curve.branches:
-        along, load = factor * branch.displacements, scale * branch.forces
-        axes.plot(along, load, "--", color=REST, linewidth=0.8)
-        axes.plot(along, np.where(branch.unstable == 0, load, np.nan), color=REST, linewidth=1.4)
-    axes.plot(x, y, "--", color=PAST, linewidth=1.0)
-    axes.plot(
-        x, np.where([p.unstable == 0 for p in curve.points], y, np.nan), color=PAST, linewidth=1.8
-    )
+    scale, newton = _force_unit(float(np.abs(curve.forces).max()))
+    for path in (*curve.branches, curve):
+        x, y = factor * path.displacements, scale * path.forces
+        color, width = (PAST, 1.0) if path is curve else (REST, 0.8)
+        axes.plot(x, y, "--", color=color, linewidth=width)
+        kept = np.where(path.unstable == 0, y, np.nan)
+        axes.plot(x, kept, color=color, linewidth=1.8 * width)
     axes.axhline(0.0, color="#808080", linewidth=0.8)
     for stable, label in ((True, "stable rest position"), (False, "unstable rest position")):
         rests = [factor * rest.displacement for rest in curve.rests if rest.stable is stable]
@@ -82,7 +74,7 @@ def _draw_force(axes: Axes, curve: Curve, factor: float, turns: bool) -> None:
         at = [(factor * e.displacement, scale * e.force) for e in curve.events if e.kind == kind]
         if at:
             axes.plot(*zip(*at, strict=True), marker, color=IMPACT, markersize=5, ls="", label=kind)
-    if curve.rests or curve.events:
+    if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize=9, frameon=False)
     axes.set_ylabel(f"holding moment [{newton} m]" if turns else f"holding force [{newton}]")
 
@@ -100,28 +92,25 @@ def _draw_across(axes: Axes, curve: Curve, factor: float) -> None:
 def _draw_frequency(axes: Axes, curve: Curve, factor: float) -> None:
     """Draw the fundamental frequency where the free mechanism is stable."""
     x = np.array([point.displacement for point in curve.points])
-    hertz = _frequencies(curve)
+    hertz = np.array([point.frequency for point in curve.points])
     scale, unit = frequency_unit(float(hertz.max()))
     shown = np.where(hertz > 0.0, scale * hertz, np.nan)
     axes.plot(factor * x, shown, color=PAST, linewidth=1.2)
-    if (hertz <= 0.0).any() and not (np.diff(x) < 0.0).any():
-        axes.annotate(
-            "shaded: unstable when released", (0.5, 0.06), xycoords="axes fraction", ha="center",
-            fontsize=9, color=IMPACT,
-        )  # fmt: skip
     axes.set_ylim(0.0, 1.15 * scale * max(float(hertz.max()), 0.0) or 1.0)
     axes.set_ylabel(f"fundamental [{unit}]")
 
 
-def _shade_unstable(every: list[Axes], x: Real, hertz: Real) -> None:
+def _shade_unstable(every: list[Axes], curve: Curve, factor: float) -> None:
     """Shade the displacements at which the released mechanism is unstable."""
-    if not (hertz <= 0.0).any() or (np.diff(x) < 0.0).any():
-        return  # All shapes are stable, or there are several at a displacement.
-    for axes in every:
-        axes.fill_between(
-            x, 0.0, 1.0, where=hertz <= 0.0, color=IMPACT, alpha=0.08, linewidth=0,
-            transform=axes.get_xaxis_transform(),
-        )  # fmt: skip
+    x, unstable = factor * curve.displacements, curve.unstable > 0
+    if (np.diff(x) < 0.0).any():
+        return  # There are several shapes at a displacement.
+    between = np.concatenate([[False], unstable[1:] | unstable[:-1], [False]])
+    ends = np.flatnonzero(np.diff(between))
+    for label, axes in zip(("unstable when released", None, None), every, strict=True):
+        for start, end in zip(x[ends[::2]], x[ends[1::2]], strict=True):
+            axes.axvspan(start, end, color=IMPACT, alpha=0.08, linewidth=0, label=label)
+            label = None  # One entry of the legend.
 
 
 def _force_unit(largest: float) -> tuple[float, str]:
