@@ -27,8 +27,10 @@ ENDS = {
     "displacement": "m", "velocity": "m", "mobility": "m",
 }  # fmt: skip
 """Tags of variables by the end of their names; the driver's oracles read them."""
+UNITS = {"m": "l", "kg": "q", "m/s2": "b"}
+"""Tags of parameters by their units, from which the oracles compute round-off."""
 
-GAP_ATOL = 1e-8  # m: largest penetration of a rigid stop.
+GAP_ATOL = 1e-8  # m: largest penetration of a rigid stop; times the size of larger mechanisms.
 ENERGY_RTOL = 1e-5  # Of the largest energy in a run: bound of its balance at tolerance 0.
 ENERGY_FACTOR = 3e3  # Of the tolerance of the integration, added to ENERGY_RTOL.
 CALL_SECONDS = 1.0  # CPU time of one call.
@@ -117,6 +119,8 @@ def _line(variable: Any, kind: str, ends: set[str]) -> str:
     compliant, stop = "peak_force" in ends, "impact_count" in ends
     if (tag == "g" and compliant) or (tag == "m" and (not stop or role == "o")):
         tag = "-"
+    if tag == "-" and role in "ptk":
+        tag = UNITS.get(v.unit or v.declaredType and v.declaredType.unit, "-")
     start = float(v.start or 0.0)
     nominal = float(v.nominal or (v.declaredType and v.declaredType.nominal) or 0.0)
     scale = nominal or abs(start) or 1.0

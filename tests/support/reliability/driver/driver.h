@@ -14,7 +14,8 @@
 /* Roles and tags of variables in a plan file. */
 enum { FIXED = 'p', TUNABLE = 't', GEOMETRY = 'k', INPUT = 'u', OUTPUT = 'o' };
 enum { GAP = 'g', COUNT = 'n', ENERGY = 'e', WORK = 'w', TOLERANCE = 'a',
-       MOVING = 'm' }; /* what moves the wall of a stop */
+       MOVING = 'm', /* what moves the wall of a stop */
+       LENGTH = 'l', MASS = 'q', ACCELERATION = 'b' };
 
 typedef struct {
     uint32_t reference;
@@ -26,7 +27,7 @@ typedef struct {
     Variable *variables;
     size_t count;
     double step;     /* communication step [s] */
-    double gap_atol; /* largest penetration of a rigid stop [m] */
+    double gap_atol; /* largest penetration of a rigid stop [m], of a mechanism of at most 1 m */
     double energy_rtol; /* of the largest energy: bound of the balance at tolerance 0 */
     double energy_factor; /* of the tolerance, added to energy_rtol */
     double call_seconds, process_seconds; /* CPU time of a call and of a process [s] */
@@ -81,6 +82,7 @@ typedef struct {
     double *values, *before; /* (reals + integers,), of the last and the previous observation */
     size_t *places;          /* in the plan */
     double tolerance;        /* of the integration */
+    double length, mass, gravity; /* largest absolute values of parameters [m], [kg], [m/s2] */
     double balance, largest; /* energy [J]: balance at the reference, largest part since then */
     bool referenced, judges_gaps, judges_energy, keeps_walls;
     double *counted;         /* impact counts at the last observation, (integers,) */

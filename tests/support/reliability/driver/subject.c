@@ -1,6 +1,7 @@
 /* An instance under test: calls, observations, and the laws that the observed values obey. */
 #include "driver.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -76,6 +77,17 @@ static size_t list_outputs(Subject *s, char type, size_t first) {
     return at - first;
 }
 
+/* Note a value on which a bound of the oracles depends: the tolerance, or the largest sizes. */
+static void note_parameter(Subject *s, const Variable *variable, double value) {
+    switch (variable->tag) {
+    case TOLERANCE: s->tolerance = value; break;
+    case LENGTH: s->length = fmax(s->length, fabs(value)); break;
+    case MASS: s->mass = fmax(s->mass, fabs(value)); break;
+    case ACCELERATION: s->gravity = fmax(s->gravity, fabs(value)); break;
+    default: break;
+    }
+}
+
 void subject_open(Subject *s, const Library *library, const Job *job, const Plan *plan,
                   Counts *counts, uint64_t seed) {
     fmi2CallbackFunctions callbacks = {logger2, calloc, free, NULL, &s->log};
@@ -98,8 +110,7 @@ void subject_open(Subject *s, const Library *library, const Job *job, const Plan
     s->reals = list_outputs(s, REAL_ITEM, 0);
     s->integers = list_outputs(s, INTEGER_ITEM, s->reals);
     for (size_t i = 0; i < plan->count; i++) {
-        s->tolerance = plan->variables[i].tag == TOLERANCE ? plan->variables[i].start
-                                                           : s->tolerance;
+        note_parameter(s, plan->variables + i, plan->variables[i].start);
     }
     s->tolerance = job->has_tolerance ? job->tolerance : s->tolerance;
     s->judges_gaps = s->judges_energy = job->kind != MODEL_EXCHANGE;
@@ -146,8 +157,8 @@ int subject_set(Subject *s, const Variable *variable, double value) {
     const uint32_t *reference = &variable->reference;
     int status = EITHER(SetReal, (s->c, reference, 1, &value), SetFloat64,
                         (s->c, reference, 1, &value, 1));
-    if (FINE(status) && variable->tag == TOLERANCE && !s->job->has_tolerance) {
-        s->tolerance = value;
+    if (FINE(status) && (variable->tag != TOLERANCE || !s->job->has_tolerance)) {
+        note_parameter(s, variable, value);
     }
     return status;
 }
@@ -264,7 +275,8 @@ static void judge_energy(Subject *s) {
     s->largest = fmax(s->largest, largest);
     double off = fabs(balance - s->balance), relative = off / fmax(s->largest, 1e-300);
     double bound = s->plan->energy_rtol + s->plan->energy_factor * s->tolerance;
-    if (s->judges_energy && off > 1e-12) { /* J; less is round-off of vanishing energies */
+    double rounded = 4.0 * DBL_EPSILON * s->mass * s->gravity * s->length; /* J, of m g z */
+    if (s->judges_energy && off > fmax(1e-12, rounded)) { /* J; less is round-off */
         s->counts->energy = fmax(s->counts->energy, relative / bound);
         if (relative > bound) {
             violated(s, ENERGY_LOST, "the balance changed by %.3g of %.3g J at tolerance %.2g", off,
@@ -291,7 +303,7 @@ void subject_observe(Subject *s) {
         }
         if (v->tag == GAP && s->judges_gaps) {
             s->counts->penetration = fmax(s->counts->penetration, -x);
-            if (x < -s->plan->gap_atol) {
+            if (x < -s->plan->gap_atol * fmax(1.0, s->length)) {
                 violated(s, PENETRATED, "value reference %u: gap %.3g m", v->reference, x);
             }
         }
