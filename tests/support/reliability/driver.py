@@ -120,7 +120,7 @@ def _line(variable: Any, kind: str, ends: set[str]) -> str:
     if (tag == "g" and compliant) or (tag == "m" and (not stop or role == "o")):
         tag = "-"
     if tag == "-" and role in "ptk":
-        tag = UNITS.get(v.unit or v.declaredType and v.declaredType.unit, "-")
+        tag = UNITS.get(v.unit or (v.declaredType and v.declaredType.unit), "-")
     start = float(v.start or 0.0)
     nominal = float(v.nominal or (v.declaredType and v.declaredType.nominal) or 0.0)
     scale = nominal or abs(start) or 1.0
