@@ -742,6 +742,7 @@ PROPOSALS = {
     "modes PRBDM --cont 3": "unrecognized arguments: --cont; did you mean --count?",
     "simulate PRBDM --stoptime=1": "--stoptime; did you mean --stop-time?",
     "fit PRBDM --frequncy 5": "--frequncy; did you mean --frequency?",
+    "modes PRBDM --set a.b=1 c.d=2": "c.d=2; repeat the option: --set 'c.d=2'",
     "modes PRBDM --colour red": "unrecognized arguments: --colour; see prbm modes --help",
     "mods PRBDM": "did you mean modes?",
     "measure frequncy a.csv": "did you mean frequency?",

@@ -25,6 +25,7 @@ class ProposingParser(ArgumentParser):
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Parse arguments; report unknown options before missing arguments."""
+        self._words = [*(args or ())]
         if args is not None and not self.allow_abbrev and self._subparsers is None:
             self._check_options(args)
         return super().parse_known_args(args, namespace)
@@ -55,7 +56,15 @@ class ProposingParser(ArgumentParser):
         if not prefix and words.startswith("--"):
             options = [x for x in self._option_string_actions if x.startswith("--")]
             return f"{message}{_proposal(words.split()[0], options)}"
-        return message
+        return message if prefix else f"{message}{self._repetition(words)}"
+
+    def _repetition(self, unknown: str) -> str:
+        """Return the remedy for several values of an option that has one."""
+        for k, word in enumerate(self._words):
+            if "=" in word and not word.startswith("--") and unknown.startswith(word):
+                before = [x for x in self._words[:k] if x.startswith("--")]
+                return f"; repeat the option: {before[-1]} {word!r}" if before else ""
+        return ""
 
 
 def _proposal(word: str, known: Iterable[str]) -> str:
