@@ -43,6 +43,40 @@ def test_every_version_gives_the_same_mechanism(tmp_path, version):
     assert thickness(result) == pytest.approx(0.4, rel=1e-9)
 
 
+@pytest.mark.parametrize("version", ["R12", "R2000", "R2018"])
+def test_a_binary_file_gives_the_mechanism_of_its_text(tmp_path, version):
+    path = write(tmp_path / "plate.dxf", framed_stage(), version)
+    text = import_drawing(path, OPTIONS)
+    ezdxf.readfile(path).saveas(path, fmt="bin")
+    assert path.read_bytes().startswith(dxf.BINARY)
+    assert import_drawing(path, OPTIONS).text == text.text
+
+
+@pytest.mark.parametrize("tiny", [1e-306, -1e-312])
+def test_coordinates_that_are_nearly_zero_are_zero(tmp_path, tiny):
+    """Nothing overflows: NumPy's warnings are errors here."""
+    path, texts = tmp_path / "plate.dxf", []
+    for zero in (0.0, tiny):
+        document = ezdxf.new("R2010", units=4)
+        for ring in rings(framed_stage()):
+            points = [(x - 30.0 or k * zero, y - 30.0 or k * zero) for k, (x, y) in enumerate(ring)]
+            document.modelspace().add_lwpolyline(points[:-1], close=True)
+        document.saveas(path)
+        with np.errstate(all="raise", under="ignore"):
+            texts.append(import_drawing(path, OPTIONS).text)
+    assert texts[0] == texts[1]
+
+
+def test_a_damaged_binary_file_is_refused(tmp_path):
+    path = write(tmp_path / "plate.dxf", framed_stage(), "R2000")
+    ezdxf.readfile(path).saveas(path, fmt="bin")
+    content = path.read_bytes()
+    for end in range(len(dxf.BINARY), len(content), 997):
+        path.write_bytes(content[:end])
+        with contextlib.suppress(DrawingError):
+            import_drawing(path, OPTIONS)
+
+
 @pytest.mark.parametrize(("unit", "length"), [(1, 25.4), (4, 1.0), (5, 10.0), (13, 1e-3)])
 def test_the_unit_of_the_file_scales_the_mechanism(tmp_path, unit, length):
     result = import_drawing(write(tmp_path / "plate.dxf", framed_stage(), unit=unit), OPTIONS)

@@ -15,6 +15,7 @@ ENTITIES_MAX = 20_000  # Entities of a drawing, with those of its blocks.
 POINTS_MAX = 200_000  # Points of all curves.
 NESTING_MAX = 8  # Blocks in blocks, or groups in groups.
 COORDINATE_MAX = 1e3  # m; as for points of mechanisms.
+COORDINATE_MIN = 1e-30  # m; less is 0, since quotients of products of such numbers overflow.
 FLATTENING_RTOL = 1e-5  # Distance of curves from polylines, as a share of the diagonal.
 ANGLE_STEP = math.radians(3.0)  # Largest angle between two points of an arc.
 
@@ -92,6 +93,8 @@ class Curves:
                 f"than {COORDINATE_MAX:g} m from the origin; check the unit, or move the drawing"
             )
         z = np.asarray(z * self.unit, complex)
+        for part in (z.real, z.imag):  # views
+            part[np.abs(part) < COORDINATE_MIN] = 0.0
         self.points += len(z)
         if self.points > POINTS_MAX:
             raise DrawingError(

@@ -29,7 +29,8 @@ UNITS = {  # Length of a unit [m] by $INSUNITS.
     1: 0.0254, 2: 0.3048, 3: 1609.344, 4: 1e-3, 5: 1e-2, 6: 1.0, 7: 1e3, 8: 2.54e-8, 9: 2.54e-5,
     10: 0.9144, 11: 1e-10, 12: 1e-9, 13: 1e-6, 14: 0.1,
 }  # fmt: skip
-DWG = b"AC10"  # Beginning of a DWG file.
+DWG = b"AC10"  # Beginning of a DWG file,
+BINARY = b"AutoCAD Binary DXF\r\n\x1a\0"  # and of a binary DXF file.
 COPIES_MAX = 1000  # Copies of a block in one array.
 SPLINE_SEGMENTS_MIN = 8  # Of each part of a spline between two knots.
 
@@ -81,13 +82,17 @@ def read_dxf(path: Path, unit: float | None, tolerance: float | None) -> Curves:
 
 
 def _document(path: Path, content: bytes) -> Any:
-    """Return the document of a file, repaired if needed."""
+    """Return the document of a file; a text is repaired if needed."""
     if content.startswith(DWG):
         raise DrawingError(f"{path}: it is a DWG file; export the drawing as DXF")
     import ezdxf.recover  # imported here because the import takes 0.3 s
+    from ezdxf.document import Drawing
+    from ezdxf.lldxf.tagger import binary_tags_loader
 
     logging.getLogger("ezdxf").setLevel(logging.CRITICAL)  # Repairs of the file.
     try:
+        if content.startswith(BINARY):
+            return Drawing.load(binary_tags_loader(content))
         return ezdxf.recover.read(io.BytesIO(content))[0]
     except Exception as error:  # Among them DXFError, ValueError, IndexError, RecursionError.
         raise DrawingError(
