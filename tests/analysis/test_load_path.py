@@ -8,8 +8,8 @@ import pytest
 from scipy.special import ellipk
 
 from prbm.analysis.holding import curve
-from prbm.analysis.load_path import load_path
-from prbm.analysis.path_following import CLOSED
+from prbm.analysis.load_path import held_path, load_path
+from prbm.analysis.path_following import CLOSED, POLE, REACH, REST_SHARE
 from prbm.base.errors import EquilibriumError
 from prbm.files.mechanism_file import load
 from prbm.mechanics.assembly import assemble
@@ -17,6 +17,7 @@ from prbm.mechanics.forces import elastic_energy
 from prbm.mechanics.statics import holding_stiffness
 from prbm.mechanism.parts import Force
 from prbm.plots.load_path import load_path_figure
+from random_equilibria import free_of_contacts
 from random_mechanisms import seeded
 from support import ROOT, mechanism
 
@@ -204,3 +205,26 @@ def test_a_nearly_symmetric_double_beam_snaps_to_a_second_stable_position():
     assert 1.9 < second[2] < 2.0
     rests = [point.unstable for kind, point in path.events if kind == "rest"]
     assert rests == [1, 0]
+
+
+def test_a_held_path_ends_at_the_reach_of_rigid_links() -> None:
+    """The links of PRBDM are straight at a displacement of gamma times the length."""
+    guide = mechanism("PRBDM")
+    system = assemble(guide, guide.values({"gravity.x": 0.0}))
+    reach = guide.values()["flexure.gamma"] * guide.values()["flexure.length"]
+    found = held_path(system, -2.0 * reach, 2.0 * reach)
+    assert found.path.ended == REACH
+    ends = [found.amount(found.path.points[k]) for k in (0, -1)]
+    assert ends == pytest.approx([-reach, reach], rel=4e-3)
+    assert len(found.path.points) < 500
+
+
+def test_a_path_that_jumps_over_an_infinite_force_ends_there() -> None:
+    """A pendulum, whose weight is small beside the springs, is held at a dead centre."""
+    guide = free_of_contacts(1881)
+    system = assemble(guide, guide.values())
+    found = held_path(system, -0.2 * system.length, 0.2 * system.length)
+    assert POLE in found.path.ended
+    rests = [point for kind, point in found.path.events if kind == "rest"]
+    assert rests
+    assert all(abs(point.share) <= REST_SHARE for point in rests)

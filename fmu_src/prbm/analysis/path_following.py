@@ -17,6 +17,10 @@ FIRST_SHARE = 0.2  # Of the longest step: the first one.
 STEP_MIN_SHARE = 1e-6  # Of the longest step: a shorter one ends the path.
 BEND_MAX = 0.2  # rad between the tangents of neighbouring points.
 CLOSED = "the path is closed: it has returned to its begin"
+POLE = "the load grows without bound, as at a dead centre"
+REACH = "the displacement has a limit, at which the force grows without bound"
+REACH_SHARE = 10.0  # Least share near the limit of a displacement.
+REACH_RTOL = 1e-3  # Of the range: change of the displacement by twice the force near its limit.
 POINTS_MAX = 2000  # Of a path.
 AWAY_STEPS = 3.0  # Steps between the begin of a path and its points before it returns.
 RETURN_RTOL = 0.1  # Of a step: distance of the begin from the step that closes the path.
@@ -72,17 +76,31 @@ def followed(curve: EquilibriumCurve, begin: PathPoint, within: Range, step: flo
         if length > single and _crossings(start, found) > 1:
             length, left = 0.5 * length, None
             continue
-        for event in _events(curve, start, found, length):
+        passed = _events(curve, start, found, length)
+        if passed is None:
+            ended = POLE
+            break
+        for event in passed:
             events.append(event)
             points.append(event[1])
         points.append(found)
         if away and _returned(curve, begin, start, found):
             ended = CLOSED
+        elif within.quantity is not share_of and _stretched(curve, found, within):
+            ended = REACH
         away = away or _apart(curve, begin, found) > AWAY_STEPS * length
         length = min(step, length * min(2.0, 0.7 * BEND_MAX / max(bend, 1e-9)))
         if len(points) >= POINTS_MAX:
             ended = f"the path has {POINTS_MAX} points without reaching its end"
     return LoadPath(tuple(points), tuple(events), ended)
+
+
+def _stretched(curve: EquilibriumCurve, point: PathPoint, within: Range) -> bool:
+    """Return whether twice the force would hardly change the displacement beyond a point."""
+    growth = point.share * float(point.tangent[-1])  # Half the rate of the squared share.
+    change = _rate(curve, point) * point.share**2
+    limit = REACH_RTOL * (within.high - within.low) * growth
+    return abs(point.share) > REACH_SHARE and abs(change) < limit
 
 
 def _apart(curve: EquilibriumCurve, point: PathPoint, other: PathPoint) -> float:
@@ -177,8 +195,11 @@ def _crossings(start: PathPoint, end: PathPoint) -> int:
 
 def _events(
     curve: EquilibriumCurve, start: PathPoint, end: PathPoint, length: float
-) -> list[tuple[str, PathPoint]]:
-    """Return the limit point, the bifurcations and the rest position within a step, in order."""
+) -> list[tuple[str, PathPoint]] | None:
+    """Return the limit point, the bifurcations and the rest position within a step, in order.
+
+    None: the share changes its sign without a zero, since the step has jumped over a pole.
+    """
     turned, found = _turned(start, end), []
     if turned:
         place = _located(curve, start, end, length, lambda p: float(p.tangent[-1]))
@@ -193,11 +214,25 @@ def _events(
     if resting[1] and not resting[0]:
         found.append((REST, end))
     elif start.share * end.share < 0.0 and not any(resting):
-        found.append((REST, _placed(curve, start, end, 0.0, True) or end))
+        rest = _rest(curve, start, end, length)
+        if rest is None:
+            return None
+        found.append((REST, rest))
     origin = state_of(start)
     return sorted(
         found, key=lambda one: float(np.linalg.norm(curve.weighted(state_of(one[1]) - origin)))
     )
+
+
+def _rest(
+    curve: EquilibriumCurve, start: PathPoint, end: PathPoint, length: float
+) -> PathPoint | None:
+    """Return the point of a step at which the share is zero, whose sign changes in it."""
+    place = _placed(curve, start, end, 0.0, True)
+    if place is None:  # The step is too long for an interpolation.
+        (_, _, before), (_, _, after) = _enclosed(curve, start, end, length, share_of, EVENT_RTOL)
+        place = _placed(curve, before, after, 0.0, True)
+    return place
 
 
 def _rate(curve: EquilibriumCurve, point: PathPoint) -> float:
