@@ -86,13 +86,20 @@ def followed(curve: EquilibriumCurve, begin: PathPoint, within: Range, step: flo
         points.append(found)
         if away and _returned(curve, begin, start, found):
             ended = CLOSED
-        elif within.quantity is not share_of and _stretched(curve, found, within):
-            ended = REACH
+        else:
+            ended = _ended(curve, points, within)
         away = away or _apart(curve, begin, found) > AWAY_STEPS * length
         length = min(step, length * min(2.0, 0.7 * BEND_MAX / max(bend, 1e-9)))
-        if len(points) >= POINTS_MAX:
-            ended = f"the path has {POINTS_MAX} points without reaching its end"
     return LoadPath(tuple(points), tuple(events), ended)
+
+
+def _ended(curve: EquilibriumCurve, points: list[PathPoint], within: Range) -> str | None:
+    """Return why a path does not reach the end of its range, if so."""
+    if within.quantity is not share_of and _stretched(curve, points[-1], within):
+        return REACH
+    if len(points) >= POINTS_MAX:
+        return f"the path has {POINTS_MAX} points without reaching its end"
+    return None
 
 
 def _stretched(curve: EquilibriumCurve, point: PathPoint, within: Range) -> bool:
