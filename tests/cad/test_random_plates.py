@@ -1,7 +1,7 @@
 """Drawings of random mechanisms: lines and arcs in random order, turned, mirrored, with noise.
 
 The noise of all ends is 1e-4 mm.  Lengths are compared within 0.5 %, thicknesses within 1 %, and
-the fundamental frequency within 2 % (the issue of this importer asks for these limits).
+the fundamental frequency within 2 %.
 """
 
 import numpy as np
