@@ -215,14 +215,14 @@ def task_time(task: str, engine: str, checkout: Path = ROOT, python: str = sys.e
     return float(done.stdout.split()[-1])
 
 
-def compare_commands() -> None:
+def compare_commands(models: dict[str, str]) -> None:
     """Print the CPU times of `prbm simulate` and of FMPy with the native FMU."""
     from prbm.files.mechanism_file import load
     from prbm.fmu import native_fmu
 
     print("complete command         prbm simulate      FMPy  difference")
     with tempfile.TemporaryDirectory() as folder:
-        for name, model in MODELS.items():
+        for name, model in models.items():
             fmu = Path(folder) / "model.fmu"
             fmu.write_bytes(native_fmu.build(load(model), fmi=3, platforms=("host",)))
             ours, other = (
@@ -253,6 +253,7 @@ def main() -> None:
     add("--old", type=Path, metavar="CHECKOUT", help="checkout of version 0.1 (default: none)")
     add("--old-python", default=sys.executable, metavar="PYTHON", help="Python of version 0.1")
     add("--validate", action="store_true", help="include prbm validate, which takes minutes")
+    add("--short", action="store_true", help="the first row of each table")
     add("--task", help=argparse.SUPPRESS)
     add("--engine", help=argparse.SUPPRESS)
     options = parser.parse_args()
@@ -260,9 +261,11 @@ def main() -> None:
         work(options.task, options.engine)
         return
     sys.path.insert(0, str(ROOT / "fmu_src"))
-    compare_commands()
+    models = dict([*MODELS.items()][: 1 if options.short else None])
+    compare_commands(models)
     old = None if options.old is None else options.old.resolve()
-    compare_tasks(old, options.old_python, [*TASKS, *([VALIDATE] if options.validate else [])])
+    tasks = [*TASKS, *([VALIDATE] if options.validate else [])]
+    compare_tasks(old, options.old_python, tasks[: 1 if options.short else None])
 
 
 if __name__ == "__main__":

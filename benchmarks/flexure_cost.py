@@ -215,9 +215,9 @@ def print_default_runs() -> None:
         )
 
 
-def print_equal_errors(repeat: int) -> None:
-    """Print cost and errors of all models."""
-    for level in LEVELS:
+def print_equal_errors(levels: Sequence[Sequence[tuple[Any, ...]]], repeat: int) -> None:
+    """Print cost and errors of all models of some levels."""
+    for level in levels:
         models = [found(model, repeat) for model in level]
         for target in TARGETS:
             print(f"\nerror of the integration below {target:g} m")
@@ -239,11 +239,13 @@ def main() -> None:
     parser.add_argument(
         "--default-run", action="store_true", help="count the instructions of default runs"
     )
+    parser.add_argument("--short", action="store_true", help="the beams of the first level alone")
     arguments = parser.parse_args()
     if arguments.default_run:
         print_default_runs()
     else:
-        print_equal_errors(arguments.runs)
+        levels = [LEVELS[0][:1]] if arguments.short else LEVELS
+        print_equal_errors(levels, arguments.runs)
 
 
 if __name__ == "__main__":

@@ -231,7 +231,7 @@ class Growth:
         return self._slope([cost.whole - cost.schur for cost in self.costs])
 
     def _slope(self, costs: Sequence[float]) -> float:
-        half = len(self.sizes) // 2
+        half = min(len(self.sizes) // 2, len(self.sizes) - 2)
         return float(np.polyfit(np.log(self.sizes[half:]), np.log(costs[half:]), 1)[0])
 
 
@@ -301,7 +301,8 @@ def main() -> None:
         "--largest",
         type=int,
         default=50,
-        help="largest number of links, flexures or nodes (default: %(default)s)",
+        help="largest number of links, flexures or nodes (default: %(default)s); two sizes of each "
+        "are the least",
     )
     parser.add_argument(
         "--runs", type=int, default=7, help="runs of a default second (default: %(default)s)"
@@ -316,7 +317,7 @@ def main() -> None:
         print_beams(arguments.runs)
         return
     found = [
-        growth(title, tuple(size for size in sizes if size <= largest), make)
+        growth(title, sizes[: max(2, sum(size <= largest for size in sizes))], make)
         for title, sizes, make in (
             ("Links: two chains of n links", LINKS, chains),
             ("Links that stretch: the same chains", LINKS, lambda n: chains(n, axial=True)),
