@@ -103,3 +103,35 @@ def test_the_forms_of_issues_are_valid(schema, files):
     folder = ROOT / ".github" / "ISSUE_TEMPLATE"
     command = [sys.executable, "-m", "check_jsonschema", "--builtin-schema", f"vendor.{schema}"]
     subprocess.run([*command, *(folder / file for file in files)], check=True)
+
+
+def packages(extra: str) -> set[str]:
+    """Return the import names of the packages of an extra."""
+    found = set()
+    for text in PROJECT["optional-dependencies"][extra]:
+        name, _, others = re.match(r"([\w-]+)(\[(.*?)\])?", text).groups(default="")
+        if name == PROJECT["name"]:
+            found |= set().union(*map(packages, others.split(",")))
+        else:
+            found.add(name.replace("-", "_"))
+    return found
+
+
+def test_the_documented_modules_need_no_package_of_another_extra():
+    """``pip install ".[docs]" && python docs/build_site.py`` imports them."""
+    pages = (ROOT / "docs" / "website" / "api").glob("*.rst")
+    text = "\n".join(path.read_text(encoding="utf-8") for path in pages)
+    names = sorted({*re.findall(r"^\.\. auto\w+:: (prbm[\w.]*)", text, re.MULTILINE)})
+    assert len(names) > 80
+    extras = PROJECT["optional-dependencies"].keys() - {"docs", "test"}
+    missing = set().union(*map(packages, extras)) - packages("docs")
+    script = (
+        "import pkgutil, sys; "
+        f"sys.modules.update(dict.fromkeys({sorted(missing)})); "
+        f"[pkgutil.resolve_name(name) for name in {names}]"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=ROOT / "fmu_src", capture_output=True, text=True,
+        encoding="utf-8", check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-1000:]
