@@ -6,6 +6,7 @@ writes the site to ``build/site``, or to another folder; open ``index.html`` the
 error.  It needs the extra ``docs``.
 """
 
+import re
 import shutil
 import sys
 import tempfile
@@ -40,7 +41,31 @@ def write_sources(folder: Path, extra: Path) -> None:
     gallery.write(folder, extra)
     front.write(sources)
     for path in sorted((WEBSITE / "api").glob("*.rst")):
-        sources.put(PurePosixPath("api") / path.name, path.read_text(encoding="utf-8"))
+        text = with_summary(path.read_text(encoding="utf-8"))
+        sources.put(PurePosixPath("api") / path.name, text)
+
+
+def with_summary(text: str) -> str:
+    r"""Return a page of the API with a table of its names above the first section.
+
+    Examples
+    --------
+    >>> print(with_summary("Page\n====\n\nA\n-\n\n.. autofunction:: prbm.load"))
+    Page
+    ====
+    <BLANKLINE>
+    .. autosummary::
+    <BLANKLINE>
+       ~prbm.load
+    <BLANKLINE>
+    A
+    -
+    <BLANKLINE>
+    .. autofunction:: prbm.load
+    """
+    names = re.findall(r"^\.\. auto\w+:: (prbm\S+)", text, re.MULTILINE)
+    table = ".. autosummary::\n\n" + "".join(f"   ~{name}\n" for name in names)
+    return re.sub(r"^(.+\n-+\n)", rf"{table}\n\1", text, count=1, flags=re.MULTILINE)
 
 
 def build(folder: Path) -> int:

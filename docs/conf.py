@@ -13,7 +13,13 @@ from prbm.base.version import __version__  # noqa: E402  The folder of the packa
 project = "prbm-impact"
 version = release = __version__
 author = "The authors of prbm-impact"
-extensions = ["sphinx.ext.autodoc", "sphinx.ext.napoleon", "myst_nb", "formulas"]
+extensions = [
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.napoleon",
+    "myst_nb",
+    "formulas",
+]
 exclude_patterns = ["static", "**/*.part.html"]
 
 # Pages in Markdown and notebooks with their stored outputs, which tests compare.
