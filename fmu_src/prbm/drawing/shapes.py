@@ -15,7 +15,7 @@ from ..mechanics.places import BodyFrame, Outline
 from ..mechanics.system import FIXED, System, unit
 from ..mechanism.expressions import affine
 from ..mechanism.flexure import BEAM, LEAF, PIN
-from ..mechanism.parts import GROUND, Flexure, Point, Stop, body_of, value
+from ..mechanism.parts import GROUND, Flexure, Guide, Point, Spring, Stop, body_of, value
 
 CURVE_POINTS = 40  # Points of the drawn curve of a flexure with pivots.
 CURVED_PIVOTS_MAX = 9  # More pivots are joined by straight lines, not by a curve.
@@ -391,7 +391,7 @@ class Shapes:
         return min(self.size, 2.0 * float(np.abs(self.bodies[stop.on]).max()))
 
     def ground(self) -> list[Complex]:
-        """Return the hatched lines where flexures, joints and springs are fixed to the ground."""
+        """Return the hatched lines where parts that connect points are fixed to the ground."""
         lines = []
         for line in self.flexures:
             z = corners(line.outline, self.straight)
@@ -413,10 +413,12 @@ class Shapes:
             for o in self.joints
             if o.name in grounded
         ]
-        for spring, outline in zip(self.system.mechanism.springs, self.coils, strict=True):
+        mechanism = self.system.mechanism
+        parts: tuple[Spring | Guide, ...] = (*mechanism.springs, *mechanism.guides)
+        for part, outline in zip(parts, (*self.coils, *self.ways), strict=True):
             z = corners(outline, self.straight)
             along = (z[1] - z[0]) / abs(z[1] - z[0])
-            for end, point, into in ((spring.start, z[0], -along), (spring.end, z[1], along)):
+            for end, point, into in ((part.start, z[0], -along), (part.end, z[1], along)):
                 if body_of(end) == GROUND:
                     length = GROUND_LENGTH * self.size / 2
                     lines.append(hatched(complex(point), complex(into), length))

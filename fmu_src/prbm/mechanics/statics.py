@@ -518,10 +518,15 @@ def _turning_message(system: System) -> str:
 
 
 def immobile(system: System) -> str:
-    """Return why the released body, as drawn, cannot be held, and a remedy."""
+    """Return why the released body, as drawn, has no stiffness, and a remedy."""
     if system.released_free:
         return (
             f"the body {system.mechanism.release.body} flies freely, and is placed without a force"
+        )
+    if not held_by_loops(system):
+        return (
+            "a motion of the mechanism, with the released body held, deforms no element and lifts "
+            "no weight; add springs or gravity"
         )
     if system.mechanism.release.turns:
         return (

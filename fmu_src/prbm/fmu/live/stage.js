@@ -272,7 +272,7 @@ class Stage {
         parts.push(this.hatched(point, [0, -1], 0.08 * shapes.size));
       }
     }
-    for (const { ends } of this.description.springs) {
+    for (const { ends } of [...this.description.springs, ...this.description.guides]) {
       const [start, end] = ends.map((one) => pointOf(one.point, shapes.values));
       const along = times(1 / norm(minus(end, start)), minus(end, start));
       [
