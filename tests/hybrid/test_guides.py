@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from exchange import assert_directional
+from exchange import assert_directional, integrate
 from guides import CRANK, ROD, cart, incline, slider_crank, slotted_arm, trammel
 from kernel_simulation import KernelSimulation
 from moved_drawings import moved
@@ -290,19 +290,63 @@ def test_directional_derivatives_are_those_of_differences(model):
     assert_directional(given, {}, dict.fromkeys(input_names(given), 0.1), ())
 
 
-@engines
-@pytest.mark.parametrize("model", [slotted_arm, cart])
-def test_results_turn_and_shift_with_the_drawing(engine, model):
-    def place(z):
-        return z * cmath.exp(0.7j) + (0.3 - 0.2j)
+@pytest.mark.native
+@pytest.mark.parametrize("model", [slider_crank, trammel, slotted_arm, cart])
+def test_model_exchange_moves_guided_mechanisms_as_co_simulation(model):
+    """The crank and the rod of the trammel make full turns."""
+    given, end = (model(velocity=4.0) if model in (slider_crank, trammel) else model()), 0.5
+    exchange = KernelSimulation(given, {}, exchange=True)
+    assert not [*integrate(exchange, end, h=2.0**-12)]
+    direct = start(given, "kernel")
+    direct.advance(end)
+    found, expected = exchange.outputs(), direct.outputs()
+    turned = max(abs(expected[f"{body.name}.angle"]) for body in given.bodies)
+    assert turned > 2.0 * math.pi or model in (slotted_arm, cart)
+    for body in given.bodies:
+        for name in (f"{body.name}.x", f"{body.name}.vy", f"{body.name}.angle"):
+            assert found[name] == pytest.approx(expected[name], rel=1e-5, abs=1e-7), name
+    for guide in given.guides:
+        name = f"{guide.name}.force"
+        assert found[name] == pytest.approx(expected[name], rel=1e-4, abs=1e-6), name
 
-    other = moved(model(), place, turn=math.degrees(0.7))
+
+PLACES = {
+    "turned and shifted": (lambda z: z * cmath.exp(0.7j) + (0.3 - 0.2j), math.degrees(0.7), 1.0),
+    "mirrored": (lambda z: z.conjugate(), 0.0, -1.0),
+}
+
+
+@engines
+@pytest.mark.parametrize("model", [slotted_arm, cart, slider_crank])
+@pytest.mark.parametrize("place", PLACES)
+def test_results_turn_shift_and_mirror_with_the_drawing(engine, model, place):
+    """The left of a line is the right of its mirror image."""
+    how, turn, sign = PLACES[place]
+    other = moved(model(), how, turn=turn, sign=sign)
     first, other = start(model(), engine), start(other, engine)
     for t in (0.1, 0.3):
         one, two = (sim.advance(t) or sim.outputs() for sim in (first, other))
         for guide in model().guides:
-            name = f"{guide.name}.force"
-            assert two[name] == pytest.approx(one[name], abs=1e-6)
+            for name in (f"{guide.name}.force", f"{guide.name}.moment"):
+                if name in one:
+                    assert two[name] == pytest.approx(sign * one[name], abs=2e-6)
+
+
+def test_results_scale_with_the_lengths():
+    """Lengths times 10, masses times 10^3, inertias times 10^5, times times sqrt(10)."""
+    small = slider_crank()
+    large = moved(small, lambda z: 10.0 * z)
+    bodies = [replace(b, mass=1e3 * b.mass, inertia=1e5 * b.inertia) for b in large.bodies]
+    release = replace(large.release, velocity=math.sqrt(10.0) * small.release.velocity)
+    large = replace(large, bodies=tuple(bodies), release=release, gravity=small.gravity)
+    first, other = start(small, "python"), start(large, "python")
+    for t in (0.1, 0.3):
+        first.advance(t)
+        other.advance(math.sqrt(10.0) * t)
+        one, two = first.outputs(), other.outputs()
+        assert two["crank.angle"] == pytest.approx(one["crank.angle"], rel=1e-8)
+        assert two["way.force"] == pytest.approx(1e3 * one["way.force"], rel=1e-6)
+        assert two["way.moment"] == pytest.approx(1e4 * one["way.moment"], rel=1e-6)
 
 
 def broken(model, *guides, **changes):
