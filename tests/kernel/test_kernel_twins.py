@@ -20,7 +20,7 @@ import pytest
 import prbm.interface.tables
 import sizes
 from free_bodies import flying
-from guides import cart, slider_crank
+from guides import beaded
 from kernel_library import (
     KERNEL,
     KernelError,
@@ -120,8 +120,7 @@ def spread(condition):
 NAMES = ("PRBDM", "PRBDM2R", "Rich", "Elastic", "Beams", "Mixed")
 OWN_MECHANISMS = {
     "Rich": rich, "Elastic": elastic, "Beams": beams, "Mixed": links_and_beams,
-    "Profiles": profiles, "LateBeam": late_beam, "FiveNodes": five_nodes, "Cart": cart,
-    "Crank": slider_crank,
+    "Profiles": profiles, "LateBeam": late_beam, "FiveNodes": five_nodes, "Beaded": beaded,
 }  # fmt: skip
 
 

@@ -1,7 +1,9 @@
 """Mechanisms with guides."""
 
 import math
+from dataclasses import replace
 
+from many_parts import anvil
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.parts import Body, Force, Guide, Joint, Probe, Release, Spring
 
@@ -104,4 +106,22 @@ def cart(gravity=(0.0, -9.81)):
         ),
         gravity=gravity, forces=(Force("push", "tray", (0.04, 0.06)),),
         probes=(Probe("corner", "tray.e"),),
+    )  # fmt: skip
+
+
+def beaded():
+    """Return a stage and a hammer on flexures, a bead in a slot of the stage, and a slider."""
+    bead = Body("bead", 4e-3, 2e-7, (0.032, "L + 1e-3"), {"c": (0.03, "L"), "e": (0.034, "L")})
+    rider = Body("rider", 3e-3, 1e-7, (0.03, "L + 0.012"), {"c": (0.031, "L + 0.01")})
+    return replace(
+        anvil(), name="Beaded", bodies=(*anvil().bodies, bead, rider),
+        ground={**anvil().ground, "post": (0.031, "L + 0.01"), "far": (0.08, "L + 0.02")},
+        guides=(
+            Guide("slot", "bead.c", "stage.left", "stage.right"),
+            Guide("rail", "rider.c", "ground.post", "ground.far", turning=False),
+        ),
+        springs=(
+            Spring("coil", "stage.left", "bead.e", 40.0, damping=0.01),
+            Spring("pair", "bead.e", "rider.c", 30.0, 0.011),
+        ),
     )  # fmt: skip
