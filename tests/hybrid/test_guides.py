@@ -370,6 +370,11 @@ def test_dependent_guides_are_named(engine):
         start(stuck, engine)
 
 
+def test_a_guide_between_bodies_that_fly_freely_is_rejected():
+    with pytest.raises(PrbmError, match="slot guides pin along arm, and both fly freely"):
+        Simulation(replace(slotted_arm(), joints=()))
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -9,9 +9,10 @@ import pytest
 from guides import cart, incline, slotted_arm
 from many_parts import anvil, elastic, rich
 from prbm.mechanics.assembly import assemble
+from prbm.mechanics.elements import Elements
 from prbm.mechanics.linear import state_space
 from prbm.mechanics.modal import fundamental_frequency, modes
-from prbm.mechanics.resting import RestingShape
+from prbm.mechanics.resting import RestingShape, resting_shape
 from prbm.mechanics.statics import equilibrium, resting, tangent_stiffness
 from prbm.mechanism.parts import Joint, Release, Spring
 
@@ -133,6 +134,36 @@ def test_a_linear_model_has_the_modes_of_the_guided_mechanism():
     frequency = modes(system, shape).frequency
     poles = np.linalg.eigvals(found.A)
     assert np.sort(np.abs(poles))[::2] == pytest.approx(2.0 * np.pi * frequency, rel=1e-3)
+
+
+def test_a_hammer_rests_on_the_stage_that_carries_it():
+    """The Lagrangian V - lam gap is stationary, and its second derivative is that of the model."""
+    face, side = anvil().stops
+    face = replace(face, position=-1e-4, friction=0.0)
+    model = replace(anvil(), stops=(face, side), frictions=())
+    system = assembled(model)
+    free = equilibrium(system)
+    rest = resting_shape(system, free, np.zeros(system.n), [0])
+    wall = np.append(np.zeros(len(system.loops)), -1e-4)
+    assert rest.rows.values(system.directions(rest.q)) + wall == pytest.approx(0.0, abs=1e-14)
+    assert rest.lam[-1] > 1e-3
+
+    def lagrangian(q):
+        e = system.directions(q)
+        height = float((system.m @ (system.A @ e + system.c)).imag)
+        x = rest.rows.values(e) + wall
+        return Elements(system).energy(q, e) + 1.0 * height - float(rest.lam @ x)
+
+    h = 1e-4
+    turns = h * np.eye(system.n)
+    slopes = [(lagrangian(rest.q + d) - lagrangian(rest.q - d)) / (2 * h) for d in turns]
+    assert np.abs(slopes).max() < 1e-10
+    found = state_space(system, rest, {}, [0], [], [])
+    for frequency, phi in zip(found.modes.frequency, found.modes.shape.T, strict=True):
+        d = h * phi / np.abs(phi).max()
+        bend = lagrangian(rest.q + d) - 2 * lagrangian(rest.q) + lagrangian(rest.q - d)
+        omega2 = bend / (d @ found.modes.M @ d)
+        assert omega2 == pytest.approx((2 * math.pi * frequency) ** 2, rel=1e-3)
 
 
 def test_a_joint_is_two_guides():

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.errors import ParameterError
+from ..base.errors import MechanismError, ParameterError
 from ..base.tolerances import JOINT_DISTANCE_RTOL, SPRING_APART_RTOL
 from ..mechanism.description import Mechanism
 from ..mechanism.expressions import affine
@@ -250,7 +250,20 @@ class Collection:
         self.loops.append((name, place.minus(other)))
 
     def guide(self, guide: Guide) -> None:
-        """Add the rows of a guide, seen from the carrier of its line."""
+        """Add the rows of a guide, seen from the carrier of its line.
+
+        Raises
+        ------
+        MechanismError
+            If both bodies fly freely: where they are placed would have to satisfy the guide.
+        ParameterError
+            As :meth:`line`.
+        """
+        if self._floats(guide) and guide.body in self.mechanism.free_bodies:
+            raise MechanismError(
+                f"guide {guide.name} guides {guide.body} along {guide.on}, and both fly freely: "
+                "connect one of them to the ground by a flexure, joint, spring or guide"
+            )
         normal, carrier = 1j * self.line(guide), guide.on
         at = self.end(guide, guide.point)
         apart = self.on(guide.body, at).minus(self.origin[carrier])
@@ -265,8 +278,11 @@ class Collection:
         along, carrier = normal.conjugate(), self.index[guide.on]
         place = Place(along * apart.c, {j: along * vector for j, vector in apart.A.items()})
         c = -(along * drawn).real + (place.c.real if carrier is None else 0.0)
-        floats = all(self.depth[body] == 0 for body in (guide.body, guide.on))
-        self.guide_rows.append(GuideRow(guide.name, place, c, carrier, floats))
+        self.guide_rows.append(GuideRow(guide.name, place, c, carrier, self._floats(guide)))
+
+    def _floats(self, guide: Guide) -> bool:
+        """Return whether only the ground and bodies without flexures and joints to it take part."""
+        return all(self.depth[body] == 0 for body in (guide.body, guide.on))
 
     def spring(self, rate: float, a: int | None, b: int | None) -> None:
         """Add a spring between two coordinates; None: the ground."""

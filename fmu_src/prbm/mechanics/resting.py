@@ -25,7 +25,7 @@ from . import constraints
 from .arrays import Complex, Real
 from .elements import Elements
 from .statics import Equilibrium, tangent_stiffness
-from .system import FIXED, Rows, System
+from .system import Rows, System
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,15 +69,15 @@ def resting_shape(
     Raises
     ------
     EquilibriumError
-        If a stop is compliant or on a body, is not reached, would have to pull, or the shape is
+        If a stop is compliant, is not reached, would have to pull, or the shape is
         not found.
     """
     parts = [system.mechanism.stops[i] for i in stops]
-    for stop, i in zip(parts, stops, strict=True):
-        if stop.compliant or system.on[i] != FIXED:
+    for stop in parts:
+        if stop.compliant:
             raise EquilibriumError(
-                f"{stop.name} is compliant or has its wall on a body: shapes that rest on it are "
-                "not computed; choose rigid stops with a wall on the ground"
+                f"{stop.name} is compliant: shapes that rest on it are not computed; choose rigid "
+                "stops"
             )
     walls = np.array([value(stop, "position", system.values) for stop in parts])
     gaps = system.gap_rows.values(system.directions(shape.q))[list(stops)] + walls

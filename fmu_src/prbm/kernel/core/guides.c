@@ -70,6 +70,20 @@ static bool check_guide(const System *system, const Guide *guide, Problem *probl
                 guide->name, fabs(apart), apart > 0.0 ? "left" : "right");
 }
 
+/* Reject a guide between bodies that fly freely. */
+static bool check_held(const System *system, const Guide *guide, Problem *problem) {
+    const Mechanism *m = system->mechanism;
+    int turn = angle_of(system, system->origins[guide->between.start].j);
+    for (int k = 0; k < m->placed_count; k++) {
+        if (m->placed[k] == turn) {
+            return fail(problem,
+                        "guide %s is between bodies that fly freely: connect one of them to the ground",
+                        guide->name);
+        }
+    }
+    return true;
+}
+
 /* Return whether a body floats, or is the ground. */
 static bool floats_alone(const Mechanism *m, int body) {
     bool found = body == GROUND;
@@ -86,7 +100,8 @@ PRBM bool add_guides(System *system, Scratch *scratch, Problem *problem) {
         for (int i = 0; i < m->guide_count; i++) {
             const Guide *guide = &m->guides[i];
             bool alone = floats_alone(m, guide->between.start) && floats_alone(m, guide->between.end);
-            if (!check_guide(system, guide, problem)) {
+            if (!check_guide(system, guide, problem) ||
+                (alone && !check_held(system, guide, problem))) {
                 return false;
             }
             if (alone == (floating == 1)) {
