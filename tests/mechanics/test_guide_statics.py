@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from guides import cart, incline, slotted_arm
+from guides import cart, incline, slotted_arm, trammel
 from many_parts import anvil, elastic, rich
+from prbm.drawing.shapes import Shapes
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.elements import Elements
 from prbm.mechanics.linear import state_space
@@ -69,6 +70,17 @@ def test_a_weight_in_a_slot_of_a_pendulum_swings_with_it():
     found = 2.0 * math.pi * modes(system, shape).frequency
     assert found == pytest.approx(sorted([swing, math.sqrt(k / m)]), rel=1e-9)
     assert fundamental_frequency(system) == pytest.approx(swing / (2.0 * math.pi))
+
+
+def test_a_trammel_hangs_and_swings_about_its_lowest_shape():
+    """It is m g a (1 - cos x) below, with the inertia m b^2 + J there."""
+    a, b, m, J = 0.2, 0.3, 0.7, 5e-3
+    system = assembled(replace(trammel(a, b), gravity=(0.0, -G)))
+    shape, balanced = resting(system)
+    assert balanced
+    assert system.amount(shape.q) == pytest.approx(-b * math.cos(math.radians(40.0)))
+    swing = math.sqrt(m * G * a / (m * b**2 + J)) / (2.0 * math.pi)
+    assert fundamental_frequency(system) == pytest.approx(swing, rel=1e-12)
 
 
 def test_a_tilted_arm_balances_a_pin_on_a_spring():
@@ -182,3 +194,13 @@ def test_a_joint_is_two_guides():
     assert fundamental_frequency(second) == pytest.approx(fundamental_frequency(first), rel=1e-9)
     angles = [equilibrium(s).q[s.bodies["arm"].j] for s in (first, second)]
     assert angles[0] == pytest.approx(angles[1], abs=1e-10)
+
+
+def test_the_slot_of_a_guide_moves_with_its_carrier_and_the_pin_in_it():
+    system = assembled(slotted_arm())
+    shapes, q = Shapes(system), system.q0.copy()
+    q[system.bodies["arm"].j] = 0.5 * math.pi
+    (slot,) = shapes.slots(shapes.arms(q))
+    assert slot[:4].mean() == pytest.approx(1j * complex(0.175, 0.02))
+    pin = system.guided_points[0]
+    assert shapes.pins(shapes.straight)[-1] == pytest.approx(pin.drawn)
