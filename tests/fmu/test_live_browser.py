@@ -13,6 +13,7 @@ import pytest
 from fmpy import simulate_fmu
 
 from browser import NARROW, WIDE, chromium
+from guides import cart
 from prbm.files.mechanism_file import load, read_mechanism, shipped
 from prbm.fmu import native_fmu, python_fmu
 from prbm.fmu.explorer import explorer
@@ -158,6 +159,14 @@ OTHERS = {
     "pivot": SUPPORT / "pivot.toml",
     "accelerometer": ROOT / "benchmarks" / "accelerometer.toml",
 }
+
+
+def test_springs_and_guides_are_drawn(browser, tmp_path):
+    data = browser.open(written(tmp_path, cart()))
+    assert data["state"] == "done"
+    assert browser.errors() == []
+    drawn = browser.run("return document.querySelector('#stage .spring').getAttribute('d')")
+    assert drawn.count("M") == len(cart().springs) + len(cart().guides)
 
 
 @pytest.mark.parametrize("name", ["lever", *OTHERS])

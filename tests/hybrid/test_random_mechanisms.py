@@ -78,7 +78,23 @@ def mass_points(system, q):
 
 
 def closures(system, q):
-    return (system.loops @ arms(system, q)).real + system.loops_c
+    """Return the closures of the loops, and where guides hold, from the geometry of bodies."""
+    found = (system.loops @ arms(system, q)).real + system.loops_c
+    for guide, rows in zip(system.mechanism.guides, system.guided, strict=True):
+        at, start, end = (
+            complex(*system.mechanism.point(point, ""))
+            for point in (guide.point, guide.start, guide.end)
+        )
+        on, body = (
+            0.0 if name == GROUND else q[system.bodies[name].j] for name in (guide.on, guide.body)
+        )
+        point = body_point(system, guide.body, at, q)
+        line = [body_point(system, guide.on, z, q) for z in (start, end)]
+        along = (line[1] - line[0]) / abs(end - start)
+        found[rows.across] = (np.conj(along) * (point - line[0])).imag
+        if rows.turn is not None:
+            found[rows.turn] = system.length * np.sin(body - on)
+    return found
 
 
 def body_point(system, body, drawn, q):
@@ -152,7 +168,7 @@ def random_state(system, seed):
 # --- assembly -----------------------------------------------------------------------------------
 
 
-@given(mechanisms(), SEEDS)
+@given(mechanisms() | mechanisms(guides=2), SEEDS)
 @laws(25)
 def test_mass_matrix_and_quadratic_terms_follow_from_the_positions(mechanism, seed):
     """M = Re(T^H m T) + J, T = dz/dq, and the quadratic terms are Re(T^H m z'') at constant rates.
@@ -175,7 +191,7 @@ def test_mass_matrix_and_quadratic_terms_follow_from_the_positions(mechanism, se
     np.testing.assert_allclose(quadratic, bent, atol=2e-6 * np.abs(M).max() * v @ v)
 
 
-@given(mechanisms(), SEEDS)
+@given(mechanisms() | mechanisms(guides=2), SEEDS)
 @laws(25)
 def test_rows_are_the_derivatives_of_their_scalars(mechanism, seed):
     """Values, gradients, rates and convective terms of loops, gaps, slides and friction points.
@@ -209,7 +225,7 @@ def test_rows_are_the_derivatives_of_their_scalars(mechanism, seed):
         )
 
 
-@given(mechanisms(), SEEDS)
+@given(mechanisms() | mechanisms(guides=2), SEEDS)
 @laws(20)
 def test_loops_gaps_and_positions_of_the_straight_shape_are_those_of_the_drawing(mechanism, seed):
     """Loops are closed, gaps equal the stops' positions, centres of mass are those of the file.
@@ -259,7 +275,12 @@ def potential(sim, q):
 
 
 @pytest.mark.slow
-@given(mechanisms(starting=True, damping=False, friction=False), SEEDS, st.booleans())
+@given(
+    mechanisms(starting=True, damping=False, friction=False)
+    | mechanisms(starting=True, damping=False, friction=False, guides=2),
+    SEEDS,
+    st.booleans(),
+)
 @laws(20)
 def test_accelerations_satisfy_lagrange_equations(mechanism, seed, held):
     """T^H m z'' + J a = -dV/dq + R^T lam, and the constraints with rows R have no acceleration.
@@ -295,7 +316,7 @@ def test_accelerations_satisfy_lagrange_equations(mechanism, seed, held):
 
 
 @pytest.mark.slow
-@given(mechanisms(starting=True), SEEDS)
+@given(mechanisms(starting=True) | mechanisms(starting=True, guides=2), SEEDS)
 @laws(20)
 def test_the_potential_energy_is_stationary_at_an_equilibrium(mechanism, seed):
     """dV/dq = rows^T lam under loads; frequencies follow from the second derivative."""
@@ -327,7 +348,10 @@ SPAN = 4e-3  # s
 FEATURE_SEEDS = range(10)  # Seeds whose mechanisms together have all features.
 
 
-@given(mechanisms(starting=True, damping=False), SEEDS)
+@given(
+    mechanisms(starting=True, damping=False) | mechanisms(starting=True, damping=False, guides=2),
+    SEEDS,
+)
 @laws(15, shrink=False)
 def test_energy_is_balanced_and_loops_remain_closed(mechanism, seed):
     check_energy(mechanism, seed)
@@ -365,7 +389,7 @@ def momentum(sim):
 
 
 @pytest.mark.slow
-@given(mechanisms(starting=True), SEEDS)
+@given(mechanisms(starting=True) | mechanisms(starting=True, guides=2), SEEDS)
 @laws(15, shrink=False)
 def test_base_reactions_equal_loads_minus_the_rate_of_momentum(mechanism, seed):
     check_momentum(mechanism, seed)
@@ -405,7 +429,7 @@ def check_momentum(mechanism, seed):
 # --- impacts ------------------------------------------------------------------------------------
 
 
-@given(mechanisms(starting=True), SEEDS)
+@given(mechanisms(starting=True) | mechanisms(starting=True, guides=2), SEEDS)
 @laws(15, shrink=False)
 def test_impacts_satisfy_the_balance_of_momentum_and_do_not_gain_energy(mechanism, seed):
     check_impacts(mechanism, seed)

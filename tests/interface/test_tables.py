@@ -19,7 +19,7 @@ from prbm.mechanics.independent import independent
 from prbm.mechanics.inputs import input_names
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.expressions import affine
-from prbm.mechanism.parts import FIELDS, FlexureType, field_of, fields_of, value
+from prbm.mechanism.parts import FIELDS, FlexureType, body_of, field_of, fields_of, value
 from support import SHIPPED
 
 REQUIRED = ("thickness", "width", "youngs_modulus", "density")
@@ -190,14 +190,14 @@ class Comparison:
     def head(self) -> None:
         m, r = self.mechanism, self.reader
         assert (r.text(), r.text()) == (TOKEN, m.name)
-        counts = [r.take("I") for _ in range(15)]
+        counts = [r.take("I") for _ in range(16)]
         parts = (
-            m.bodies, m.flexure_types, m.flexures, m.joints, m.springs, m.stops, m.frictions,
-            m.forces, m.probes, m.ground,
+            m.bodies, m.flexure_types, m.flexures, m.joints, m.springs, m.guides, m.stops,
+            m.frictions, m.forces, m.probes, m.ground,
         )  # fmt: skip
         assert counts[0] == len(m.parameters)
-        assert counts[1:11] == [*map(len, parts)]
-        assert counts[11:] == [
+        assert counts[1:12] == [*map(len, parts)]
+        assert counts[12:] == [
             len(self.bounds), len(self.native.variables), len(self.native.independent),
             len(input_names(m)),
         ]  # fmt: skip
@@ -262,6 +262,13 @@ class Comparison:
             self.between(spring)
             assert r.take("I") == (spring.free_length is not None)
             self.fields(spring)
+        for guide in m.guides:
+            assert r.text() == guide.name
+            for point in (guide.point, guide.start):
+                assert self.body() == body_of(point)
+                self.point(m.point(point, guide.name))
+            self.point(m.point(guide.end, guide.name))
+            assert r.take("I") == (not guide.turning)
 
     def contacts_and_forces(self) -> None:
         m, r = self.mechanism, self.reader

@@ -54,6 +54,16 @@ def test_the_kernel_computes_the_motion_of_a_random_mechanism_as_the_engine_does
     assert found[worst] <= DEVIATION_MAX, (worst, found[worst])
 
 
+@pytest.mark.parametrize("free", [False, True])
+@pytest.mark.parametrize(
+    "seed", [*range(6), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(6, 24))]
+)
+def test_the_kernel_moves_random_mechanisms_with_guides_as_the_engine_does(seed, free):
+    found = deviations(seed, free=free, springs=seed % 3, guides=2)
+    worst = max(found, key=found.__getitem__)
+    assert found[worst] <= DEVIATION_MAX, (worst, found[worst])
+
+
 SPRUNG_SEEDS = [*range(4), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(4, 12))]
 
 

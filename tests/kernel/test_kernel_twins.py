@@ -20,6 +20,7 @@ import pytest
 import prbm.interface.tables
 import sizes
 from free_bodies import flying
+from guides import beaded
 from kernel_library import (
     KERNEL,
     KernelError,
@@ -119,7 +120,7 @@ def spread(condition):
 NAMES = ("PRBDM", "PRBDM2R", "Rich", "Elastic", "Beams", "Mixed")
 OWN_MECHANISMS = {
     "Rich": rich, "Elastic": elastic, "Beams": beams, "Mixed": links_and_beams,
-    "Profiles": profiles, "LateBeam": late_beam, "FiveNodes": five_nodes,
+    "Profiles": profiles, "LateBeam": late_beam, "FiveNodes": five_nodes, "Beaded": beaded,
 }  # fmt: skip
 
 
@@ -508,7 +509,7 @@ def test_messages_about_redundant_loops_are_the_same():
     guide = replace(guide, flexure_types=types, flexures=(one, other, *more))
     theirs, ours = refused(guide, 3)
     assert ours == theirs
-    assert "closed by a_fourth, third depend" in ours
+    assert "constraints of a_fourth, third depend" in ours
 
 
 def test_messages_about_points_that_a_joint_cannot_connect_are_the_same():
@@ -576,8 +577,7 @@ class KernelRows:
 
     def __init__(self, ours, rows):
         self.rows, r = rows, len(rows)
-        z, on = np.zeros(r, complex), np.full(r, system_arrays.FIXED, np.int32)
-        z[rows.carried], on[rows.carried] = rows.z, rows.on
+        z, on = rows.every_z.copy(), rows.every_on.astype(np.int32)
         self.arrays = [rows.B.copy(), rows.c.copy(), z, on]
         self.structure = structures()["Rows"](
             ctypes.addressof(ours.structure), r, *(part.ctypes.data for part in self.arrays)
@@ -1091,13 +1091,14 @@ def shape_of(expected):
 def test_tangent_stiffness_is_the_same(name):
     for system, ours, rng in systems(name):
         q, _ = random_state(system, rng)
-        e, n, B = system.directions(q), system.n, system.loops
-        w, lam = rng.normal(size=(system.d, 2)).view(complex)[:, 0], rng.normal(size=len(B))
-        w, K_t = system.spread(w), np.full((n, n), np.nan)
-        kernel().tangent_stiffness(ours.structure, 0.7, len(B), w, B, lam, e, K_t)
-        K = elements.Elements(system).tangent(e, 0.7)
-        expected = statics.tangent_stiffness(K, w, B, lam, e, system.arm, system.Phi)
-        assert_same(K_t, expected)
+        e, n = system.directions(q), system.n
+        w = system.spread(rng.normal(size=(system.d, 2)).view(complex)[:, 0])
+        for rows in (system.loop_rows, system.gap_rows):
+            lam, K_t = rng.normal(size=len(rows)), np.full((n, n), np.nan)
+            own = KernelRows(ours, rows)
+            kernel().tangent_stiffness(own.structure, 0.7, w, lam, e, K_t)
+            K = elements.Elements(system).tangent(e, 0.7)
+            assert_same(K_t, statics.tangent_stiffness(K, w, rows, lam, e))
 
 
 def stacked_release(system):

@@ -126,7 +126,7 @@ def ends_of(system, name, e):
 
 
 @pytest.mark.slow
-@given(mechanisms(starting=True))
+@given(mechanisms(starting=True) | mechanisms(starting=True, guides=2))
 @settings(
     phases=[Phase.generate], max_examples=15, deadline=None, derandomize=True,
     suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow],

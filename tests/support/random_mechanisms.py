@@ -34,6 +34,7 @@ from prbm.mechanism.parts import (
     FlexureType,
     Force,
     Friction,
+    Guide,
     Joint,
     Probe,
     Release,
@@ -135,12 +136,13 @@ def build(
     damping: bool = True,
     free: bool = False,
     springs: int = 0,
+    guides: int = 0,
 ) -> Mechanism:
     """Return a mechanism, which may be over-constrained.
 
-    ``bodies``, ``loops``, ``stops`` and ``springs`` are the largest numbers of these parts.  With
-    ``free``, one or two more bodies fly freely, alone or connected to each other, unless springs
-    hold them.
+    ``bodies``, ``loops``, ``stops``, ``springs`` and ``guides`` are the largest numbers of these
+    parts.  With ``free``, one or two more bodies fly freely, alone or connected to each other,
+    unless springs or guides hold them.
     """
     b = _Builder(choose, rng)
     for _ in range(choose((1, 2, 3))):
@@ -183,6 +185,7 @@ def build(
     aimed = [(stop.body, stop.direction) for stop in walls]
     body, direction = choose((*aimed, *aimed, (choose(names), choose(directions))))
     coils = [_spring(b, i, names) for i in range(choose(range(1, springs + 1)) if springs else 0)]
+    ways = [_guide(b, i, names) for i in range(choose(range(1, guides + 1)) if guides else 0)]
     gravity = choose(((0.0, 0.0), (0.0, -1.0), (0.3, 0.4)))
     return Mechanism(
         name="Random",
@@ -196,6 +199,7 @@ def build(
         flexures=tuple(b.flexures),
         joints=tuple(b.joints),
         springs=tuple(coils),
+        guides=tuple(ways),
         stops=tuple(walls),
         frictions=tuple(rubs),
         forces=tuple(pushes),
@@ -217,6 +221,18 @@ def _spring(b: _Builder, i: int, names: list[str]) -> Spring:
     return Spring(
         f"coil{i}", b.point(other, start), b.point(body, end), b.real(5.0, 40.0), free,
         b.choose((0.0, b.real(1e3, 1e5))), b.choose((0.0, b.real(0.01, 0.2))),
+    )  # fmt: skip
+
+
+def _guide(b: _Builder, i: int, names: list[str]) -> Guide:
+    """Return a guide of a point of a body, on a line of the ground or of another body."""
+    body = b.choose(names)
+    other = b.choose([GROUND, *(name for name in names if name != body)])
+    at = b.near(body)
+    start = b.point(other, at)
+    return Guide(
+        f"guide{i}", b.point(body, at), start, b.point(other, at + b.disc(CELL)),
+        b.choose((True, True, False)),
     )  # fmt: skip
 
 
@@ -258,7 +274,8 @@ def starts(mechanism: Mechanism) -> bool:
     system = sim.system
     e = system.directions(sim.front.q)
     M, _ = inertia(system.H, np.diag(system.J), e)
-    rows = jacobian(system.spread(np.vstack([system.loops, system.release])), e)
+    release = jacobian(system.spread(system.release[None]), e)
+    rows = np.vstack([system.loop_rows.by_direction(e), release])
     own = np.setdiff1d(np.arange(system.d), system.floats)  # No coordinate moves these directions.
     M, rows = M[np.ix_(own, own)], rows[:, own]
     left, free = (

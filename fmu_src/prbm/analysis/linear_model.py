@@ -301,7 +301,7 @@ def linearize(
     given = dict(loads or {})
     free = equilibrium(system, None, given)
     stops = [stop_index(mechanism, name) for name in resting]
-    shape = RestingShape(free.q, system.loops, free.lam, free.load)
+    shape = RestingShape(free.q, system.loop_rows, free.lam, free.load)
     if stops:
         shape = resting_shape(system, free, load_row(system, given)[1], stops)
     space = state_space(system, shape, given, stops, inputs, outputs)

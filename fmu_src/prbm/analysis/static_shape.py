@@ -11,9 +11,10 @@ from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble
 from ..mechanics.body_compliance import compliance_matrix
 from ..mechanics.modal import Modes
+from ..mechanics.places import BodyFrame
 from ..mechanics.statics import Equilibrium, holding_stiffness
 from ..mechanics.stress import Stress, static_stresses
-from ..mechanics.system import BodyFrame, System
+from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import Probe
 

@@ -36,7 +36,7 @@ def frequencies(options: argparse.Namespace) -> None:
     if not len(found.frequency):
         raise UserMistake(
             f"{mechanism.name} has no modes: all bodies fly freely; connect them to the ground by "
-            "flexures, joints or springs, or simulate the motion"
+            "flexures, joints, springs or guides, or simulate the motion"
         )
     count = min(options.count, len(found.frequency))
     motions = [(body.name, m) for body in mechanism.bodies for m in ("x", "y", "turning")]

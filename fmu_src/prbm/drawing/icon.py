@@ -160,15 +160,15 @@ def _faint_parts(shapes: Shapes) -> Iterator[Part]:
 
 
 def _parts(shapes: Shapes, E: Complex) -> Iterator[Part]:
-    """Yield flexures, springs, bodies and pins in a shape."""
+    """Yield flexures, springs, guides, bodies and pins in a shape."""
     leaf = "leaf thin" if len(shapes.flexures) >= THIN_LINES_MIN else "leaf"
     for line in shapes.flexures:
         if line.shaped:
             yield Area("profile", [line.edge(E)])
         else:
             yield Line(leaf, line.centre_line(E))
-    for spring in shapes.springs(E):
-        yield Line("spring", spring)
+    for drawn in (*shapes.springs(E), *shapes.slots(E)):
+        yield Line("spring", drawn)
     for name in shapes.bodies:
         yield Area("body", shapes.areas(name, E))
         yield Dots("centre", np.array([shapes.centre(name, E)]))

@@ -7,7 +7,7 @@ import numpy as np
 from ..base.errors import EquilibriumError
 from ..mechanics.arrays import Complex, Real
 from ..mechanics.constraints import project_positions
-from ..mechanics.system import FIXED, Rows, System
+from ..mechanics.system import Rows, System
 
 STRETCH_ITERATIONS_MAX = 20  # The convergence is quadratic: four iterations are usual.
 STRETCH_RTOL = 1e-9  # Largest last change of a stretch, far below the resolution of a picture.
@@ -33,11 +33,9 @@ def closed(system: System, q: Real, stop: int | None = None, wall: float = 0.0) 
         Coordinates of the shape.
     """
     touching = [] if stop is None else [stop]
-    B = np.vstack([system.loops, system.gaps[touching]])
-    c = np.concatenate([system.loops_c, system.gaps_c[touching] + wall])
-    z, on = np.zeros(len(B), complex), np.full(len(B), FIXED)
-    z[len(system.loops) :], on[len(system.loops) :] = system.gaps_z[touching], system.on[touching]
-    return project_positions(system, Rows(system, B, c, z, on), q, c)[0]
+    rows = system.loop_rows.beside(system.gap_rows.some(touching))
+    rows.c[len(system.loops) :] += wall
+    return project_positions(system, rows, q)[0]
 
 
 def stretched(system: System, q: Real, displacements: Mapping[str, Complex]) -> Real:
@@ -64,17 +62,19 @@ def stretched(system: System, q: Real, displacements: Mapping[str, Complex]) -> 
         return q
     q = q.copy()
     q[:, k] = 0.0
-    B, c = [system.loops], [np.tile(system.loops_c, (len(q), 1))]
+    B, c = [], [np.tile(system.loops_c, (len(q), 1))]
     for name, displacement in displacements.items():
         frame = system.bodies[name]
         missing = frame.c - frame.drawn - displacement
         B += [frame.A[None], -1j * frame.A[None]]
         c += [missing.real[:, None], missing.imag[:, None]]
-    rows, constants = np.vstack(B), np.hstack(c)
+    placed = np.vstack(B) if B else np.zeros((0, system.d), complex)
+    rows = system.loop_rows.beside(Rows(system, placed, np.zeros(len(placed))))
+    constants = np.hstack(c)
     for _ in range(STRETCH_ITERATIONS_MAX):
         E = system.directions(q)
-        x = (E @ rows.T).real + constants
-        slopes = system.gradient(rows, E[:, None, :])[..., k]
+        x = rows.values(E, constants)
+        slopes = rows.jacobian(E)[..., k]
         change = np.linalg.pinv(slopes) @ x[:, :, None]
         q[:, k] -= change[:, :, 0]
         if not np.abs(change).max() > STRETCH_RTOL:

@@ -11,10 +11,11 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from ..mechanics.arrays import Complex, Real
-from ..mechanics.system import FIXED, BodyFrame, Outline, System, unit
+from ..mechanics.places import BodyFrame, Outline
+from ..mechanics.system import FIXED, System, unit
 from ..mechanism.expressions import affine
 from ..mechanism.flexure import BEAM, LEAF, PIN
-from ..mechanism.parts import GROUND, Flexure, Point, Stop, body_of, value
+from ..mechanism.parts import GROUND, Flexure, Guide, Point, Spring, Stop, body_of, value
 
 CURVE_POINTS = 40  # Points of the drawn curve of a flexure with pivots.
 CURVED_PIVOTS_MAX = 9  # More pivots are joined by straight lines, not by a curve.
@@ -27,6 +28,7 @@ GROUND_SHARE_MAX = 0.4  # Longest ground at the end of a flexure, as a share of 
 GROUND_THICKNESSES_MIN = 1.3  # unless the flexure is thick: shortest ground over its thickness.
 STROKES = 6  # Strokes of the hatching.
 SPRING_WIDTH = 0.05  # Of the size: width of the zigzag of a spring.
+SLOT_WIDTH = 0.04  # Of the size: width of the slot that shows a guide.
 COILS = 6  # Corners of this zigzag on each side.
 COILED = 0.7  # Share of the length of a spring that is coiled.
 INCLINED_AREA_MAX = 0.4  # An inclined box must be smaller than this share of the upright box.
@@ -98,6 +100,18 @@ def zigzag(start: complex, end: complex, width: float) -> Complex:
     sides[[0, -1]] = 0.0
     coils: Complex = start + shares * along + sides * across
     return np.concatenate([[start], coils, [end]])
+
+
+def slot(start: complex, end: complex, width: float) -> Complex:
+    """Return the outline of a slot between two points, which closes.
+
+    Examples
+    --------
+    >>> slot(0j, 1.0 + 0j, 0.1).tolist()
+    [0.05j, (1+0.05j), (1-0.05j), -0.05j, 0.05j]
+    """
+    across = 0.5j * width * (end - start) / (abs(end - start) or 1.0)
+    return np.array([start + across, end + across, end - across, start - across, start + across])
 
 
 def hull(points: Complex) -> Complex:
@@ -254,6 +268,7 @@ class Shapes:
         self.flexures = [self._flexure(o) for o in system.outlines if o.kind == "flexure"]
         self.joints = [o for o in system.outlines if o.kind == "joint"]
         self.coils = [o for o in system.outlines if o.kind == "spring"]
+        self.ways = [o for o in system.outlines if o.kind == "guide"]
         self.hits = [self._hit(stop) for stop in system.mechanism.stops]
         self.bodies = {name: self._body(name) for name in system.bodies}
         self.holes = {name: self._holes(name) for name in system.bodies}
@@ -376,7 +391,7 @@ class Shapes:
         return min(self.size, 2.0 * float(np.abs(self.bodies[stop.on]).max()))
 
     def ground(self) -> list[Complex]:
-        """Return the hatched lines where flexures, joints and springs are fixed to the ground."""
+        """Return the hatched lines where parts that connect points are fixed to the ground."""
         lines = []
         for line in self.flexures:
             z = corners(line.outline, self.straight)
@@ -398,10 +413,12 @@ class Shapes:
             for o in self.joints
             if o.name in grounded
         ]
-        for spring, outline in zip(self.system.mechanism.springs, self.coils, strict=True):
+        mechanism = self.system.mechanism
+        parts: tuple[Spring | Guide, ...] = (*mechanism.springs, *mechanism.guides)
+        for part, outline in zip(parts, (*self.coils, *self.ways), strict=True):
             z = corners(outline, self.straight)
             along = (z[1] - z[0]) / abs(z[1] - z[0])
-            for end, point, into in ((spring.start, z[0], -along), (spring.end, z[1], along)):
+            for end, point, into in ((part.start, z[0], -along), (part.end, z[1], along)):
                 if body_of(end) == GROUND:
                     length = GROUND_LENGTH * self.size / 2
                     lines.append(hatched(complex(point), complex(into), length))
@@ -412,10 +429,16 @@ class Shapes:
         ends = [corners(outline, E) for outline in self.coils]
         return [zigzag(complex(a), complex(b), SPRING_WIDTH * self.size) for a, b in ends]
 
+    def slots(self, E: Complex) -> list[Complex]:
+        """Return the outlines of the slots that show the guides in a shape [m]."""
+        ends = [corners(outline, E) for outline in self.ways]
+        return [slot(complex(a), complex(b), SLOT_WIDTH * self.size) for a, b in ends]
+
     def pins(self, E: Complex) -> Complex:
-        """Return the positions of joints and of pinned ends of flexures in a shape [m]."""
+        """Return joints, pinned ends of flexures and guided points in a shape, positions [m]."""
         ends = [line.pins(E) for line in self.flexures]
-        return np.concatenate([*ends, *(corners(joint, E) for joint in self.joints), []])
+        guided = _positions(self.system.guided_points, E)
+        return np.concatenate([*ends, *(corners(joint, E) for joint in self.joints), guided])
 
     def probes(self, E: Complex) -> Complex:
         """Return the positions of the probes [m]."""

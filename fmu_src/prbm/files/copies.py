@@ -1,4 +1,4 @@
-"""Mirror images and repeated copies of bodies, flexures, joints and springs as ordinary parts.
+"""Mirror images and repeated copies of bodies and of parts that connect points as ordinary parts.
 
 A copy is attached to the image of the body to which the original is attached, or to the same body
 if there is no image.  The points of the copy are created unless they are defined.
@@ -14,9 +14,20 @@ import numpy as np
 
 from ..base.errors import MechanismError
 from ..mechanism.expressions import affine
-from ..mechanism.parts import FIELDS, GROUND, Body, Flexure, FlexureType, Joint, Point, Spring
+from ..mechanism.parts import (
+    FIELDS,
+    GROUND,
+    Body,
+    Flexure,
+    FlexureType,
+    Guide,
+    Joint,
+    Point,
+    Spring,
+)
 from .images import SAME_ATOL, SAME_RTOL, Image, Line, displaced, rotated, same, written
 
+POINTS = ("point", "start", "end")  # Fields of connections that are points.
 COPIES_MAX = 10_000  # Copies in one file.
 SIGNED = tuple(name for name in ("curvature", "rise") if name in FIELDS[FlexureType])
 SUBJECT_WORDS = 2  # The subject of a message is among its first words: flexure NAME.
@@ -24,7 +35,7 @@ SUBJECT_WORDS = 2  # The subject of a message is among its first words: flexure 
 _NAME = re.compile(r"[\w\[\]]+(?:\.[\w\[\]]+)*")
 
 Chain = tuple[Image, ...]
-Connection = TypeVar("Connection", Flexure, Joint, Spring)
+Connection = TypeVar("Connection", Flexure, Joint, Spring, Guide)
 
 
 class Repeat(Protocol):
@@ -166,7 +177,7 @@ class Drawing:
     def connections(
         self, tables: Sequence[Copied], parts: Sequence[Connection]
     ) -> Iterator[Connection]:
-        """Yield flexures, joints or springs, each followed by its copies.
+        """Yield flexures, joints, springs or guides, each followed by its copies.
 
         Raises
         ------
@@ -180,13 +191,17 @@ class Drawing:
                     yield part
                     continue
                 user = f"{table.name}.{_key(chain)}"
-                start, end = (self._image(end, chain, user) for end in (part.start, part.end))
-                if {start, end} == {part.start, part.end}:
+                own = [key for key in POINTS if hasattr(part, key)]
+                ends: dict[str, str] = {
+                    key: self._image(getattr(part, key), chain, user) for key in own
+                }
+                if {*ends.values()} == {getattr(part, key) for key in own}:
                     raise MechanismError(
                         f"{user}: a copy of {table.name} joins the same points; remove "
                         f"{_key(chain)}, or change the line or the displacement"
                     )
-                yield replace(part, name=_name(table.name, chain), start=start, end=end)
+                changed: dict[str, Any] = {"name": _name(table.name, chain), **ends}
+                yield replace(part, **changed)
 
     def _image(self, reference: str, chain: Chain, user: str) -> str:
         """Return the reference to the image of a point; undefined ones are rejected later."""

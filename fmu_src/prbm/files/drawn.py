@@ -34,6 +34,8 @@ def check_drawing(mechanism: Mechanism) -> None:
             )
     for spring in mechanism.springs:
         drawn.check_apart(spring)
+    for guide in mechanism.guides:
+        drawn.line(guide)
 
 
 def _places(mechanism: Mechanism) -> Iterator[tuple[str, Point]]:

@@ -37,6 +37,16 @@ from ..mechanism.flexure import (
 )
 from ..mechanism.parameters import Tolerance
 from ..mechanism.parts import FIELDS, GROUND, LENGTH_MAX, LENGTH_MIN
+from .connections import (
+    GuideTable,
+    JointTable,
+    SpringTable,
+    guide_of,
+    joint_of,
+    mirror_key,
+    repeat_key,
+    spring_of,
+)
 from .copies import (
     Copied,
     Drawing,
@@ -81,15 +91,6 @@ IDENTIFIER = "^[A-Za-z_][A-Za-z0-9_]*$"
 
 
 # --- tables -----------------------------------------------------------------------------------
-
-
-# Each field has an object of its own: releases of pydantic before 2.12 change it with its class.
-def _mirror() -> Any:
-    return Field((), description='Line of symmetry, "x = ..." or "y = ...", or a list of both')
-
-
-def _repeat() -> Any:
-    return Field(None, description="Equal parts in a row or on a circle")
 
 
 class Section(Named):
@@ -178,8 +179,8 @@ class FlexureTable(Section):
         description="Type of both ends, or a pair for start and end; the other end of a free one "
         "must be a clamp",
     )
-    mirror: LineOrLines = _mirror()
-    repeat: RepeatTable | None = _repeat()
+    mirror: LineOrLines = mirror_key()
+    repeat: RepeatTable | None = repeat_key()
 
 
 _GIVEN: Any = {"required": [*GIVEN]}
@@ -220,33 +221,8 @@ class BodyTable(Named):
         None, description="Name of the material of the plate, in place of density"
     )
     density: Annotated[Quantity, measured(parts.FlexureType, "density")] | None = None
-    mirror: LineOrLines = _mirror()
-    repeat: RepeatTable | None = _repeat()
-
-
-class JointTable(Named):
-    """A pin between two points that are drawn at the same position."""
-
-    start: Reference = Field(description="First point, body.point or ground.point")
-    end: Reference = Field(description="Second point, body.point or ground.point")
-    stiffness: Annotated[Quantity, measured(parts.Joint, "stiffness")] | None = None
-    mirror: LineOrLines = _mirror()
-    repeat: RepeatTable | None = _repeat()
-
-
-class SpringTable(Named):
-    """A coil spring and a damper between two points."""
-
-    start: Reference = Field(description="First end, body.point or ground.point")
-    end: Reference = Field(description="Second end, body.point or ground.point")
-    stiffness: Annotated[Quantity, measured(parts.Spring, "stiffness")]
-    free_length: Annotated[Quantity, measured(parts.Spring, "free_length")] | None = None
-    cubic_stiffness: Annotated[Quantity, measured(parts.Spring, "cubic_stiffness")] = (
-        parts.Spring.cubic_stiffness
-    )
-    damping: Annotated[Quantity, measured(parts.Spring, "damping")] = parts.Spring.damping
-    mirror: LineOrLines = _mirror()
-    repeat: RepeatTable | None = _repeat()
+    mirror: LineOrLines = mirror_key()
+    repeat: RepeatTable | None = repeat_key()
 
 
 class StopTable(Named):
@@ -361,6 +337,7 @@ class MechanismTable(Table):
     flexures: tuple[FlexureTable, ...] = Field((), description="Flexures")
     joints: tuple[JointTable, ...] = Field((), description="Pins")
     springs: tuple[SpringTable, ...] = Field((), description="Springs and dampers")
+    guides: tuple[GuideTable, ...] = Field((), description="Lines that points of bodies stay on")
     stops: tuple[StopTable, ...] = Field((), description="Walls")
     frictions: tuple[FrictionTable, ...] = Field((), description="Coulomb friction")
     forces: tuple[ForceTable, ...] = Field((), description="Forces that are inputs of the FMU")
@@ -394,11 +371,14 @@ def mechanism(file: MechanismTable, drawing: str = "") -> Mechanism:
     flexures = tuple(drawn.connections(file.flexures, [*map(_flexure, file.flexures)]))
     own = (flexure for flexure in file.flexures if flexure.type is None)
     types = [_type(table, materials) for table in (*file.flexure_types, *own)]
-    joints = tuple(drawn.connections(file.joints, [*map(_joint, file.joints)]))
-    springs = tuple(drawn.connections(file.springs, [*map(_spring, file.springs)]))
+    others: dict[str, Any] = {
+        "joints": tuple(drawn.connections(file.joints, [*map(joint_of, file.joints)])),
+        "springs": tuple(drawn.connections(file.springs, [*map(spring_of, file.springs)])),
+        "guides": tuple(drawn.connections(file.guides, [*map(guide_of, file.guides)])),
+    }
     connected = mirrored_types(file.flexures, flexures, types)
     try:
-        result = _assembled(file, drawn, connected, (joints, springs), drawing)
+        result = _assembled(file, drawn, connected, others, drawing)
         result = replace(result, tolerances=_tolerances(file.tolerances, result))
         if misshapen:  # Raised after an undefined name in an outline, which may be its cause.
             raise misshapen[0]
@@ -413,7 +393,7 @@ def _assembled(
     file: MechanismTable,
     drawn: Drawing,
     connected: tuple[tuple[parts.Flexure, ...], tuple[parts.FlexureType, ...]],
-    others: tuple[tuple[parts.Joint, ...], tuple[parts.Spring, ...]],
+    others: Mapping[str, Any],
     drawing: str,
 ) -> Mechanism:
     """Return the mechanism of a file, whose bodies and connections include the copies."""
@@ -425,8 +405,7 @@ def _assembled(
         bodies=drawn.bodies,
         flexures=connected[0],
         flexure_types=connected[1],
-        joints=others[0],
-        springs=others[1],
+        **others,
         stops=tuple(_stop(stop, points) for stop in file.stops),
         frictions=tuple(parts.Friction(**_attached(part, points)) for part in file.frictions),
         forces=tuple(parts.Force(**_attached(force, points)) for force in file.forces),
@@ -495,15 +474,8 @@ def _materials(file: MechanismTable) -> dict[str, dict[str, Any]]:
 def _check_names(file: MechanismTable) -> None:
     """Reject a name of two parts of one kind, or of a material and any other part."""
     parts: tuple[tuple[Named, ...], ...] = (file.bodies, file.flexure_types, file.flexures)
-    parts = (
-        *parts,
-        file.joints,
-        file.springs,
-        file.stops,
-        file.frictions,
-        file.forces,
-        file.probes,
-    )
+    parts = (*parts, file.joints, file.springs, file.guides, file.stops, file.frictions)
+    parts = (*parts, file.forces, file.probes)
     reserved = {*RESERVED}
     for kind in (file.materials, *parts):
         seen = set(reserved)
@@ -520,7 +492,7 @@ def _check_names(file: MechanismTable) -> None:
 
 def _with_copies(file: MechanismTable) -> tuple[Copied, ...]:
     """Return the tables of parts that may have copies."""
-    return (*file.bodies, *file.flexures, *file.joints, *file.springs)
+    return (*file.bodies, *file.flexures, *file.joints, *file.springs, *file.guides)
 
 
 def _referred(material: MaterialTable, key: str) -> Quantity:
@@ -638,17 +610,6 @@ def _density(table: BodyTable, materials: Mapping[str, dict[str, Quantity]]) -> 
     if table.density is not None:
         raise MechanismError(f"{table.name} has material as well as density: remove one of them")
     return _named_material(table.name, table.material, materials)["density"]
-
-
-def _joint(table: JointTable) -> parts.Joint:
-    """Return the joint of a table."""
-    return parts.Joint(table.name, table.start, table.end, table.stiffness)
-
-
-def _spring(table: SpringTable) -> parts.Spring:
-    """Return the spring of a table."""
-    given = dict(table)
-    return parts.Spring(**{key: given[key] for key in given if key not in ("mirror", "repeat")})
 
 
 def _flexure(table: FlexureTable) -> parts.Flexure:

@@ -60,6 +60,13 @@ STOP_LAWS = {
 }
 
 
+GUIDES = (
+    f"<p>The rows of guides in {inline('Phi')} are the displacement of a point to the left of its "
+    "line, and, if the body keeps its angle, the sine of this angle times the size, both in the "
+    "frame of the body that carries the line.</p>\n"
+)
+
+
 def equations(mechanism: Mechanism) -> str:
     """Return the section of the equations of motion, impacts and flexures, in HTML."""
     beams = _beams(mechanism)
@@ -85,7 +92,8 @@ def equations(mechanism: Mechanism) -> str:
         "projected onto them. The gap "
         f"{inline('g')} has the rate {inline('dot(g) = G v + w')}, with {inline('w')} the velocity "
         f"of the wall.</p>\n{''.join(STOP_LAWS[law] for law in laws)}"
-        f"{SPRINGS if mechanism.springs else ''}{_flexure_table(mechanism)}"
+        f"{SPRINGS if mechanism.springs else ''}{GUIDES if mechanism.guides else ''}"
+        f"{_flexure_table(mechanism)}"
         "<p>Energy balance: kinetic + elastic + gravitational + dissipated energy - work is "
         "constant, also across impacts.</p>"
     )

@@ -57,6 +57,7 @@ def all_outputs(
     out: Outputs = {**motions(system, q, v, e)}
     out |= _stops(equations, t, y, e, evaluation)
     out |= _springs(equations, e, v)
+    out |= _guides(system, evaluation.lam)
     force, moment = base_reaction(equations, q, v, a)
     out["base.force.x"], out["base.force.y"] = force.real, force.imag
     out["base.moment"] = moment
@@ -131,6 +132,16 @@ def _springs(equations: Equations, e: Complex, v: Real) -> dict[str, float]:
         out[f"{spring.name}.force"] = float(force[i])
         out[f"{spring.name}.length"] = float(now.length[i])
         out[f"{spring.name}.length_rate"] = float(rates[i])
+    return out
+
+
+def _guides(system: System, lam: Real) -> dict[str, float]:
+    """Return the forces and moments of the guides."""
+    out: dict[str, float] = {}
+    for guide, rows in zip(system.mechanism.guides, system.guided, strict=True):
+        out[f"{guide.name}.force"] = float(lam[rows.across])
+        if rows.turn is not None:
+            out[f"{guide.name}.moment"] = float(lam[rows.turn]) * system.length
     return out
 
 

@@ -21,6 +21,7 @@ from .variables import (
     STORED,
     STRESS_OUTPUTS,
     compliant_states,
+    guide_outputs,
 )
 
 Dependencies = Mapping[str, tuple[str, ...]]
@@ -65,6 +66,8 @@ def dependencies(mechanism: Mechanism, interface: NativeInterface) -> Dependenci
     for spring in (s.name for s in mechanism.springs):
         found |= {f"{spring}.force": moving, f"{spring}.length": shape}
         found[f"{spring}.length_rate"] = moving
+    for guide in mechanism.guides:
+        found |= {f"{guide.name}.{name}": everything for name in guide_outputs(guide)}
     for stop in (s.name for s in mechanism.stops if s.compliant):
         found |= {f"{stop}.{output}": () for output in COMPLIANT_OUTPUTS}
     for flexure in (mechanism.flexures[i].name for i in stressed(mechanism)):

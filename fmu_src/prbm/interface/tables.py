@@ -25,6 +25,7 @@ from ..mechanism.parts import (
     FlexureType,
     Force,
     Friction,
+    Guide,
     Joint,
     Part,
     Point,
@@ -49,6 +50,7 @@ from .variables import (
     STOP_OUTPUTS,
     STRESS_OUTPUTS,
     Variable,
+    guide_outputs,
 )
 
 FILE = "mechanism.bin"
@@ -65,11 +67,11 @@ COORDINATES_MAX = 512  # The mass matrix then has 2 MB.
 DIRECTIONS_MAX = 1024  # The mass matrix of the directions then has 16 MB.
 DIRECTION_MAP_MAX = 16384  # Changes of directions with coordinates.
 STOPS_MAX = 64  # Largest number of stops, and of friction points.
-PLACES_MAX = 1024  # Largest number of forces, of probes, and of springs.
+PLACES_MAX = 1024  # Largest number of forces, of probes, of springs, and of guides.
 GROUND_POINTS_MAX = 4096  # The kernel computes the distance of every pair of points.
 GROUND_NUMBER = 0  # Bodies are counted from 1.
 SLOT_GROUPS = (
-    "parameters", "inputs", "bodies", "stops", "springs", "base", "energies", "latched",
+    "parameters", "inputs", "bodies", "stops", "springs", "guides", "base", "energies", "latched",
     "compliant", "links", "stretches", "probes", "stresses", "frequency", "calculated",
     "derivatives", "indicators", "time",
 )  # fmt: skip
@@ -129,6 +131,7 @@ def check_size(mechanism: Mechanism) -> None:
             DIRECTION_MAP_MAX,
         ),
         ("springs", len(m.springs), PLACES_MAX),
+        ("guides", len(m.guides), PLACES_MAX),
         ("stops", len(m.stops), STOPS_MAX),
         ("frictions", len(m.frictions), STOPS_MAX),
         ("forces", len(m.forces), PLACES_MAX),
@@ -168,6 +171,7 @@ def _groups(mechanism: Mechanism, independent: Sequence[int]) -> dict[str, Itera
         "bodies": [f"{body.name}.{output}" for body in mechanism.bodies for output in BODY_OUTPUTS],
         "stops": [f"{stop}.{output}" for stop in stops for output in STOP_OUTPUTS],
         "springs": [f"{s.name}.{output}" for s in mechanism.springs for output in SPRING_OUTPUTS],
+        "guides": [f"{g.name}.{output}" for g in mechanism.guides for output in guide_outputs(g)],
         "base": BASE_OUTPUTS,
         "energies": ENERGIES,
         "latched": [f"{stop}.{output}" for stop in stops for output in LATCHED],
@@ -254,7 +258,7 @@ class _Writer:
         yield from self._variables()
 
     def _members(self) -> Iterator[bytes]:
-        """Yield bodies, types of flexures, flexures, joints and springs."""
+        """Yield bodies, types of flexures, flexures, joints, springs and guides."""
         m = self.mechanism
         for body in m.bodies:
             yield _text(body.name) + self._fields(body) + self._point(body.centre)
@@ -269,6 +273,9 @@ class _Writer:
         for spring in m.springs:
             yield _text(spring.name) + self._between(spring)
             yield _u32(spring.free_length is not None) + self._fields(spring)
+        for guide in m.guides:
+            yield _text(guide.name) + self._between(guide, "point", "start")
+            yield self._point(m.point(guide.end, guide.name)) + _u32(not guide.turning)
 
     def _contacts(self) -> Iterator[bytes]:
         """Yield stops, friction points, forces and probes."""
@@ -295,8 +302,8 @@ class _Writer:
     def _counts(self) -> tuple[int, ...]:
         m = self.mechanism
         parts: tuple[Mapping[str, object] | Sequence[object], ...] = (
-            self.parameters, m.bodies, m.flexure_types, m.flexures, m.joints, m.springs, m.stops,
-            m.frictions, m.forces, m.probes, m.ground, self.bounds, self.variables,
+            self.parameters, m.bodies, m.flexure_types, m.flexures, m.joints, m.springs, m.guides,
+            m.stops, m.frictions, m.forces, m.probes, m.ground, self.bounds, self.variables,
             self.independent, self.inputs,
         )  # fmt: skip
         return tuple(map(len, parts))
@@ -345,10 +352,11 @@ class _Writer:
         numbers += _u32(PROFILES.index(kind.profile), given)
         return _text(kind.name) + numbers + self._fields(kind) + b"".join(coefficients)
 
-    def _between(self, part: Flexure | Joint | Spring) -> bytes:
+    def _between(self, part: Flexure | Joint | Spring | Guide, *keys: str) -> bytes:
+        """Return two points of a part with their bodies; the default are its ends."""
         return b"".join(
             _u32(self.body[body_of(end)]) + self._point(self.mechanism.point(end, part.name))
-            for end in (part.start, part.end)
+            for end in (getattr(part, key) for key in keys or ("start", "end"))
         )
 
     def _placed(self, part: Friction | Force) -> bytes:

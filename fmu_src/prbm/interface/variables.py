@@ -19,7 +19,7 @@ from ..mechanics.stress import stressed
 from ..mechanism.description import Mechanism
 from ..mechanism.expressions import affine
 from ..mechanism.parameters import Parameter
-from ..mechanism.parts import GROUND, Force, Spring, Stop
+from ..mechanism.parts import GROUND, Force, Guide, Spring, Stop
 from .units import QUANTITIES, Quantity
 
 Number = float | int | bool
@@ -34,6 +34,7 @@ STOP_OUTPUTS = (
     "gap", "gap_rate", "force", "point.displacement", "point.velocity", "point.mobility",
 )  # fmt: skip
 SPRING_OUTPUTS = ("force", "length", "length_rate")
+GUIDE_OUTPUTS = ("force", "moment")  # The moment only of guides in which bodies do not turn.
 BASE_OUTPUTS = (f"{BASE}.force.x", f"{BASE}.force.y", f"{BASE}.moment")
 STORED = ("energy.dissipated", "energy.work")  # Energies that are integrated, hence states.
 ENERGIES = ("energy.kinetic", "energy.elastic", "energy.gravitational", *STORED)
@@ -283,6 +284,8 @@ def _variables(
         yield from _of_compliant_stop(rigid, stop.name, nominal) if stop.compliant else rigid
     for spring in mechanism.springs:
         yield from _spring(spring, nominal)
+    for guide in mechanism.guides:
+        yield from _guide(guide, nominal)
     yield from _base(nominal)
     yield from _energies(nominal, -math.inf if mechanism.springs else 0.0)
     yield from _flexures(sample, nominal)
@@ -505,6 +508,24 @@ def _spring(spring: Spring, nominal: Scales) -> Iterator[Variable]:
         f"{name}.length_rate", "m/s", f"Rate of the distance of {ends}", nominal,
         derivative_of=f"{name}.length",
     )  # fmt: skip
+
+
+def guide_outputs(guide: Guide) -> tuple[str, ...]:
+    """Return the names of the outputs of a guide."""
+    return GUIDE_OUTPUTS[:1] if guide.turning else GUIDE_OUTPUTS
+
+
+def _guide(guide: Guide, nominal: Scales) -> Iterator[Variable]:
+    line = f"the line from {guide.start} to {guide.end}"
+    yield _output(
+        f"{guide.name}.force", "N", f"Force of the guide on {guide.point}, positive to the left of "
+        f"{line}", nominal,
+    )  # fmt: skip
+    if not guide.turning:
+        yield _output(
+            f"{guide.name}.moment", "N.m", f"Moment of the guide on {guide.body} about "
+            f"{guide.point}, counter-clockwise", nominal,
+        )  # fmt: skip
 
 
 COMPLIANT_DESCRIPTIONS = {

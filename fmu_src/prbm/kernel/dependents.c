@@ -88,7 +88,7 @@ static bool complete_angles(Simulation *sim, Loops *x, double *q) {
     int r = system->r;
     double best = HUGE_VAL, length = system->length;
     bool closed = false, regular = true;
-    Rows loops = plain_rows(system, r, system->loops, system->loops_c);
+    Rows loops = loop_rows(system);
     Complex *e = take_complex(&sim->scratch, system->d, 1);
     for (int step = 0; step < CONSTRAINT_ITERATIONS_MAX && regular && !closed; step++) {
         directions(system, q, e);

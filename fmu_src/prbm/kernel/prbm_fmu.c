@@ -34,6 +34,7 @@
 #include "core/free_body.c"
 #include "core/flexures.c"
 #include "core/placement.c"
+#include "core/guides.c"
 #include "core/assembly.c"
 #include "core/factors.c"
 #include "core/branch_terms.c"

@@ -38,8 +38,8 @@ Slots = NDArray[np.intc]
 UNFINISHED = -2  # Result of a call that is to be repeated, ENGINE_UNFINISHED in C.
 MOTION_GROUPS = ("bodies", "probes")
 OUTPUT_GROUPS = (
-    *MOTION_GROUPS, "stops", "springs", "base", "energies", "latched", "compliant", "links",
-    "stretches", "stresses", "frequency", "calculated",
+    *MOTION_GROUPS, "stops", "springs", "guides", "base", "energies", "latched", "compliant",
+    "links", "stretches", "stresses", "frequency", "calculated",
 )  # fmt: skip
 """The groups of values that are outputs, in the order of the Python engine."""
 

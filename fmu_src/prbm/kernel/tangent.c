@@ -63,7 +63,7 @@ static bool tangent_coordinates(Tangent *t, const double *dx, Problem *problem) 
     const Mechanism *m = system->mechanism;
     int n = system->n, r = system->r, count = m->independent_count;
     Loops x = take_loops(sim);
-    Rows loops = plain_rows(system, r, system->loops, system->loops_c);
+    Rows loops = loop_rows(system);
     jacobian(&loops, t->e, x.rows);
     if (!factor_dependents(sim, &x)) {
         return singular_choice(sim, x.dependent, problem);
@@ -354,7 +354,7 @@ static bool mobility_change(const Tangent *t, int i, double *result, Problem *pr
     size_t mark = sim->scratch.used;
     int n = system->n, r = system->r, size = n + r;
     double *x = take(&sim->scratch, (size_t)size);
-    Rows gaps = gap_rows(system), loops = plain_rows(system, r, system->loops, system->loops_c);
+    Rows gaps = gap_rows(system), loops = loop_rows(system);
     ContactProblem *at = contact_problem_at(sim, t->y);
     row_jacobian(&gaps, i, at->e, x);
     zeros(r, x + n);
@@ -430,6 +430,7 @@ static void all_changes(const Tangent *t, const double *dx, const Complex *dw,
     link_changes(t, out + slots->links, out + slots->stretches);
     stop_changes(t, out + slots->stops);
     spring_changes(t, out + slots->springs);
+    guide_loads(t->eq->system, t->dlam, out + slots->guides);
     base_changes(t, out + slots->base);
     energy_changes(t, dx, out + slots->energies);
     stress_changes(t, out + slots->stresses);

@@ -54,6 +54,24 @@ static void stop_pull_changes(const Tangent *t, Complex *on) {
     }
 }
 
+/* Add the changes of the forces of guides. */
+static void guide_pull_changes(const Tangent *t, Complex *on) {
+    const System *system = t->eq->system;
+    const Mechanism *m = system->mechanism;
+    for (int i = 0; i < m->guide_count; i++) {
+        const GuideRows *guide = &system->guided[i];
+        int carrier = system->loops_on[guide->across];
+        Complex change = complex_of(t->dlam[guide->across], 0.0);
+        if (carrier != FIXED) {
+            change = plus(product(t->e[carrier], change),
+                          scaled(t->lam[guide->across], t->dE[carrier]));
+        }
+        change = product(guide->normal, change);
+        add_change(on, m->guides[i].between.start, change);
+        add_change(on, m->guides[i].between.end, scaled(-1.0, change));
+    }
+}
+
 /* Add the changes of the forces of friction points and of the inputs. */
 static void pull_changes(const Tangent *t, Complex *on) {
     const Equations *eq = t->eq;
@@ -93,6 +111,7 @@ static SectionState state_change(const Tangent *t) {
     stop_pull_changes(t, change.on);
     pull_changes(t, change.on);
     spring_pull_changes(t, change.on);
+    guide_pull_changes(t, change.on);
     transmit(system, t->dlam, &change);
     return change;
 }

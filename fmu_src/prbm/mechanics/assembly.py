@@ -25,6 +25,7 @@ from ..mechanism.flexure import stub
 from ..mechanism.parts import (
     GROUND,
     Flexure,
+    Guide,
     Joint,
     Probe,
     Stop,
@@ -34,7 +35,8 @@ from ..mechanism.parts import (
 from .arrays import Complex, Real
 from .collection import Collection
 from .flexures import add_flexure, coefficients
-from .system import FIXED, NO_THICKNESS, BodyFrame, Outline, Place, System, stacked, unit
+from .places import NO_THICKNESS, BodyFrame, GuideRows, Outline, Place
+from .system import FIXED, System, stacked, unit
 
 NAMES_MAX = 5  # Parameters that a message names.
 
@@ -117,9 +119,14 @@ class _Assembler(Collection):
             ]
         for body in self.mechanism.bodies:
             self.body(body.name)
+        for guide in self.mechanism.guides:
+            self.guide(guide)
+        self.guide_rows.sort(key=lambda row: row.floats)
         result = self.arrays()
         e = result.directions(result.q0)
-        check_loops(result.gradient(result.loops, e), [name for name, _ in self.loops])
+        owners = [name for name, _ in self.loops for _ in range(2)]
+        owners += [row.name for row in self.guide_rows]
+        check_loops(result.loop_rows.jacobian(e), owners)
         check_masses(result.mass_matrix(e), names)
         return result
 
@@ -197,6 +204,7 @@ class _Assembler(Collection):
             bodies=frames,
             pushed=tuple(self.frame(f.name, f.body, f.point) for f in mechanism.forces),
             probes=tuple(self.probe(probe) for probe in mechanism.probes),
+            guided_points=tuple(self.probe(guide) for guide in mechanism.guides),
             links=tuple(self.links),
             owners=tuple(self.owners),
             connections=tuple(self.connections),
@@ -207,9 +215,25 @@ class _Assembler(Collection):
         )
 
     def loop_arrays(self, d: int) -> dict[str, Any]:
-        """Return the rows of the loop closures and their constants."""
+        """Return the rows of the loop closures and of the guides, and their constants."""
         rows, constants = components([place for _, place in self.loops], d)
-        return {"loops": rows, "loops_c": constants}
+        guides, closures = self.guide_rows, len(rows)
+        carriers = [FIXED if row.carrier is None else row.carrier for row in guides]
+        return {
+            "loops": np.vstack([rows, stacked([row.place.row(d) for row in guides], d)]),
+            "loops_c": np.append(constants, [row.c for row in guides]),
+            "loops_z": np.array([0j] * closures + [row.place.c for row in guides], complex),
+            "loops_on": np.array([FIXED] * closures + carriers, int),
+            "guided": tuple(self.guided(guide, closures) for guide in self.mechanism.guides),
+            "tied": closures + sum(not row.floats for row in guides),
+        }
+
+    def guided(self, guide: Guide, closures: int) -> GuideRows:
+        """Return where the rows of a guide are, behind the closures, and draw its line."""
+        k = [closures + i for i, row in enumerate(self.guide_rows) if row.name == guide.name]
+        ends = [self.on(guide.on, self.end(guide, end)) for end in (guide.start, guide.end)]
+        self.lines.append((guide.name, "guide", ends, NO_THICKNESS))
+        return GuideRows(k[0], None if guide.turning else k[1], 1j * self.line(guide))
 
     def span_arrays(self, d: int) -> dict[str, Any]:
         """Return the rows of the vectors along the springs and their constants."""
@@ -257,7 +281,7 @@ class _Assembler(Collection):
         B = unit(direction).conjugate() * frame.A
         return B, -float((B @ e0).real)
 
-    def probe(self, probe: Probe) -> BodyFrame:
+    def probe(self, probe: Probe | Guide) -> BodyFrame:
         point = self.mechanism.point(probe.point, probe.name)
         return self.frame(probe.name, body_of(probe.point), point)
 
@@ -386,10 +410,10 @@ def check_loops(jacobian: Real, names: Sequence[str]) -> None:
 
     Parameters
     ----------
-    jacobian : (2 k, n)
-        Jacobian of the loops at the straight shape [m/rad].
+    jacobian : (r, n)
+        Jacobian of the loops and guides at the straight shape [m/rad].
     names : sequence of str
-        Names of the parts that close the k loops.
+        Name of the part that each row belongs to.
 
     Raises
     ------
@@ -400,15 +424,17 @@ def check_loops(jacobian: Real, names: Sequence[str]) -> None:
     if not rows:
         return
     tolerance = DEPENDENT_LOOP_RTOL * np.abs(jacobian).max()
-    repeated = sorted({names[k // 2] for k in dependent_rows(jacobian, tolerance)})
+    repeated = sorted({names[k] for k in dependent_rows(jacobian, tolerance)})
+    every = ", ".join(repeated or dict.fromkeys(names))
     if repeated or rows > n:
         raise MechanismError(
-            f"the constraints of the loops closed by {', '.join(repeated or names)} depend on "
-            "those of other loops at the straight shape: rigid links are over-constrained there; "
-            "remove a part, move it out of line, or let flexures stretch (axial = true)"
+            f"the constraints of {every} depend on those of other loops and guides at the straight "
+            "shape: rigid links are over-constrained there; remove a part, move it out of line, or "
+            "let flexures stretch (axial = true) or bodies turn in their guides (turning = true)"
         )
     if rows >= n:
         raise MechanismError(
-            f"the loops closed by {', '.join(names)} prevent every motion of the mechanism: remove "
-            "a part, or let flexures bend (clamp their ends) or stretch (axial = true)"
+            f"the loops closed by {every} prevent every motion of the mechanism: remove a part, or "
+            "let flexures bend (clamp their ends) or stretch (axial = true), or bodies turn in "
+            "their guides (turning = true)"
         )

@@ -17,8 +17,9 @@ from ..base.tolerances import RIGID_RTOL
 from . import constraints
 from .arrays import Real
 from .forces import load_rows
+from .places import BodyFrame
 from .statics import Equilibrium, balance_matrix
-from .system import BodyFrame, System
+from .system import System
 
 
 def compliance_matrix(

@@ -3,21 +3,47 @@
 import math
 from collections.abc import Mapping
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
-from ..base.errors import ParameterError
-from ..base.tolerances import SPRING_APART_RTOL
+from ..base.errors import MechanismError, ParameterError
+from ..base.tolerances import JOINT_DISTANCE_RTOL, SPRING_APART_RTOL
 from ..mechanism.description import Mechanism
 from ..mechanism.expressions import affine
-from ..mechanism.parts import GROUND, Flexure, Joint, Point, Spring, body_of
+from ..mechanism.parts import GROUND, Flexure, Guide, Joint, Point, Spring, body_of
 from .arrays import Real
 from .direction_map import DirectionMap
 from .free_body import Connection, FreeBody
-from .system import FIXED, BodyFrame, Place
+from .places import BodyFrame, Place
+from .system import FIXED
 
 ROD_POINTS = (0.5 - 0.5 / math.sqrt(3), 0.5 + 0.5 / math.sqrt(3))
 """Places of the two equal point masses of a uniform rod, in units of its length [-]."""
+
+
+class GuideRow(NamedTuple):
+    """A row Re(f (A E + z)) + c of a guide, with the place z + A E.
+
+    Parameters
+    ----------
+    name : str
+        Name of the guide.
+    place : Place
+        A and z [m].
+    c : float
+        Constant [m].
+    carrier : int or None
+        Direction of the body that carries the line, f = conj(E); None: the ground, f = 1 and no z.
+    floats : bool
+        Whether only bodies without flexures and joints to the ground, and the ground, move it.
+    """
+
+    name: str
+    place: Place
+    c: float
+    carrier: int | None
+    floats: bool
 
 
 class Collection:
@@ -42,6 +68,7 @@ class Collection:
         self.masses: list[tuple[Place, float]] = []
         self.springs: list[tuple[float, int | None, int | None]] = []
         self.loops: list[tuple[str, Place]] = []
+        self.guide_rows: list[GuideRow] = []
         self.origin: dict[str, Place] = {GROUND: Place()}
         self.drawn: dict[str, complex] = {GROUND: 0j}
         self.depth = {GROUND: 0}  # Flexures and joints between each body and the ground.
@@ -66,7 +93,7 @@ class Collection:
         """Return the drawn position of a point [m]."""
         return complex(self.number(point[0]), self.number(point[1]))
 
-    def end(self, part: Flexure | Joint | Spring, reference: str) -> complex:
+    def end(self, part: Flexure | Joint | Spring | Guide, reference: str) -> complex:
         """Return the drawn position of an end of a part [m]."""
         return self.at(self.mechanism.point(reference, part.name))
 
@@ -88,6 +115,31 @@ class Collection:
                 f"spring {spring.name} from {spring.start} to {spring.end} has the length "
                 f"{apart:.4g} m, so that its direction is undefined: draw its ends apart"
             )
+
+    def line(self, guide: Guide) -> complex:
+        """Return the direction of the line of a guide as drawn, a unit vector.
+
+        Raises
+        ------
+        ParameterError
+            If the points of the line coincide, or the guided point is not on it.
+        """
+        start, end = self.end(guide, guide.start), self.end(guide, guide.end)
+        length = abs(end - start)
+        if not length > SPRING_APART_RTOL * self.size:
+            raise ParameterError(
+                f"guide {guide.name} from {guide.start} to {guide.end} has the length "
+                f"{length:.4g} m, so that its direction is undefined: draw these points apart"
+            )
+        along = (end - start) / length
+        apart = ((self.end(guide, guide.point) - start) * along.conjugate()).imag
+        if not abs(apart) <= JOINT_DISTANCE_RTOL * self.size:
+            side = "left" if apart > 0.0 else "right"
+            raise ParameterError(
+                f"guide {guide.name}: {guide.point} is drawn {abs(apart):.4g} m to the {side} of "
+                f"the line from {guide.start} to {guide.end}; draw it on the line"
+            )
+        return along
 
     @cached_property
     def size(self) -> float:
@@ -196,6 +248,41 @@ class Collection:
     def close(self, name: str, place: Place, other: Place) -> None:
         """Close a loop: require that two places coincide."""
         self.loops.append((name, place.minus(other)))
+
+    def guide(self, guide: Guide) -> None:
+        """Add the rows of a guide, seen from the carrier of its line.
+
+        Raises
+        ------
+        MechanismError
+            If both bodies fly freely: where they are placed would have to satisfy the guide.
+        ParameterError
+            As :meth:`line`.
+        """
+        if self._floats(guide) and guide.body in self.mechanism.free_bodies:
+            raise MechanismError(
+                f"guide {guide.name} guides {guide.body} along {guide.on}, and both fly freely: "
+                "connect one of them to the ground by a flexure, joint, spring or guide"
+            )
+        normal, carrier = 1j * self.line(guide), guide.on
+        at = self.end(guide, guide.point)
+        apart = self.on(guide.body, at).minus(self.origin[carrier])
+        self._guide_row(guide, normal, apart, at - self.drawn[carrier])
+        turn = self.index[guide.body]
+        if not guide.turning and turn is not None:
+            arm = Place(0j, {turn: complex(self.size)})
+            self._guide_row(guide, 1j, arm, complex(self.size))
+
+    def _guide_row(self, guide: Guide, normal: complex, apart: Place, drawn: complex) -> None:
+        """Add the change of a vector along a normal, both in the frame of the carrier."""
+        along, carrier = normal.conjugate(), self.index[guide.on]
+        place = Place(along * apart.c, {j: along * vector for j, vector in apart.A.items()})
+        c = -(along * drawn).real + (place.c.real if carrier is None else 0.0)
+        self.guide_rows.append(GuideRow(guide.name, place, c, carrier, self._floats(guide)))
+
+    def _floats(self, guide: Guide) -> bool:
+        """Return whether only the ground and bodies without flexures and joints to it take part."""
+        return all(self.depth[body] == 0 for body in (guide.body, guide.on))
 
     def spring(self, rate: float, a: int | None, b: int | None) -> None:
         """Add a spring between two coordinates; None: the ground."""

@@ -286,7 +286,9 @@ def satisfied(residual: Real, length: float) -> bool:
     return not len(residual) or float(np.abs(residual).max()) <= CONSTRAINT_RTOL * length
 
 
-def project_positions(system: System, rows: Rows, q: Real, c: Real) -> tuple[Real, Complex]:
+def project_positions(
+    system: System, rows: Rows, q: Real, c: Real | None = None
+) -> tuple[Real, Complex]:
     """Move q onto the rows by the least mass-weighted change (Gauss-Newton).
 
     Parameters
@@ -297,8 +299,9 @@ def project_positions(system: System, rows: Rows, q: Real, c: Real) -> tuple[Rea
         Constraints.
     q : (n,)
         Coordinates near the constraints [rad].
-    c : (r,)
-        Constants of the rows at the present time; they change if walls move [m].
+    c : (r,) or None
+        Constants of the rows at the present time; they change if walls move [m].  None: the own
+        ones of the rows.
 
     Returns
     -------
@@ -324,7 +327,7 @@ def project_positions(system: System, rows: Rows, q: Real, c: Real) -> tuple[Rea
             return q, e
         best = min(best, error)
         G = rows.jacobian(e)
-        right = np.zeros(n + len(c))
+        right = np.zeros(n + len(rows))
         right[n:] = -s
         q = q + solve(saddle(system.mass_matrix(e), G, G), right, n, system.length)[:n]
     raise SimulationError(

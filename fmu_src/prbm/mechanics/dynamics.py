@@ -24,7 +24,7 @@ from .contact_state import ContactMode, ContactState
 from .elements import Elements
 from .inputs import Inputs
 from .kinetics import kinetic_energy, mass_accelerations, turned_moments
-from .system import FIXED, Rows, System
+from .system import Rows, System
 
 
 class Evaluation(NamedTuple):
@@ -133,18 +133,12 @@ class Equations:
         system, held, stops = self.system, self.held, self.contacts.stops
         stuck = [c for c in self.sticking if c < stops]
         rubbing = [c - stops for c in self.sticking if c >= stops]
-        B = np.vstack([system.loops, system.gaps[held], system.slides[stuck], system.rubs[rubbing]])
-        loops, end = len(system.loops), len(B) - len(rubbing)
-        c = np.zeros(len(B))
-        c[:loops] = system.loops_c
+        self.rows = system.loop_rows.beside(
+            system.gap_rows.some(held), system.slide_rows.some(stuck), system.rub_rows.some(rubbing)
+        )
         for k, i in enumerate(held):
-            c[self.first_hold + k] = system.gaps_c[i] + self.inputs.walls[i].position
-            c[self.first_hold + k] += self.contacts.depth(i)
-        z = np.zeros(len(B), complex)
-        on = np.full(len(B), FIXED)
-        z[loops:end] = [*system.gaps_z[held], *system.slides_z[stuck]]
-        on[loops:end] = [*system.on[held], *system.on[stuck]]
-        self.rows = Rows(system, B, c, z, on)
+            self.rows.c[self.first_hold + k] += self.inputs.walls[i].position
+            self.rows.c[self.first_hold + k] += self.contacts.depth(i)
         self.positions = self.rows.first(self.first_stick)
 
     def _scale(self) -> Real:

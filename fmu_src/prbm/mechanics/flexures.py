@@ -16,8 +16,8 @@ from .arrays import Complex, Real
 from .beam import Beam, Material
 from .collection import ROD_POINTS, Collection
 from .free_body import of_beam, of_links
+from .places import NO_THICKNESS, Place
 from .profile import Line, Notch, Panel, Straight, notch_panels
-from .system import NO_THICKNESS, Place
 
 CURVE_POINTS = 33  # Points of each panel of a drawn beam.
 

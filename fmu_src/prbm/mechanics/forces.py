@@ -8,7 +8,8 @@ row w = i sum conj(F) A.  Their generalised forces are Q = Phi^T Re(w e).
 import numpy as np
 
 from .arrays import Complex, Real
-from .system import BodyFrame, System
+from .places import BodyFrame
+from .system import System
 
 
 def springs(K: Real, deflection: Real) -> Real:

@@ -27,9 +27,10 @@ from .elements import Elements
 from .forces import field_row, load_rows, normal_force
 from .inputs import BASE_AXES, LOADS
 from .modal import Modes, fundamental_frequency, vibrations
+from .places import BodyFrame
 from .resting import RestingShape
 from .statics import tangent_stiffness
-from .system import BodyFrame, System
+from .system import System
 
 MOTIONS = {"x": "m", "y": "m", "angle": "rad", "vx": "m/s", "vy": "m/s", "omega": "rad/s"}
 POINTS = ("x", "y", "vx", "vy")  # Motions of probes.
@@ -142,7 +143,7 @@ class _SmallMotions:
         self.rows, self.contacts = self._rows()
         elements = Elements(system)
         self.K_t = tangent_stiffness(
-            elements.tangent(self.e), shape.load, shape.B, shape.lam, self.e, system.arm, system.Phi
+            elements.tangent(self.e), shape.load, shape.rows, shape.lam, self.e
         )
         self.modes = vibrations(system.mass_matrix(self.e), self.K_t, self.rows)
         values = system.values
@@ -157,7 +158,7 @@ class _SmallMotions:
         A contact that other rows keep from sliding carries no friction force.
         """
         system, mechanism, values = self.system, self.system.mechanism, self.system.values
-        rows = system.gradient(self.shape.B, self.e)
+        rows = self.shape.rows.jacobian(self.e)
         contacts = {mechanism.stops[i].name: "held" for i in self.stops}
         slides, rubs = (x.jacobian(self.e) for x in (system.slide_rows, system.rub_rows))
         sticking = [

@@ -16,8 +16,8 @@ from . import constraints
 from .arrays import Complex, Real
 from .elements import Elements
 from .forces import field_row
-from .statics import Equilibrium, resting, sprung, tangent_stiffness
-from .system import System
+from .statics import Equilibrium, held_rows, resting, sprung, tangent_stiffness
+from .system import Rows, System
 
 
 @dataclass(frozen=True)
@@ -56,22 +56,21 @@ def modes(system: System, shape: Equilibrium) -> Modes:
     shape : Equilibrium
         Static shape, as :func:`prbm.mechanics.statics.equilibrium` returns it.
     """
-    B, lam = system.loops, shape.lam
+    rows, lam = system.loop_rows, shape.lam
     if shape.force != 0.0:
-        B = np.vstack([B, system.holding_row(shape.q)])
+        rows = held_rows(system, system.amount(shape.q))
         lam = np.append(lam, shape.force)
     e = system.directions(shape.q)
-    return _modes(system, e, system.mass_matrix(e), B, lam, shape.load)
+    return _modes(system, e, system.mass_matrix(e), rows, lam, shape.load)
 
 
-def _modes(system: System, e: Complex, M: Real, B: Complex, lam: Real, w: Complex) -> Modes:
+def _modes(system: System, e: Complex, M: Real, rows: Rows, lam: Real, w: Complex) -> Modes:
     """Solve K_t phi = omega^2 M phi for phi on the tangent space of the loops.
 
     Bodies that nothing connects to the ground do not move.
-    The tangent stiffness K_t is that of the loads w and of the multipliers lam along B.
+    The tangent stiffness K_t is that of the loads w and of the multipliers lam along rows.
     """
-    K = Elements(system).tangent(e)
-    K_t = tangent_stiffness(K, w, B, lam, e, system.arm, system.Phi)
+    K_t = tangent_stiffness(Elements(system).tangent(e), w, rows, lam, e)
     still = np.eye(system.n)[system.placed]
     return vibrations(M, K_t, np.vstack([system.loop_rows.jacobian(e), still]))
 
@@ -252,14 +251,14 @@ def modes_at(system: System, q: Real) -> Modes:
     """
     e = system.directions(q)
     M = system.mass_matrix(e)
-    B = np.vstack([system.loops, system.holding_row(q)])
-    rows = system.gradient(B, e)
+    rows = held_rows(system, system.amount(q))
+    G = rows.jacobian(e)
     w = field_row(system.spread(system.S), system.gravity)
     load = Elements(system).force(q, e) + system.Phi.pull((w * e).real)
-    right = np.concatenate([load, np.zeros(len(B))])
-    kkt = constraints.saddle(M, rows, rows)
+    right = np.concatenate([load, np.zeros(len(rows))])
+    kkt = constraints.saddle(M, G, G)
     lam = -constraints.solve(kkt, right, system.n, system.length)[system.n :]
-    return _modes(system, e, M, B, lam, w)
+    return _modes(system, e, M, rows, lam, w)
 
 
 def simulated_restitution(phi: Real, M: Real, before: Real, after: Real) -> float:

@@ -25,7 +25,7 @@ from . import constraints
 from .arrays import Complex, Real
 from .elements import Elements
 from .statics import Equilibrium, tangent_stiffness
-from .system import FIXED, System
+from .system import Rows, System
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +36,8 @@ class RestingShape:
     ----------
     q : (n,)
         Coordinates [rad], [-].
-    B : (r + s, d) complex
-        Rows of the loops and of the gaps of the closed stops [m].
+    rows : Rows
+        The loops and the gaps of the closed stops [m].
     lam : (r + s,)
         Forces of the loops, and of the stops (> 0 pushes) [N].
     load : (d,) complex
@@ -45,7 +45,7 @@ class RestingShape:
     """
 
     q: Real
-    B: Complex
+    rows: Rows
     lam: Real
     load: Complex
 
@@ -69,15 +69,15 @@ def resting_shape(
     Raises
     ------
     EquilibriumError
-        If a stop is compliant or on a body, is not reached, would have to pull, or the shape is
+        If a stop is compliant, is not reached, would have to pull, or the shape is
         not found.
     """
     parts = [system.mechanism.stops[i] for i in stops]
-    for stop, i in zip(parts, stops, strict=True):
-        if stop.compliant or system.on[i] != FIXED:
+    for stop in parts:
+        if stop.compliant:
             raise EquilibriumError(
-                f"{stop.name} is compliant or has its wall on a body: shapes that rest on it are "
-                "not computed; choose rigid stops with a wall on the ground"
+                f"{stop.name} is compliant: shapes that rest on it are not computed; choose rigid "
+                "stops"
             )
     walls = np.array([value(stop, "position", system.values) for stop in parts])
     gaps = system.gap_rows.values(system.directions(shape.q))[list(stops)] + walls
@@ -87,14 +87,14 @@ def resting_shape(
                 f"{stop.name} is not reached: its gap in the equilibrium is {gap:.4g} m; add "
                 "loads that press on it, or leave it out"
             )
-    B = np.vstack([system.loops, system.gaps[list(stops)]])
-    closed = np.concatenate([system.loops_c, system.gaps_c[list(stops)] + walls])
+    rows = system.loop_rows.beside(system.gap_rows.some(list(stops)))
+    closed = rows.c + np.concatenate([np.zeros(len(system.loops)), walls])
     behind = np.concatenate([np.zeros(len(system.loops)), gaps])
     state = np.concatenate([shape.q, shape.lam, np.zeros(len(stops))])
     done, step = 0.0, 1.0
     while done < 1.0:
         target = min(1.0, done + step)
-        found = _balanced(system, B, closed - (1.0 - target) * behind, shape.load, moment, state)
+        found = _balanced(rows, closed - (1.0 - target) * behind, shape.load, moment, state)
         if found is not None:
             state, done = found, target
         elif step <= STATICS_LOAD_STEP_MIN:
@@ -108,26 +108,24 @@ def resting_shape(
             raise EquilibriumError(
                 f"{stop.name} would have to pull with {-force:.4g} N: leave it out"
             )
-    return RestingShape(state[: system.n], B, lam, shape.load)
+    return RestingShape(state[: system.n], rows, lam, shape.load)
 
 
-def _balanced(
-    system: System, B: Complex, c: Real, w: Complex, moment: Real, start: Real
-) -> Real | None:
-    """Return coordinates and multipliers on the rows Re(B E) + c = 0; None: not found."""
+def _balanced(rows: Rows, c: Real, w: Complex, moment: Real, start: Real) -> Real | None:
+    """Return coordinates and multipliers on rows with constants c; None: not found."""
+    system = rows.system
     n, state, turn, elements = system.n, start, math.inf, Elements(system)
     for _ in range(STATICS_ITERATIONS_MAX):
         q, lam = state[:n], state[n:]
         e = system.directions(q)
-        rows, open_by = system.gradient(B, e), (B @ e).real + c
+        G, open_by = rows.jacobian(e), rows.values(e, c)
         if turn <= STATICS_STEP_ATOL and (
             np.abs(open_by).max(initial=0.0) <= STATICS_CONSTRAINT_RTOL * system.length
         ):
             return state
         loads = system.Phi.pull((w * e).real) + moment
-        torque = elements.force(q, e) + loads + lam @ rows
-        K_t = tangent_stiffness(elements.tangent(e), w, B, lam, e, system.arm, system.Phi)
-        kkt = constraints.saddle(K_t, rows, rows)
+        torque = elements.force(q, e) + loads + lam @ G
+        kkt = constraints.saddle(tangent_stiffness(elements.tangent(e), w, rows, lam, e), G, G)
         try:
             right = np.concatenate([torque, -open_by])
             change = constraints.solve(kkt, right, n, system.length)

@@ -58,7 +58,7 @@ def connection_loads(
     loads : (p,) complex
         Gravity, inertia and damping of all mass points [N].
     pulls : iterable of (str, complex)
-        Other forces on bodies, by the name of the body [N].
+        Other forces on bodies than those of guides, by the name of the body [N].
     lam : (r,)
         Multipliers, those of the loops first [N].
 
@@ -70,7 +70,7 @@ def connection_loads(
         Sum of the forces of flexures, joints and pulls on the ground [N].
     """
     on = {name: complex(loads[k]) for name, k in system.body_masses.items()} | {GROUND: 0j}
-    for name, force in pulls:
+    for name, force in (*pulls, *guide_forces(system, e, lam)):
         on[name] += force
     closing = [c for c in system.connections if c.loop is not None]
     tree = [c for c in system.connections if c.loop is None]
@@ -161,6 +161,16 @@ def point_loads(equations: Equations, e: Complex, v: Real, a: Real) -> Complex:
         change = change - equations.mass_damping * 1j * (system.A @ system.swing(e, v))
     result: Complex = system.m * change
     return result
+
+
+def guide_forces(system: System, e: Complex, lam: Real) -> Pulls:
+    """Yield the forces of the guides on bodies and on the ground."""
+    for guide, rows in zip(system.mechanism.guides, system.guided, strict=True):
+        on = system.loops_on[rows.across]
+        normal = rows.normal * (1.0 if on == FIXED else complex(e[on]))
+        pull = float(lam[rows.across]) * normal
+        yield guide.body, pull
+        yield guide.on, -pull
 
 
 def _inputs(equations: Equations) -> Pulls:

@@ -6,12 +6,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.errors import EquilibriumError, ParameterError, SimulationError
+from ..base.tolerances import STATICS_CONSTRAINT_RTOL
 from ..mechanism.parts import value
 from .arrays import Real
 from .constraints import project_positions
 from .modal import modes, moved_by, unstable_directions
-from .statics import equilibrium, resting, with_bodies_placed
-from .system import Rows, System
+from .statics import equilibrium, held_rows, resting, with_bodies_placed
+from .system import System
 
 
 class Instability(NamedTuple):
@@ -91,7 +92,18 @@ def start_shape(system: System, values: Mapping[str, float], fraction: float = 1
     amount = fraction * value(release, release.start, values)
     if release.mode:
         return mode_shape(system, release.mode, amount)
-    return equilibrium(with_bodies_placed(system), amount).q
+    q = equilibrium(with_bodies_placed(system), amount).q
+    open_by = system.loop_rows.values(system.directions(q))
+    if np.abs(open_by).max(initial=0.0) <= STATICS_CONSTRAINT_RTOL * system.length:
+        return q
+    try:  # The released body was placed beside the line of a guide.
+        return project_positions(system, held_rows(system, amount), q)[0]
+    except SimulationError:
+        raise EquilibriumError(
+            f"release.{release.start} = {amount:g} {'rad' if release.turns else 'm'}: the guides "
+            f"do not let the body {release.body} move there; reduce it, or choose another "
+            "release.point or direction"
+        ) from None
 
 
 def mode_shape(system: System, mode: int, amplitude: float) -> Real:
@@ -134,12 +146,10 @@ def mode_shape(system: System, mode: int, amplitude: float) -> Real:
         )
     if amplitude == 0.0:
         return rest.q
-    rows = Rows(system, np.vstack([system.loops, system.release]), np.zeros(len(system.loops) + 1))
-    target = system.amount(rest.q) + amplitude
-    constants = np.append(system.loops_c, system.release_c - target)
     start = rest.q + phi * (amplitude / moved)
     try:
-        return project_positions(system, rows, start, constants)[0]
+        rows = held_rows(system, system.amount(rest.q) + amplitude)
+        return project_positions(system, rows, start)[0]
     except SimulationError:
         raise EquilibriumError(
             f"release.amplitude = {amplitude:g} m: no shape along mode {mode} has this amplitude; "

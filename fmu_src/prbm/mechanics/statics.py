@@ -11,7 +11,7 @@ couple at most the angle and the stretch of one arm, because every position is l
 
 Bodies that nothing connects to the ground are placed: no balance determines their displacements and
 rotations.  They are as drawn, or at the displacement or rotation of the release.  Bodies that only
-springs connect to it may have motions without stiffness and load, which do not occur.
+springs and guides connect to it may have motions without stiffness and load, which do not occur.
 """
 
 import math
@@ -44,11 +44,10 @@ from ..base.tolerances import (
 )
 from . import constraints
 from .arrays import Complex, Real, Whole
-from .direction_map import DirectionMap
 from .elements import Elements, geometric_stiffness
 from .forces import field_row, force_row
 from .inputs import checked_loads
-from .system import System, values
+from .system import Rows, System
 from .system import unit as unit_vector
 
 
@@ -84,19 +83,12 @@ class Equilibrium:
     load: Complex
 
 
-def tangent_stiffness(
-    K: Real,
-    w: Complex,
-    B: Complex,
-    lam: Real,
-    e: Complex,
-    arm: Whole | None = None,
-    Phi: DirectionMap | None = None,
-) -> Real:
+def tangent_stiffness(K: Real, w: Complex, rows: Rows, lam: Real, e: Complex) -> Real:
     r"""Stiffness about a shape, K + Phi^T D Phi with D = diag(Im(w e) + Re(lam^T B e)) [N m/rad].
 
     An arm with g = Im(w e) + Re(lam^T B e) and h = Im(lam^T B e) - Re(w e) has the diagonal entries
-    g for its angle and -g for its stretch, and h couples both.  Displacements have none.
+    g for its angle and -g for its stretch, and h couples both.  Displacements have none.  Rows that
+    bodies carry add :meth:`prbm.mechanics.system.Rows.carrier_stiffness` to D.
 
     Parameters
     ----------
@@ -104,26 +96,17 @@ def tangent_stiffness(
         Tangent stiffness of the elements [N m/rad].
     w : (d,) complex
         Row of the dead loads, Q = Phi^T Re(w e) [N m].
-    B, lam : (r, d) complex, (r,)
-        Constraints and their multipliers [m], [N].
+    rows, lam : Rows, (r,)
+        Constraints and their multipliers [N].
     e : (d,) complex
         Directions.
-    arm : (d,) int or None
-        Index of the arm that each direction turns or stretches; None: direction j turns arm j.
-    Phi : DirectionMap or None
-        Map from coordinates to directions; None: the directions are the coordinates.
-
-    Examples
-    --------
-    A pendulum of length l hanging along -y under the weight m g has the stiffness m g l:
-
-    >>> l, mg = 2.0, 3.0
-    >>> w = 1j * np.conj(-1j * mg) * np.array([l + 0j])
-    >>> none = np.zeros((0, 1), complex)
-    >>> tangent_stiffness(np.zeros((1, 1)), w, none, np.zeros(0), np.array([-1j])).item()
-    6.0
     """
-    return K + geometric_stiffness((lam @ B - 1j * w) * e, arm, Phi)
+    system = rows.system
+    pull = rows.pull(lam, e) - 1j * w * e
+    K_t: Real = K + geometric_stiffness(pull, system.arm, system.Phi)
+    if len(rows.carried):
+        K_t += system.Phi.congruence(rows.carrier_stiffness(lam, e))
+    return K_t
 
 
 def equilibrium(
@@ -213,16 +196,22 @@ def with_bodies_placed(system: System) -> System:
     """Return a system in which bodies without flexures and joints are placed, springs or not.
 
     They are as drawn, or at the displacement or rotation of the release, where a motion begins.
+    The rows of guides between them alone are left out.
     """
     if not len(sprung(system)):
         return system
-    return replace(system, placed=system.floating)
+    loops = system.loop_rows.first(system.tied)
+    return replace(
+        system, placed=system.floating, loops=loops.B, loops_c=loops.c, loops_z=loops.every_z,
+        loops_on=loops.every_on,
+    )  # fmt: skip
 
 
 def resting(system: System) -> tuple[Equilibrium, bool]:
     """Return the shape under gravity, and whether it is an equilibrium.
 
-    If slow loading reaches none, bodies that only springs connect to the ground are as drawn.
+    If slow loading reaches none, bodies that only springs and guides connect to the ground are as
+    drawn.
 
     Raises
     ------
@@ -234,7 +223,9 @@ def resting(system: System) -> tuple[Equilibrium, bool]:
     except EquilibriumError:
         if not len(sprung(system)):
             raise
-        return equilibrium(with_bodies_placed(system)), False
+        found = equilibrium(with_bodies_placed(system))
+        missing = len(system.loops) - len(found.lam)  # Of guides between placed bodies.
+        return replace(found, lam=np.append(found.lam, np.zeros(missing))), False
 
 
 def _load_fully(
@@ -303,33 +294,38 @@ def _follow(
 
 def _determinant_sign(system: System, given: _Given, state: Real) -> int:
     """Return the sign of the determinant of the balance in a state; 0 if it is singular."""
-    B = _holding_rows(system, given.held)[0]
-    kkt = _linear_balance(system, state[: system.n], (given.w, given.share), B, state[system.n :])
+    rows = _holding_rows(system, given.held)
+    kkt = _linear_balance(
+        system, state[: system.n], (given.w, given.share), rows, state[system.n :]
+    )
     return constraints.determinant_sign(kkt, system.n, system.length)
 
 
 def _linear_balance(
-    system: System, q: Real, given: tuple[Complex, float], B: Complex, lam: Real
+    system: System, q: Real, given: tuple[Complex, float], rows: Rows, lam: Real
 ) -> Real:
-    """Return [[K_t, rows^T], [rows, 0]] for loads and constraints B with multipliers.
+    """Return [[K_t, rows^T], [rows, 0]] for loads and constraints with multipliers.
 
     What is given is the row w of the loads, and the share of strains and pretension.
     """
     w, share = given
     e = system.directions(q)
-    rows = system.gradient(B, e)
-    K = Elements(system).tangent(e, share)
-    K_t = tangent_stiffness(K, w, B, lam, e, system.arm, system.Phi)
-    return _placed(system, constraints.saddle(K_t, rows, rows))
+    G = rows.jacobian(e)
+    K_t = tangent_stiffness(Elements(system).tangent(e, share), w, rows, lam, e)
+    return _placed(system, constraints.saddle(K_t, G, G))
 
 
-def _holding_rows(system: System, held: float | None) -> tuple[Complex, Real]:
-    """Return B, c of the loops and, if a force holds the released body, of its displacement."""
-    B, c = system.loops, system.loops_c
+def _holding_rows(system: System, held: float | None) -> Rows:
+    """Return the loops and, if a force holds the released body, the row of its displacement."""
     if held is None or system.released_free:
-        return B, c
-    row, constant = system.holding(held)
-    return np.vstack([B, row]), np.append(c, constant)
+        return system.loop_rows
+    return held_rows(system, held)
+
+
+def held_rows(system: System, amount: float) -> Rows:
+    """Return the loops and guides, and the row that holds the released body at an amount."""
+    row, constant = system.holding(amount)
+    return system.loop_rows.beside(Rows(system, row[None], np.array([constant])))
 
 
 def _places(system: System, amount: float) -> Real:
@@ -386,33 +382,33 @@ def _newton(system: System, given: _Given, start: Real) -> Real | None:
     """Find the equilibrium with what is given; None without convergence."""
     n, elements = system.n, Elements(system)
     held, w, moment, share = given
-    B, c = _holding_rows(system, held)
+    rows = _holding_rows(system, held)
     stiffest = float(np.abs(elements.drawn).max())
     springs_scale = STATICS_FORCE_RTOL * stiffest
     idle = sprung(system)
+    least = SPRING_IDLE_RTOL * (stiffest or float(np.abs(w).max()) or 1.0)
     state, turn = start.copy(), math.inf
     state[system.placed] = _places(system, held or 0.0)
     for _ in range(STATICS_ITERATIONS_MAX):
         q, lam = state[:n], state[n:]
         e = system.directions(q)
-        rows = system.gradient(B, e)
+        G = rows.jacobian(e)
         loads = system.Phi.pull((w * e).real) + moment
-        torque = elements.force(q, e, share) + loads + lam @ rows
+        torque = elements.force(q, e, share) + loads + lam @ G
         torque[system.placed] = 0.0
-        open_by = values(B, c, e)
+        open_by = rows.values(e)
         closed = (
             not len(open_by) or np.abs(open_by).max() <= STATICS_CONSTRAINT_RTOL * system.length
         )
         # Torques of springs, and the torques that are added here: these are rounded.
-        added = float(np.abs(w).max() + np.abs(lam) @ np.abs(B).max(axis=1, initial=0.0))
+        added = float(np.abs(w).max() + np.abs(lam) @ np.abs(rows.B).max(axis=1, initial=0.0))
         scale = max(springs_scale, STATICS_ROUNDING_RTOL * added)
         balanced = closed and np.abs(torque).max() <= scale
         if balanced and turn <= STATICS_STEP_ATOL:
             return state
-        K = elements.tangent(e, share)
-        K_t = tangent_stiffness(K, w, B, lam, e, system.arm, system.Phi)
-        K_t[idle, idle] += SPRING_IDLE_RTOL * stiffest
-        kkt = _placed(system, constraints.saddle(K_t, rows, rows))
+        K_t = tangent_stiffness(elements.tangent(e, share), w, rows, lam, e)
+        K_t[idle, idle] += least
+        kkt = _placed(system, constraints.saddle(K_t, G, G))
         try:
             right = np.concatenate([torque, -open_by])
             change = constraints.solve(kkt, right, n, system.length)
@@ -522,10 +518,15 @@ def _turning_message(system: System) -> str:
 
 
 def immobile(system: System) -> str:
-    """Return why the released body, as drawn, cannot be held, and a remedy."""
+    """Return why the released body, as drawn, has no stiffness, and a remedy."""
     if system.released_free:
         return (
             f"the body {system.mechanism.release.body} flies freely, and is placed without a force"
+        )
+    if not held_by_loops(system):
+        return (
+            "a motion of the mechanism, with the released body held, deforms no element and lifts "
+            "no weight; add springs or gravity"
         )
     if system.mechanism.release.turns:
         return (
@@ -593,9 +594,9 @@ def balance_matrix(system: System, shape: Equilibrium, held: bool) -> Real:
 
     The rows are those of the loops and, if the released body is held, that of its displacement.
     """
-    B = np.vstack([system.loops, system.holding_row(shape.q)])
+    rows = held_rows(system, system.amount(shape.q))
     lam = np.append(shape.lam, shape.force / _holding_unit(system))
-    kkt = _linear_balance(system, shape.q, (shape.load, 1.0), B, lam)
+    kkt = _linear_balance(system, shape.q, (shape.load, 1.0), rows, lam)
     return kkt if held else kkt[:-1, :-1]
 
 
@@ -647,7 +648,7 @@ def release_velocity(system: System, q: Real, speed: float) -> Real:
         return np.zeros(system.n)
     e = system.directions(q)
     M = system.mass_matrix(e)
-    rows = system.gradient(np.vstack([system.loops, system.release]), e)
+    rows = np.vstack([system.loop_rows.jacobian(e), system.gradient(system.release, e)])
     rates = np.zeros(len(rows))
     rates[-1] = -speed
     try:

@@ -33,8 +33,8 @@ arms.  Then dx/dtheta = -Im(spread(B) e), and dx/dq = dx/dtheta Phi.
 
 import cmath
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -44,97 +44,12 @@ from .arrays import Complex, Real, Whole
 from .direction_map import DirectionMap
 from .free_body import Connection
 from .kinetics import turned_moments
+from .places import BodyFrame, GuideRows, Outline
 
 ANGLE = ("angle", "omega")  # Names of the variables of a coordinate that is an angle.
 STRAIN = ("strain", "strain_rate")  # Those of a coordinate that is a stretch.
 SHIFTS = ("x", "vx"), ("y", "vy")  # Those of the coordinates of an arm that floats.
 FIXED = -1  # In place of a direction: fixed to the ground.
-
-
-@dataclass(frozen=True)
-class Place:
-    """A point of the mechanism, z = c + A E.
-
-    Parameters
-    ----------
-    c : complex
-        Fixed part [m].
-    A : dict of int to complex
-        Vectors that turn, and stretch, with the arms [m].
-    """
-
-    c: complex = 0j
-    A: Mapping[int, complex] = field(default_factory=dict)
-
-    def plus(self, j: int | None, vector: complex) -> "Place":
-        """Return the place at the end of a vector fixed to direction j (None: the ground)."""
-        if j is None:
-            return Place(self.c + vector, self.A)
-        return Place(self.c, {**self.A, j: self.A.get(j, 0j) + vector})
-
-    def minus(self, other: "Place") -> "Place":
-        """Return the vector from another place to this one."""
-        A = dict(self.A)
-        for j, vector in other.A.items():
-            A[j] = A.get(j, 0j) - vector
-        return Place(self.c - other.c, A)
-
-    def row(self, d: int) -> Complex:
-        """Return A as a row of d columns."""
-        row = np.zeros(d, complex)
-        for j, vector in self.A.items():
-            row[j] = vector
-        return row
-
-
-@dataclass(frozen=True)
-class BodyFrame:
-    """A point of a body, for instance its centre of mass.
-
-    Parameters
-    ----------
-    name : str
-        Name of the body, the force or the probe.
-    j : int
-        The body's coordinate; :data:`FIXED`: the ground.
-    arm : int
-        The body's direction, the index of its arm; :data:`FIXED`: the ground.
-    c, A : complex, (d,) complex
-        Position z = c + A E of the point [m].
-    drawn : complex
-        Position of the point in the straight shape [m].
-    """
-
-    name: str
-    j: int
-    arm: int
-    c: complex
-    A: Complex
-    drawn: complex
-
-
-@dataclass(frozen=True)
-class Outline:
-    """A line to draw.
-
-    Parameters
-    ----------
-    name, kind : str
-        Name of the part; ``"flexure"``, ``"joint"``, ``"spring"`` or ``"body"``.
-    c, A : (p,) complex, (p, d) complex
-        The places of its corners, z = c + A E [m].
-    thickness : (p,)
-        Thickness of a beam at the corners [m]; empty for other parts.
-    """
-
-    name: str
-    kind: str
-    c: Complex
-    A: Complex
-    thickness: Real
-
-
-NO_THICKNESS: Real = np.zeros(0)  # Thickness of outlines that are not beams.
 
 
 def values(B: Complex, c: Real, e: Complex) -> Real:
@@ -178,22 +93,35 @@ class Rows:
     ) -> None:
         self.system, self.B, self.c = system, B, c
         self.spread = system.spread(B)
-        on = np.full(len(B), FIXED) if on is None else on
-        self.carried: Whole = np.flatnonzero(on != FIXED)
-        self.on: Whole = on[self.carried]
-        self.z: Complex = np.zeros(0, complex) if z is None else z[self.carried]
+        self.every_on: Whole = np.full(len(B), FIXED) if on is None else on
+        self.every_z: Complex = np.zeros(len(B), complex) if z is None else z
+        self.carried: Whole = np.flatnonzero(self.every_on != FIXED)
+        self.on: Whole = self.every_on[self.carried]
+        self.z: Complex = self.every_z[self.carried]
 
     def __len__(self) -> int:
         return len(self.B)
 
+    def some(self, which: slice | Sequence[int]) -> "Rows":
+        """Return some of the rows."""
+        return Rows(
+            self.system, self.B[which], self.c[which], self.every_z[which], self.every_on[which]
+        )
+
     def first(self, r: int) -> "Rows":
         """Return the first r rows."""
-        if r == len(self):
-            return self
-        on = np.full(len(self), FIXED)
-        z = np.zeros(len(self), complex)
-        on[self.carried], z[self.carried] = self.on, self.z
-        return Rows(self.system, self.B[:r], self.c[:r], z[:r], on[:r])
+        return self if r == len(self) else self.some(slice(r))
+
+    def beside(self, *others: "Rows") -> "Rows":
+        """Return these rows, followed by others."""
+        every = (self, *others)
+        return Rows(
+            self.system,
+            np.vstack([rows.B for rows in every]),
+            np.concatenate([rows.c for rows in every]),
+            np.concatenate([rows.every_z for rows in every]),
+            np.concatenate([rows.every_on for rows in every]),
+        )
 
     def values(self, e: Complex, c: Real | None = None) -> Real:
         """Return x [m], (..., r); e may be a stack (..., d); ``c`` replaces the constants."""
@@ -209,22 +137,46 @@ class Rows:
         return result
 
     def jacobian(self, e: Complex) -> Real:
-        """Return dx/dq [m/rad], (r, n)."""
+        """Return dx/dq [m/rad], (..., r, n); e may be a stack (..., d)."""
         return self.system.Phi.pull(self.by_direction(e))
 
     def by_direction(self, e: Complex) -> Real:
-        """Return dx/dtheta [m/rad], (r, d)."""
-        result = jacobian(self.spread, e)
+        """Return dx/dtheta [m/rad], (..., r, d); e may be a stack (..., d)."""
+        result = jacobian(self.spread, e[..., None, :])
         if len(self.carried):
-            result[self.carried] = self._carried_by_direction(e)
+            result[..., self.carried, :] = self._carried_by_direction(e)
         return result
 
     def _carried_by_direction(self, e: Complex) -> Real:
         """Return dx/dtheta of the carried rows [m/rad]."""
-        f = e[self.on].conj()
-        result: Real = -(f[:, None] * self.spread[self.carried] * e).imag
-        result[np.arange(len(self.on)), self.on] += self._carried_values(self.B @ e, e).imag
+        f = e[..., self.on].conj()
+        result: Real = -(f[..., None] * self.spread[self.carried] * e[..., None, :]).imag
+        turned = self._carried_values(e @ self.B.T, e).imag
+        result[..., np.arange(len(self.on)), self.on] += turned
         return result
+
+    def pull(self, lam: Real, e: Complex) -> Complex:
+        """Return the pull lam^T (f B) e of forces lam (r,) along the rows on the arms [N m]."""
+        pull: Complex = (lam @ self.B) * e
+        if len(self.carried):
+            turned = e[self.on].conj() - 1.0
+            pull = pull + ((lam[self.carried] * turned) @ self.B[self.carried]) * e
+        return pull
+
+    def carrier_stiffness(self, lam: Real, e: Complex) -> Real:
+        """Return the stiffness of the directions by forces lam, where bodies carry rows, (d, d).
+
+        It is what the rotation of these bodies adds to -lam d^2x/dtheta^2 [N m/rad]: their
+        directions have the second derivatives -Re(f (B E + z)), and Re(f B e) with all others.
+        """
+        D = np.zeros((self.system.d, self.system.d))
+        values = self._carried_values(self.B @ e, e).real
+        for k, on, value in zip(self.carried, self.on, values.tolist(), strict=True):
+            across = lam[k] * (e[on].conj() * self.spread[k] * e).real
+            D[on] -= across
+            D[:, on] -= across
+            D[on, on] += lam[k] * value
+        return D
 
     def reach(self) -> Real:
         """Return the largest |dx/dq| with arms of their drawn length, (r, n) [m/rad].
@@ -304,8 +256,14 @@ class System:
         elements with energy are in :class:`prbm.mechanics.elements.Elements`.
     A, c, m : (p, d) complex, (p,) complex, (p,)
         Mass points z = c + A E [m] and their masses [kg].
-    loops, loops_c : (r, d) complex, (r,)
-        Loop closures Phi = Re(loops E) + loops_c [m].
+    loops, loops_c, loops_z, loops_on : (r, d) complex, (r,), (r,) complex, (r,) int
+        Loop closures, then guides: Phi = Re(f (loops E + loops_z)) + loops_c [m], with f = conj(E)
+        of the body loops_on that carries a guide.  Those of guides that involve bodies without
+        flexures and joints to the ground alone are the last ones.
+    guided : tuple of GuideRows
+        The rows of each guide.
+    tied : int
+        Number of the other rows.
     spans, spans_c : (2 c, d) complex, (2 c,)
         Components along x and y of the vectors from start to end of the c springs [m].
     gaps, gaps_c, gaps_z : (s, d) complex, (s,), (s,) complex
@@ -327,6 +285,8 @@ class System:
         The points at which the forces act.
     probes : tuple of BodyFrame
         The points whose motion is reported.
+    guided_points : tuple of BodyFrame
+        The points that guides keep on their lines.
     links : tuple of int
         The coordinates that are angles of flexures, in the order of the interface.
     owners : (n,) tuple of str
@@ -362,6 +322,10 @@ class System:
     m: Real
     loops: Complex
     loops_c: Real
+    loops_z: Complex
+    loops_on: Whole
+    guided: tuple[GuideRows, ...]
+    tied: int
     spans: Complex
     spans_c: Real
     gaps: Complex
@@ -379,6 +343,7 @@ class System:
     bodies: Mapping[str, BodyFrame]
     pushed: tuple[BodyFrame, ...]
     probes: tuple[BodyFrame, ...]
+    guided_points: tuple[BodyFrame, ...]
     links: tuple[int, ...]
     owners: tuple[str, ...]
     connections: tuple[Connection, ...]
@@ -430,8 +395,8 @@ class System:
 
     @cached_property
     def loop_rows(self) -> Rows:
-        """The closures of all loops [m]."""
-        return Rows(self, self.loops, self.loops_c)
+        """The closures of all loops, and the guides [m]."""
+        return Rows(self, self.loops, self.loops_c, self.loops_z, self.loops_on)
 
     @cached_property
     def shared(self) -> Whole:

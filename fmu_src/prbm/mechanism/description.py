@@ -54,6 +54,7 @@ from .parts import (
     FlexureType,
     Force,
     Friction,
+    Guide,
     Joint,
     Part,
     Point,
@@ -87,8 +88,8 @@ class Mechanism:
         Identifier of the FMU, title of one line, description of a paragraph.
     ground : mapping
         Fixed points, by name [m].
-    bodies, flexure_types, flexures, joints, stops, frictions, forces, probes, springs : tuples
-        Parts of each kind.
+    bodies, flexure_types, flexures, joints, springs, guides, stops, frictions, forces, probes
+        Parts of each kind, as tuples.
     release : Release
         Start of the motion.
     geometry : tuple of Parameter
@@ -120,6 +121,7 @@ class Mechanism:
     release: Release
     joints: tuple[Joint, ...] = ()
     springs: tuple[Spring, ...] = ()
+    guides: tuple[Guide, ...] = ()
     stops: tuple[Stop, ...] = ()
     frictions: tuple[Friction, ...] = ()
     forces: tuple[Force, ...] = ()
@@ -152,8 +154,8 @@ class Mechanism:
         if self.damping_zeta and self.free_bodies:
             raise MechanismError(
                 f"damping_zeta = {self.damping_zeta:g}: damping in proportion to mass would slow "
-                f"the flight of {', '.join(self.free_bodies)}, which no flexures, joints or "
-                "springs connect to the ground; use damping_beta, or connect them"
+                f"the flight of {', '.join(self.free_bodies)}, which no flexures, joints, "
+                "springs or guides connect to the ground; use damping_beta, or connect them"
             )
         self._check_names()
         known = {p.name: p for p in self.parameters}
@@ -270,18 +272,23 @@ class Mechanism:
     @cached_property
     def floating_bodies(self) -> tuple[str, ...]:
         """Names of the bodies that no flexures or joints connect to the ground."""
-        return self._apart((*self.flexures, *self.joints))
+        return self._apart(self._joined())
 
     @cached_property
     def free_bodies(self) -> tuple[str, ...]:
-        """Names of the bodies that no flexures, joints or springs connect to the ground."""
-        return self._apart((*self.flexures, *self.joints, *self.springs))
+        """Names of the bodies that no flexures, joints, springs or guides connect to the ground."""
+        springs = [(body_of(spring.start), body_of(spring.end)) for spring in self.springs]
+        return self._apart([*self._joined(), *springs, *((g.on, g.body) for g in self.guides)])
 
-    def _apart(self, parts: tuple[Flexure | Joint | Spring, ...]) -> tuple[str, ...]:
-        """Return the names of the bodies that parts do not connect to the ground."""
+    def _joined(self) -> list[tuple[str, str]]:
+        """Return the bodies that each flexure and joint connects."""
+        parts: tuple[Flexure | Joint, ...] = (*self.flexures, *self.joints)
+        return [(body_of(part.start), body_of(part.end)) for part in parts]
+
+    def _apart(self, pairs: list[tuple[str, str]]) -> tuple[str, ...]:
+        """Return the names of the bodies that connected pairs do not connect to the ground."""
         neighbours: dict[str, list[str]] = {}
-        for part in parts:
-            ends = body_of(part.start), body_of(part.end)
+        for ends in pairs:
             for one, other in (ends, ends[::-1]):
                 neighbours.setdefault(one, []).append(other)
         held, waiting = {GROUND}, [GROUND]
@@ -299,7 +306,8 @@ class Mechanism:
         # A flexure may share its name with its type.
         own = [f.name for f in self.flexures if f.type != f.name]
         parts: tuple[Part, ...] = (*self.bodies, *self.flexure_types, *self.joints, *self.stops)
-        parts = (*parts, *self.springs, *self.frictions, *self.forces, *self.probes)
+        parts = (*parts, *self.springs, *self.guides)
+        parts = (*parts, *self.frictions, *self.forces, *self.probes)
         for name in (*(part.name for part in parts), *own):
             if name in seen:
                 raise MechanismError(
@@ -329,6 +337,8 @@ class Mechanism:
             self._check_connection("joint", joint)
         for spring in self.springs:
             self._check_connection("spring", spring)
+        for guide in self.guides:
+            self._check_guide(guide)
         for probe in self.probes:
             self.point(probe.point, probe.name)
         self._check_attached({body.name: body for body in self.bodies})
@@ -455,6 +465,26 @@ class Mechanism:
                 "bodies"
             )
 
+    def _check_guide(self, guide: Guide) -> None:
+        """Reject a guide with undefined points, or with a line that no other body carries."""
+        for point in (guide.point, guide.start, guide.end):
+            self.point(point, guide.name)
+        if guide.on != body_of(guide.end):
+            raise MechanismError(
+                f"guide {guide.name} has a line from {guide.start} to {guide.end}, which are "
+                "points of two bodies: choose two points of one body, or of the ground"
+            )
+        if guide.body == guide.on:
+            raise MechanismError(
+                f"guide {guide.name} guides {guide.body} along itself: choose a point of another "
+                "body"
+            )
+        if guide.body == GROUND:
+            raise MechanismError(
+                f"guide {guide.name} guides a point of the ground: choose a point of {guide.on}, "
+                "and a line of the ground"
+            )
+
     def check_rigid(self, use: str) -> None:
         """Reject compliant stops, for a computation that has rigid impacts only.
 
@@ -486,17 +516,17 @@ class Mechanism:
         Raises
         ------
         MechanismError
-            If no flexures, joints or springs connect a body to the ground.
+            If no flexures, joints, springs or guides connect a body to the ground.
         """
         if self.free_bodies:
             raise MechanismError(
-                f"{use} has no bodies that fly freely: no flexures, joints or springs "
-                f"connect {', '.join(self.free_bodies)} to the ground; connect them, or simulate "
-                "the mechanism"
+                f"{use} has no bodies that fly freely: no flexures, joints, springs or "
+                f"guides connect {', '.join(self.free_bodies)} to the ground; connect them, or "
+                "simulate the mechanism"
             )
 
     def check_springless(self, use: str) -> None:
-        """Reject springs, for a computation that has flexures and joints only.
+        """Reject springs and guides, for a computation that has flexures and joints only.
 
         Parameters
         ----------
@@ -506,13 +536,14 @@ class Mechanism:
         Raises
         ------
         MechanismError
-            If there is a spring.
+            If there is a spring or a guide.
         """
-        if self.springs:
-            raise MechanismError(
-                f"{use} has no springs: remove {', '.join(s.name for s in self.springs)}, or "
-                "simulate the mechanism"
-            )
+        for kind, parts in (("springs", self.springs), ("guides", self.guides)):
+            if parts:
+                raise MechanismError(
+                    f"{use} has no {kind}: remove {', '.join(part.name for part in parts)}, or "
+                    "simulate the mechanism"
+                )
 
     def point(self, reference: str, user: str) -> Point:
         """Return the coordinates of the point ``body.point`` as drawn [m].

@@ -223,6 +223,40 @@ class Spring:
 
 
 @dataclass(frozen=True)
+class Guide:
+    """A straight line that a point of a body stays on: a pin in a slot, or a slider.
+
+    Parameters
+    ----------
+    name : str
+        Prefix of its outputs, for instance ``guide``.
+    point : str
+        The guided point, ``body.point``.
+    start, end : str
+        Two points of the line, both on the ground or on one other body, which carries the line.
+        The line is unlimited, and passes through the guided point as drawn.
+    turning : bool
+        Whether the guided body may turn; otherwise it keeps its angle relative to the carrier.
+    """
+
+    name: str
+    point: str
+    start: str
+    end: str
+    turning: bool = True
+
+    @property
+    def body(self) -> str:
+        """Name of the guided body."""
+        return body_of(self.point)
+
+    @property
+    def on(self) -> str:
+        """Name of the body that carries the line, or ``ground``."""
+        return body_of(self.start)
+
+
+@dataclass(frozen=True)
 class Stop:
     """A contact of a point of a body with a wall, fixed to the ground or to another body.
 
@@ -382,7 +416,19 @@ class Release:
         return self.angle is not None
 
 
-Part = Body | FlexureType | Flexure | Joint | Spring | Stop | Friction | Force | Probe | Release
+Part = (
+    Body
+    | FlexureType
+    | Flexure
+    | Joint
+    | Spring
+    | Guide
+    | Stop
+    | Friction
+    | Force
+    | Probe
+    | Release
+)
 
 LENGTH_MIN = 1e-9  # m; smallest dimension of a mechanism.
 MASS_MIN = 1e-15  # kg; half the mass of a cubic micrometre of silicon.

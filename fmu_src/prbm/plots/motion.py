@@ -174,7 +174,7 @@ def _displacements(system: System, columns: Columns) -> dict[str, Complex]:
 
 def _check_loops(system: System, q: Real) -> None:
     """Reject shapes with open loops: the mechanism or its lengths are different ones."""
-    opened = np.abs((system.directions(q) @ system.loops.T).real + system.loops_c)
+    opened = np.abs(system.loop_rows.values(system.directions(q)))
     if opened.size and opened.max() > LOOP_OPEN_RTOL * system.length:
         raise ResultError(
             f"the loops of {system.mechanism.name} are open by {opened.max():.3g} m in the result; "

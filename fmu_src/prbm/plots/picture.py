@@ -191,7 +191,8 @@ def _walls(shapes: Shapes) -> list[Complex]:
 
 def _places(shapes: Shapes, E: Complex) -> list[Complex]:
     lines = [corners(line.outline, E) for line in shapes.flexures]
-    return [*lines, *shapes.springs(E), *(shapes.body(name, E) for name in shapes.bodies)]
+    lines += [*shapes.springs(E), *shapes.slots(E)]
+    return [*lines, *(shapes.body(name, E) for name in shapes.bodies)]
 
 
 def _aligned(across: float) -> Literal["left", "center", "right"]:
@@ -262,7 +263,7 @@ class Drawing:
             self.line(np.append(z, z[0]), STRAIGHT, 0.9, 0.5, "--")
 
     def shape(self, E: Complex, pivots: bool = False) -> None:
-        """Draw flexures, springs, bodies and pins."""
+        """Draw flexures, springs, guides, bodies and pins."""
         for line in self.shapes.flexures:
             if line.shaped:
                 self.patch([line.edge(E)], FLEXURE, 2.0)
@@ -272,8 +273,8 @@ class Drawing:
             self.line(z, LINK, 0.9, 2.5)
             if pivots and line.jointed:
                 self.pivots(z[1:-1], 3.4 if line.curved else 1.5, 4.0)
-        for spring in self.shapes.springs(E):
-            self.line(spring, LINK, 0.9, 3.2)
+        for drawn in (*self.shapes.springs(E), *self.shapes.slots(E)):
+            self.line(drawn, LINK, 0.9, 3.2)
         for name in self.shapes.bodies:
             self.patch(self.shapes.areas(name, E), BODY, 3.0)
         self.pivots(self.shapes.pins(E), 6.0, 5.0, 1.5)
@@ -384,7 +385,7 @@ class Drawing:
         )  # fmt: skip
 
     def names(self, E: Complex) -> None:
-        """Write the names of bodies, flexures, springs, joints and probes without overlaps."""
+        """Write the names of parts and probes without overlaps."""
         shapes = self.shapes
         for name in shapes.bodies:
             z, x = shapes.body(name, E), shapes.centre(name, E).real
@@ -397,7 +398,7 @@ class Drawing:
             z = corners(line.outline, E)
             thickness = float(line.outline.thickness.max()) if line.shaped else 0.0
             self.along(complex(z[0]), complex(z[-1]), line.flexure.name, thickness)
-        for outline in shapes.coils:
+        for outline in (*shapes.coils, *shapes.ways):
             start, end = (complex(z) for z in corners(outline, E))
             self.along(start, end, outline.name, SPRING_WIDTH * shapes.size)
         for joint in shapes.joints:

@@ -101,8 +101,9 @@ class Scene:
 
     Attributes
     ----------
-    links, curves, edges, springs, bodies, hits, walls : dict of str to artist
-        Moving artists by the names of flexures, springs, bodies and stops, in the unit of the axes.
+    links, curves, edges, springs, slots, bodies, hits, walls : dict of str to artist
+        Moving artists by the names of flexures, springs, guides, bodies and stops, in the unit of
+        the axes.
         Flexures with a profile are in ``edges``, all others in ``links``.
     """
 
@@ -215,6 +216,9 @@ class Scene:
         self.springs = {
             outline.name: self._moving_line(LINK, 1.3, zorder=3.2) for outline in self.shapes.coils
         }
+        self.slots = {
+            outline.name: self._moving_line(LINK, 0.9, zorder=3.2) for outline in self.shapes.ways
+        }
         self.bodies: dict[str, PathPatch] = {}
         self.centres: dict[str, Line2D] = {}
         for name in self.system.bodies:
@@ -277,7 +281,7 @@ class Scene:
             q, walls = self.motion.shape(float(t))
             E = self.shapes.arms(q)
             places += [line.drawn(E) for line in self.shapes.flexures]
-            places += self.shapes.springs(E)
+            places += [*self.shapes.springs(E), *self.shapes.slots(E)]
             places += [self.shapes.body(name, E) for name in self.system.bodies]
             places += [self.shapes.wall(i, float(wall), E) for i, wall in enumerate(walls)]
         places += [
@@ -364,6 +368,8 @@ class Scene:
         self._colour(t, E)
         for coil, z in zip(self.springs.values(), self.shapes.springs(E), strict=True):
             self._move(coil, z)
+        for way, z in zip(self.slots.values(), self.shapes.slots(E), strict=True):
+            self._move(way, z)
         for name, patch in self.bodies.items():
             patch.set_path(area(self.shapes.areas(name, E), self.factor))
             self._move(self.centres[name], np.array([self.shapes.centre(name, E)]))

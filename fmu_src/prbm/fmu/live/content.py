@@ -10,13 +10,15 @@ from ...interface.tables import slots
 from ...interface.units import UNITS
 from ...interface.variables import Variable
 from ...mechanics.assembly import assemble
-from ...mechanics.system import Outline, System
+from ...mechanics.places import Outline
+from ...mechanics.system import System
 from ...mechanism.description import Mechanism
 from ...mechanism.expressions import Quantity, affine
 from ...mechanism.flexure import BEAM, LEAF, PIN
 from ...mechanism.parts import (
     Flexure,
     FlexureType,
+    Guide,
     Joint,
     Part,
     Point,
@@ -95,6 +97,7 @@ def content(
         "springs": [
             {"name": spring.name, "ends": _ends(mechanism, spring)} for spring in mechanism.springs
         ],
+        "guides": [_guide(mechanism, guide) for guide in mechanism.guides],
         "stops": [_stop(stop, mechanism) for stop in mechanism.stops],
         "probes": [
             {
@@ -226,6 +229,7 @@ def _expressions(mechanism: Mechanism) -> str:
         "flexure_types",
         "joints",
         "springs",
+        "guides",
         "stops",
         "frictions",
         "forces",
@@ -251,11 +255,19 @@ def _stop(stop: Stop, mechanism: Mechanism) -> dict[str, Json]:
     }
 
 
-def _ends(mechanism: Mechanism, part: Flexure | Joint | Spring) -> list[dict[str, Json]]:
-    return [
-        {"body": body_of(end), "point": _point(mechanism.point(end, part.name))}
-        for end in (part.start, part.end)
-    ]
+def _guide(mechanism: Mechanism, guide: Guide) -> dict[str, Json]:
+    """Return the points of the line of a guide, and the guided point."""
+    point = _place(mechanism, guide.point, guide.name)
+    return {"name": guide.name, "ends": _ends(mechanism, guide), "point": point}
+
+
+def _ends(mechanism: Mechanism, part: Flexure | Joint | Spring | Guide) -> list[dict[str, Json]]:
+    return [_place(mechanism, end, part.name) for end in (part.start, part.end)]
+
+
+def _place(mechanism: Mechanism, reference: str, user: str) -> dict[str, Json]:
+    """Return the body and the coordinates of a point."""
+    return {"body": body_of(reference), "point": _point(mechanism.point(reference, user))}
 
 
 def _flexures(mechanism: Mechanism, system: System) -> list[dict[str, Json]]:

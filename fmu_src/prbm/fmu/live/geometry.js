@@ -6,6 +6,7 @@ const SPLINE_POINTS = 8; // Points of the drawn curve between two nodes of a bea
 const CURVED_CORNERS_MAX = 11; // More corners are joined by straight lines, not by a curve.
 const COINCIDENT_RTOL = 1e-9; // A shorter step between points, over the length of the line, is none.
 const SPRING_WIDTH = 0.05; // Of the size of the mechanism: width of the zigzag of a spring.
+const SLOT_WIDTH = 0.04; // Of the size of the mechanism: width of the slot that shows a guide.
 const COILS = 6; // Corners of this zigzag on each side.
 const COILED = 0.7; // Share of the length of a spring that is coiled.
 const BODY_THICKNESS_MIN = 0.04; // Of the size of the mechanism.
@@ -54,6 +55,14 @@ function zigzag([start, end], size) {
     return plus(plus(start, times(share, along)), times(side, across));
   });
   return [start, ...coils, end];
+}
+
+// Return the outline of the slot between two points that shows a guide.
+function slot([start, end], size) {
+  const along = minus(end, start);
+  const across = times((0.5 * SLOT_WIDTH * size) / (norm(along) || 1), turned([0, 1], along));
+  const corners = [plus(start, across), plus(end, across), minus(end, across), minus(start, across)];
+  return [...corners, corners[0]];
 }
 
 const pointOf = (point, values) => point.map((x) => evaluated(x, values));

@@ -166,7 +166,7 @@ class Stage {
         ]),
       );
       points.push(
-        ...this.description.springs.flatMap(({ ends }) =>
+        ...[...this.description.springs, ...this.description.guides].flatMap(({ ends }) =>
           ends.map((end) => shapes.carried(end.body, end.point, shape.poses)),
         ),
       );
@@ -272,7 +272,7 @@ class Stage {
         parts.push(this.hatched(point, [0, -1], 0.08 * shapes.size));
       }
     }
-    for (const { ends } of this.description.springs) {
+    for (const { ends } of [...this.description.springs, ...this.description.guides]) {
       const [start, end] = ends.map((one) => pointOf(one.point, shapes.values));
       const along = times(1 / norm(minus(end, start)), minus(end, start));
       [
@@ -329,9 +329,13 @@ class Stage {
     const springs = description.springs.map(({ ends }) =>
       zigzag(ends.map((end) => shapes.carried(end.body, end.point, shape.poses)), shapes.size),
     );
-    this.springs.setAttribute("d", springs.map((line) => this.path(line)).join(""));
+    const slots = description.guides.map(({ ends }) =>
+      slot(ends.map((end) => shapes.carried(end.body, end.point, shape.poses)), shapes.size),
+    );
+    this.springs.setAttribute("d", [...springs, ...slots].map((line) => this.path(line)).join(""));
     const pins = [
       ...description.joints.map((joint) => joint.ends[0]),
+      ...description.guides.map((guide) => guide.point),
       ...description.flexures.flatMap((f) => f.ends.filter((_, side) => !f.guided[side])),
     ];
     const places = pins.map((end) => shapes.carried(end.body, end.point, shape.poses));

@@ -10,6 +10,7 @@
 #include "core/elements.h"
 #include "core/flexure.h"
 #include "core/flexures.h"
+#include "core/guides.h"
 #include "core/matrix.h"
 #include "core/vectors.h"
 
@@ -467,88 +468,6 @@ static bool check_masses(System *system, const Complex *e0, Scratch *scratch, Pr
     return true;
 }
 
-/* Find the longest of the rows k to r - 1, exchange it with row k, and return its length.  The loop
- * numbers of both rows are exchanged, too. */
-static double choose_row(int k, int r, int n, double *rows, int *loop) {
-    int best = k;
-    double most = dot(n, rows + k * n, rows + k * n);
-    for (int i = k + 1; i < r; i++) {
-        double square = dot(n, rows + i * n, rows + i * n);
-        best = square > most ? i : best;
-        most = greater(square, most);
-    }
-    int chosen = loop[best];
-    loop[best] = loop[k];
-    loop[k] = chosen;
-    exchange(n, rows + k * n, rows + best * n);
-    return square_root(most);
-}
-
-/* Find the loops with linearly dependent rows by Gram-Schmidt orthogonalisation with pivoting. */
-static bool repeated_loops(int r, int n, double *rows, int *loop, double tolerance,
-                           bool *repeated) {
-    bool any = false;
-    for (int k = 0; k < r; k++) {
-        double length = choose_row(k, r, n, rows, loop), *row = rows + k * n;
-        if (!(length > tolerance)) {
-            repeated[loop[k]] = any = true;
-            continue;
-        }
-        for (int i = k + 1; i < r; i++) {
-            double share = dot(n, row, rows + i * n) / (length * length);
-            add_scaled(n, -share, row, rows + i * n);
-        }
-    }
-    return any;
-}
-
-/* List the names of the flexures and joints that close these loops, in alphabetical order. */
-static void name_loops(const Mechanism *m, bool *repeated, char *text, size_t size) {
-    text[0] = '\0';
-    for (size_t used = 0;;) {
-        const char *next = NULL;
-        int which = 0;
-        for (int i = 0, loop = 0; i < m->step_count; i++) {
-            const Step *step = &m->steps[i];
-            if (step->closes && repeated[loop] && (!next || strcmp(step->name, next) < 0)) {
-                next = step->name;
-                which = loop;
-            }
-            loop += step->closes;
-        }
-        if (!next || used + strlen(next) + 3 > size) {
-            return;
-        }
-        repeated[which] = false;
-        used += (size_t)snprintf(text + used, size - used, "%s%s", used ? ", " : "", next);
-    }
-}
-
-static bool check_loops(const System *system, const Complex *e0, Scratch *scratch,
-                        Problem *problem) {
-    size_t mark = scratch->used;
-    int r = system->r, n = system->n;
-    double *rows = take_matrix(scratch, r, n);
-    int *loop = take_integers(scratch, r);
-    bool *repeated = (bool *)take_integers(scratch, r);
-    char names[PROBLEM_LENGTH / 2];
-    for (int i = 0; i < r; i++) {
-        loop[i] = i / 2;
-        repeated[i] = false;
-    }
-    Rows loops = plain_rows(system, r, system->loops, system->loops_c);
-    jacobian(&loops, e0, rows);
-    double scale = largest(r * n, rows);
-    bool any = repeated_loops(r, n, rows, loop, DEPENDENT_LOOP_RTOL * scale, repeated);
-    name_loops(system->mechanism, repeated, names, sizeof names);
-    scratch->used = mark;
-    return !any || fail(problem,
-                        "the constraints of the loops closed by %s depend on those of other loops "
-                        "at the straight shape: rigid links are over-constrained there; remove a "
-                        "part, move it out of line, or let flexures stretch (axial = true)",
-                        names);
-}
-
 /* Compute gamma0, the relative length of the stub, of each type with several pivots. */
 static bool stubs(System *system, Scratch *scratch, Problem *problem) {
     const Mechanism *m = system->mechanism;
@@ -670,7 +589,7 @@ PRBM bool assemble(System *system, const double *values, Scratch *scratch, Probl
     bool ok = stubs(system, scratch, problem) && walk_all(system, scratch, problem);
     if (ok) {
         add_arrays(system, scratch);
-        ok = add_coils(system, scratch, problem) &&
+        ok = add_coils(system, scratch, problem) && add_guides(system, scratch, problem) &&
              check_loops(system, system->e0, scratch, problem) &&
              check_masses(system, system->e0, scratch, problem);
     }

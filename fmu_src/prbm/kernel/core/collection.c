@@ -103,6 +103,8 @@ PRBM void close_loop(System *system, const Place *spot, const Place *other) {
     Complex c = minus(spot->c, other->c);
     system->loops_c[system->r] = c.re;
     system->loops_c[system->r + 1] = c.im;
+    system->loops_on[system->r] = system->loops_on[system->r + 1] = FIXED;
+    system->loops_z[system->r] = system->loops_z[system->r + 1] = complex_of(0.0, 0.0);
     system->r += 2;
 }
 

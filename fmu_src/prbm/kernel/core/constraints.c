@@ -14,6 +14,28 @@ PRBM Rows plain_rows(const System *system, int count, const Complex *B, const do
     return rows;
 }
 
+PRBM Rows loop_rows(const System *system) {
+    const int *on = system->mechanism->guide_count > 0 ? system->loops_on : NULL;
+    Rows rows = {system, system->r, system->loops, system->loops_c, system->loops_z, on};
+    return rows;
+}
+
+PRBM Rows rows_beside_loops(const System *system, int count, const Complex *B, const double *c,
+                            Scratch *scratch) {
+    Rows rows = plain_rows(system, count, B, c);
+    if (system->mechanism->guide_count > 0) {
+        Complex *z = take_complex(scratch, count, 1);
+        int *on = take_integers(scratch, (size_t)count);
+        for (int i = 0; i < count; i++) {
+            z[i] = i < system->r ? system->loops_z[i] : complex_of(0.0, 0.0);
+            on[i] = i < system->r ? system->loops_on[i] : FIXED;
+        }
+        rows.z = z;
+        rows.on = on;
+    }
+    return rows;
+}
+
 PRBM Rows gap_rows(const System *system) {
     Rows rows = {system, system->s, system->gaps, system->gaps_c, system->gaps_z, system->on};
     return rows;
@@ -30,6 +52,11 @@ PRBM Rows rub_rows(const System *system) {
 
 PRBM int seen_from(const Rows *rows, int i) {
     return rows->on == NULL ? FIXED : rows->on[i];
+}
+
+PRBM Complex carrier_arm(const Rows *rows, int i, const Complex *e) {
+    int on = seen_from(rows, i);
+    return on == FIXED ? complex_of(1.0, 0.0) : conjugate(e[on]);
 }
 
 /* Return f (B E + z) of row i, which is measured relative to a body. */

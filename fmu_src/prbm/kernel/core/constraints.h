@@ -21,6 +21,12 @@ typedef struct {
     "or a part that can move has no mass"
 
 PRBM Rows plain_rows(const System *system, int count, const Complex *B, const double *c);
+/* The loop closures and the guides. */
+PRBM Rows loop_rows(const System *system);
+/* Rows with the coefficients B (count, d) and the constants c, the first ones of which are the loops; the
+ * others are relative to the ground. */
+PRBM Rows rows_beside_loops(const System *system, int count, const Complex *B, const double *c,
+                            Scratch *scratch);
 PRBM Rows gap_rows(const System *system);
 PRBM Rows slide_rows(const System *system);
 PRBM Rows rub_rows(const System *system);
@@ -30,6 +36,9 @@ PRBM double row_rate(const Rows *rows, int i, const Complex *e, const double *v)
 PRBM void row_by_direction(const Rows *rows, int i, const Complex *e, double *row);
 PRBM void row_jacobian(const Rows *rows, int i, const Complex *e, double *row);
 PRBM double row_convective(const Rows *rows, int i, const Complex *e, const double *v);
+/* Return f (B E + z) of row i, which a body carries, and f alone, 1 on the ground. */
+PRBM Complex seen_value(const Rows *rows, int i, const Complex *e);
+PRBM Complex carrier_arm(const Rows *rows, int i, const Complex *e);
 PRBM void scalars(const Rows *rows, const Complex *e, double *s);
 PRBM void jacobian(const Rows *rows, const Complex *e, double *result); /* (count, n) */
 /* Set kkt (n + r, n + r) to [[M, columns^T], [rows, 0]]. */

@@ -24,7 +24,7 @@ PRBM void set_position(ContactProblem *at, const double *q, Scratch *scratch) {
     if (at->assembly == system->assembly && memcmp(at->q, q, bytes) == 0) {
         return;
     }
-    Rows loops = plain_rows(system, system->r, system->loops, system->loops_c);
+    Rows loops = loop_rows(system);
     memmove(at->q, q, bytes);
     directions(system, at->q, at->e);
     mass_matrix(system, at->e, at->M, scratch);

@@ -144,6 +144,16 @@ PRBM Complex along_arms(int d, const Complex *A, const Complex *e) {
     return sum;
 }
 
+PRBM void guide_loads(const System *system, const double *lam, double *out) {
+    for (int i = 0; i < system->mechanism->guide_count; i++) {
+        const GuideRows *guide = &system->guided[i];
+        *out++ = lam[guide->across];
+        if (guide->turn != FIXED) {
+            *out++ = lam[guide->turn] * system->length;
+        }
+    }
+}
+
 PRBM void base_reaction(const Equations *equations, const Complex *e, const double *v,
                         const double *a, Complex *force, double *moment, Scratch *scratch) {
     const System *system = equations->system;

@@ -12,6 +12,8 @@ PRBM bool rate(const Equations *equations, double t, const double *y, const Refe
  * the result.  Rates depend on the time only if walls move. */
 PRBM bool rate_at_time(const Equations *equations, const double *y, const Reference *near,
                        Evaluation *result, double *dy, Problem *problem);
+/* Copy the forces and moments of guides from lam, or their changes, to out. */
+PRBM void guide_loads(const System *system, const double *lam, double *out);
 PRBM void base_reaction(const Equations *equations, const Complex *e, const double *v,
                         const double *a, Complex *force, double *moment, Scratch *scratch);
 /* Compute the second derivatives (d,) of the arms. */

@@ -115,8 +115,7 @@ static void add_stiffnesses(const System *system, int k, const SpringState *now,
 
 /* --- geometric stiffness ---------------------------------------------------------------------- */
 
-/* Add an element of the stiffness of the directions to that of the coordinates. */
-static void stiffen(const System *system, int i, int j, double x, double *K_t) {
+PRBM void stiffen(const System *system, int i, int j, double x, double *K_t) {
     if (system->mapped) {
         pull_both(system, i, j, x, K_t);
     } else {

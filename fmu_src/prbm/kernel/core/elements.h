@@ -41,6 +41,8 @@ PRBM void element_stiffness(const System *system, const Complex *e, double *K, S
 /* Set torques (n,) to the product of this stiffness and w (n,); row (n,) is working memory. */
 PRBM void element_torques(const System *system, const Complex *e, const double *w, double *torques,
                           double *row);
+/* Add an element of the stiffness of the directions i and j to that of the coordinates K_t (n, n). */
+PRBM void stiffen(const System *system, int i, int j, double x, double *K_t);
 /* Add the stiffness by forces that act on arms to K_t (n, n): pull (d,) of each arm, see the twin. */
 PRBM void add_geometric_stiffness(const System *system, const Complex *pull, double *K_t);
 

@@ -77,7 +77,7 @@ static void list_slipping(Equations *eq) {
 /* Set the active rows: those of the loops, of held stops and of sticking contacts. */
 static void set_rows(Equations *eq) {
     const System *system = eq->system;
-    Rows loops = plain_rows(system, system->r, system->loops, system->loops_c);
+    Rows loops = loop_rows(system);
     Rows gaps = gap_rows(system), walls = slide_rows(system), rubs = rub_rows(system);
     eq->r = eq->carried_count = 0;
     for (int k = 0; k < system->r; k++) {

@@ -55,10 +55,12 @@ static const Connection *connection(const Mechanism *m, int i) {
     return i < m->flexure_count ? &m->flexures[i].between : &m->joints[i - m->flexure_count].between;
 }
 
-/* Return what part i connects: the flexures come first, then the joints and the coil springs. */
+/* Return what part i connects: the flexures come first, then joints, coil springs and guides. */
 static const Connection *attachment(const Mechanism *m, int i) {
-    int parts = m->flexure_count + m->joint_count;
-    return i < parts ? connection(m, i) : &m->coils[i - parts].between;
+    int parts = m->flexure_count + m->joint_count, coils = parts + m->coil_count;
+    return i < parts   ? connection(m, i)
+           : i < coils ? &m->coils[i - parts].between
+                       : &m->guides[i - coils].between;
 }
 
 /* Mark what the first parts connect to a marked body. */
@@ -98,7 +100,7 @@ static int free_count(Reader *reader, const Mechanism *m) {
 }
 
 static bool too_many_places(const Mechanism *m) {
-    return m->coil_count > PLACES_MAX || m->stop_count > STOPS_MAX ||
+    return m->coil_count > PLACES_MAX || m->guide_count > PLACES_MAX || m->stop_count > STOPS_MAX ||
            m->friction_count > STOPS_MAX || m->force_count > PLACES_MAX ||
            m->probe_count > PLACES_MAX || m->ground_count > GROUND_POINTS_MAX;
 }
@@ -133,7 +135,7 @@ PRBM void count_coordinates(Reader *reader, Mechanism *m) {
         floats = free_count(reader, m);
         shifts = SHIFTS_EACH * floats;
         n += shifts;
-        r += 2 * floats;
+        r += 2 * floats + m->guided_count;
         arms += floats;
         map += shifts;
     }
@@ -166,7 +168,7 @@ PRBM void count_coordinates(Reader *reader, Mechanism *m) {
  * directions added so far. */
 typedef struct {
     bool *held, *walked;
-    bool *hung; /* (b + 1,) whether parts or coil springs connect a body to the ground */
+    bool *hung; /* (b + 1,) whether parts, coil springs or guides connect a body to the ground */
     int *body; /* (b + 1,) coordinates of the bodies */
     int *depth; /* (b + 1,) numbers of parts between the bodies and the ground */
     Coordinate *coordinates;
@@ -399,7 +401,8 @@ PRBM void lay_out_coordinates(Reader *reader, Mechanism *m) {
     memset(walk.walked, 0, parts * sizeof *walk.walked);
     memset(walk.hung, 0, (b + 1) * sizeof *walk.hung);
     walk.held[GROUND] = walk.hung[GROUND] = true;
-    mark_connected(m, m->flexure_count + m->joint_count + m->coil_count, walk.hung);
+    mark_connected(m, m->flexure_count + m->joint_count + m->coil_count + m->guide_count,
+                   walk.hung);
     walk.depth[GROUND] = 0;
     walk.map.first[0] = 0;
     for (size_t i = 0; i < all; i++) {
@@ -465,6 +468,7 @@ PRBM void lay_out_slots(Mechanism *m) {
         [SLOTS_BODIES] = PER_BODY * m->body_count,
         [SLOTS_STOPS] = PER_STOP * m->stop_count,
         [SLOTS_SPRINGS] = PER_SPRING * m->coil_count,
+        [SLOTS_GUIDES] = m->guided_count,
         [SLOTS_BASE] = PER_BASE,
         [SLOTS_ENERGIES] = PER_ENERGY,
         [SLOTS_LATCHED] = PER_LATCHED * m->stop_count,
@@ -487,6 +491,7 @@ PRBM void lay_out_slots(Mechanism *m) {
         .bodies = at[SLOTS_BODIES],
         .stops = at[SLOTS_STOPS],
         .springs = at[SLOTS_SPRINGS],
+        .guides = at[SLOTS_GUIDES],
         .base = at[SLOTS_BASE],
         .energies = at[SLOTS_ENERGIES],
         .latched = at[SLOTS_LATCHED],

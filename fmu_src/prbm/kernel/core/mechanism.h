@@ -74,6 +74,15 @@ typedef struct {
     Expression stiffness, free_length, cubic_stiffness, damping;
 } Coil;
 
+/* A line through the end of a connection and another point of the same body, on which its start
+ * stays. */
+typedef struct {
+    const char *name;
+    Connection between; /* from the guided point to a point of the line */
+    Point along;        /* Another point of the line. */
+    bool keeps_angle;   /* Whether the guided body keeps its angle relative to the line. */
+} Guide;
+
 typedef struct {
     const char *name;
     int body, on; /* The stopped body, and the body or GROUND that carries the wall. */
@@ -129,7 +138,7 @@ typedef struct {
 
 /* The first slot of each group in the vector of all values. */
 typedef struct {
-    int parameters, inputs, bodies, stops, springs, base, energies, latched, compliant, links, stretches,
+    int parameters, inputs, bodies, stops, springs, guides, base, energies, latched, compliant, links, stretches,
         probes, stresses, frequency, calculated, derivatives, indicators, time, count;
 } Slots;
 
@@ -175,8 +184,8 @@ typedef struct {
 
 typedef struct {
     const char *token, *name;
-    int parameter_count, body_count, type_count, flexure_count, joint_count, coil_count, stop_count,
-        friction_count, force_count, probe_count, ground_count, bound_count, variable_count,
+    int parameter_count, body_count, type_count, flexure_count, joint_count, coil_count, guide_count,
+        stop_count, friction_count, force_count, probe_count, ground_count, bound_count, variable_count,
         independent_count, input_count;
     const Parameter *parameters;
     const Body *bodies; /* (body_count,): body k is bodies[k - 1] */
@@ -184,6 +193,7 @@ typedef struct {
     const Flexure *flexures;
     const Joint *joints;
     const Coil *coils;
+    const Guide *guides;
     const Stop *stops;
     const Friction *frictions;
     const Force *forces;
@@ -210,7 +220,7 @@ typedef struct {
     int gravity[2], tolerance, damping_zeta, damping_beta; /* Indices of parameters. */
     double default_step; /* Step of the default experiment [s]; 0: unknown. */
     /* Sizes of the assembled system. */
-    int coordinate_count, direction_count, loop_count, link_count, strain_count, stretch_count,
+    int coordinate_count, direction_count, loop_count, guided_count, link_count, strain_count, stretch_count,
         shift_count, placed_count, floating_count, step_count, mass_count, spring_count, corner_count;
     int compliant_count; /* Number of compliant stops. */
     int first_extra;     /* 2 n + 2: position of the states of compliant stops in a state. */

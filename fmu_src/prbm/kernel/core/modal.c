@@ -97,7 +97,7 @@ static void tangent_space(const System *system, const Complex *e, const double *
     size_t used = scratch->used;
     int n = system->n, k = mode_count(system), r = n - k;
     double *rows = take_matrix(scratch, r, n);
-    Rows loops = plain_rows(system, system->r, system->loops, system->loops_c);
+    Rows loops = loop_rows(system);
     jacobian(&loops, e, rows);
     zeros(system->placed_count * n, rows + system->r * n);
     for (int i = 0; i < system->placed_count; i++) {
@@ -120,19 +120,19 @@ static void tangent_space(const System *system, const Complex *e, const double *
 }
 
 /* Solve K_t phi = omega^2 M phi on the tangent space of the loops for the frequencies [Hz] (k,) and
- * the modes phi (n, k).  K_t includes the loads of the multipliers lam (r,) along the rows B, which
- * may have one row more than the loops.  e and M: the directions and the mass matrix. */
-static bool modes_about(const System *system, const Complex *e, const double *M, int r,
-                        const Complex *B, const double *lam, double *frequency, double *phi,
-                        Scratch *scratch, Problem *problem) {
+ * the modes phi (n, k).  K_t includes the loads of the multipliers lam (r,) along the rows, which
+ * may be one more than the loops.  e and M: the directions and the mass matrix. */
+static bool modes_about(const Rows *rows, const Complex *e, const double *M, const double *lam,
+                        double *frequency, double *phi, Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
+    const System *system = rows->system;
     int n = system->n, k = mode_count(system);
     Complex *w = take_complex(scratch, 1, system->d);
     double *K_t = take_matrix(scratch, n, n), *Z = take_matrix(scratch, n, k);
     double *K_z = take_matrix(scratch, k, k), *M_z = take_matrix(scratch, k, k);
     double *reduced = take_matrix(scratch, k, k);
     gravity_row(system, w);
-    tangent_stiffness(system, 1.0, r, w, B, lam, e, K_t, scratch);
+    tangent_stiffness(rows, 1.0, w, lam, e, K_t, scratch);
     tangent_space(system, e, M, Z, scratch);
     congruent(n, k, Z, K_t, K_z, scratch);
     congruent(n, k, Z, M, M_z, scratch);
@@ -165,7 +165,8 @@ PRBM bool modes(const System *system, const Equilibrium *shape, double *frequenc
     copy(r, shape->lam, lam);
     lam[r] = shape->force;
     r += shape->force != 0.0;
-    bool found = modes_about(system, e, M, r, B, lam, frequency, phi, scratch, problem);
+    Rows rows = rows_beside_loops(system, r, B, NULL, scratch);
+    bool found = modes_about(&rows, e, M, lam, frequency, phi, scratch, problem);
     scratch->used = used;
     return found;
 }
@@ -283,16 +284,15 @@ PRBM bool slow_rates(const System *system, double *rate, double *fast, Scratch *
 /* Compute the multipliers lam of a shape held at rest by a force on the released body.  They solve
  * [M, rows^T; rows, 0] (a, -lam) = (Q, 0) for the loads Q, so that the accelerations a that remain
  * are as small as possible. */
-static bool resting_multipliers(const System *system, const double *q, const Complex *e,
-                                const double *M, const Complex *B, double *lam,
-                                Scratch *scratch, Problem *problem) {
+static bool resting_multipliers(const Rows *held, const double *q, const Complex *e,
+                                const double *M, double *lam, Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
-    int n = system->n, r = system->r + 1, size = n + r;
+    const System *system = held->system;
+    int n = system->n, r = held->count, size = n + r;
     Complex *w = take_complex(scratch, 1, system->d);
     double *rows = take_matrix(scratch, r, n), *kkt = take_matrix(scratch, size, size);
     double *right = take(scratch, (size_t)size);
-    Rows held = plain_rows(system, r, B, NULL);
-    jacobian(&held, e, rows);
+    jacobian(held, e, rows);
     gravity_row(system, w);
     element_forces(system, q, e, 1.0, right, scratch);
     add_loads(system, w, e, right);
@@ -317,8 +317,9 @@ PRBM bool fundamental_at(const System *system, const double *q, double *phi, dou
     directions(system, q, e);
     mass_matrix(system, e, M, scratch);
     stack_holding_at(system, q, B, lam);
-    bool found = resting_multipliers(system, q, e, M, B, lam, scratch, problem) &&
-                 modes_about(system, e, M, r, B, lam, frequency, all, scratch, problem);
+    Rows held = rows_beside_loops(system, r, B, NULL, scratch);
+    bool found = resting_multipliers(&held, q, e, M, lam, scratch, problem) &&
+                 modes_about(&held, e, M, lam, frequency, all, scratch, problem);
     for (int i = 0; found && i < n; i++) {
         phi[i] = k > 0 ? all[i * k + first_acting(system, frequency)] : 0.0;
     }

@@ -76,6 +76,9 @@ PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memor
     result.S = place(memory, d, sizeof(Complex));
     result.loops = place(memory, r * d, sizeof(Complex));
     result.loops_c = place(memory, r, sizeof(double));
+    result.loops_z = place(memory, r, sizeof(Complex));
+    result.loops_on = place(memory, r, sizeof(int));
+    result.guided = place(memory, (size_t)m->guide_count, sizeof(GuideRows));
     place_coils(&result, memory);
     place_contacts(&result, memory);
     result.release = place(memory, d, sizeof(Complex));

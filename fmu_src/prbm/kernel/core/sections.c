@@ -94,6 +94,19 @@ static void add_spring_pulls(const System *system, const Complex *e, const doubl
     scratch->used = mark;
 }
 
+/* Let guides push their bodies with the forces lam. */
+static void add_guide_pulls(const System *system, const Complex *e, const double *lam, Complex *on) {
+    const Mechanism *m = system->mechanism;
+    for (int i = 0; i < m->guide_count; i++) {
+        const GuideRows *guide = &system->guided[i];
+        int carrier = system->loops_on[guide->across];
+        Complex pull = scaled(lam[guide->across], guide->normal);
+        pull = carrier == FIXED ? pull : product(pull, e[carrier]);
+        pull_body(on, m->guides[i].between.start, pull);
+        pull_body(on, m->guides[i].between.end, scaled(-1.0, pull));
+    }
+}
+
 /* Return the sum of the loads of mass points i to end - 1. */
 static Complex sum_loads(const Complex *loads, int i, int end) {
     Complex sum = {0.0, 0.0};
@@ -164,6 +177,7 @@ PRBM SectionState section_state(const Equations *eq, const Complex *e, const dou
     }
     add_contact_pulls(eq, e, found, at.on);
     add_spring_pulls(system, e, v, at.on, scratch);
+    add_guide_pulls(system, e, found->lam, at.on);
     transmit(system, found->lam, &at);
     return at;
 }

@@ -15,7 +15,7 @@ static bool displace(const System *system, const double *phi, int k, double move
     Complex *e = take_complex(scratch, 1, system->d);
     double *c = take(scratch, (size_t)r + 1);
     stack_release(system, B, c);
-    Rows rows = plain_rows(system, r + 1, B, c);
+    Rows rows = rows_beside_loops(system, r + 1, B, c, scratch);
     directions(system, q, e);
     c[r] = -row_value(&rows, r, e) - amplitude;
     for (int j = 0; j < n; j++) {
@@ -64,6 +64,30 @@ static bool mode_shape(const System *system, double amplitude, double *q, Scratc
     return found;
 }
 
+/* Move bodies that were placed beside the lines of their guides onto them, with the amount of the
+ * release. */
+static bool place_on_guides(const System *system, double amount, double *q, Scratch *scratch,
+                            Problem *problem) {
+    size_t used = scratch->used;
+    int r = system->r + 1;
+    Complex *B = take_complex(scratch, r, system->d), *e = take_complex(scratch, 1, system->d);
+    double *c = take(scratch, (size_t)r), *open_by = take(scratch, (size_t)r);
+    stack_holding(system, amount, B, c);
+    Rows rows = rows_beside_loops(system, r, B, c, scratch), loops = loop_rows(system);
+    directions(system, q, e);
+    scalars(&loops, e, open_by);
+    Problem ignored;
+    bool closed = largest(system->r, open_by) <= STATICS_CONSTRAINT_RTOL * system->length ||
+                  project_positions(system, &rows, q, c, e, scratch, &ignored);
+    scratch->used = used;
+    bool turns = system->mechanism->release.start == START_ANGLE;
+    return closed || fail(problem,
+                          "release.%s = %g %s: the guides do not let the body %s move there; reduce "
+                          "it, or choose another release.point or direction",
+                          turns ? "angle" : "displacement", amount, turns ? "rad" : "m",
+                          system->mechanism->bodies[system->mechanism->release.body - 1].name);
+}
+
 PRBM bool start_shape(const System *system, const double *values, double *q, Scratch *scratch,
                       Problem *problem) {
     const Release *release = &system->mechanism->release;
@@ -74,7 +98,8 @@ PRBM bool start_shape(const System *system, const double *values, double *q, Scr
     size_t used = scratch->used;
     Equilibrium shape = {q, take(scratch, (size_t)system->r + 1), 0.0};
     System placed = with_bodies_placed(system);
-    bool found = equilibrium(&placed, true, amount, &shape, scratch, problem);
+    bool found = equilibrium(&placed, true, amount, &shape, scratch, problem) &&
+                 place_on_guides(system, amount, q, scratch, problem);
     scratch->used = used;
     return found;
 }

@@ -62,6 +62,9 @@ PRBM System with_bodies_placed(const System *system) {
     System result = *system;
     result.placed_count = system->mechanism->floating_count;
     result.placed = system->mechanism->floating;
+    if (result.placed_count > system->placed_count) {
+        result.r = system->tied;
+    }
     return result;
 }
 
@@ -106,21 +109,43 @@ static void remove_placed(const System *system, int size, double *kkt) {
 
 /* --- stiffness -------------------------------------------------------------------------------- */
 
-/* K_t is that of the elements plus Phi^T diag(Re(p)) Phi, with the pull p = (lam^T B - i w) e of each
- * arm. */
-PRBM void tangent_stiffness(const System *system, double share, int r, const Complex *w,
-                            const Complex *B, const double *lam, const Complex *e, double *K_t,
-                            Scratch *scratch) {
+/* Add what the rotation of the body that carries row i adds to -lam d^2x/dq^2: its direction has the
+ * second derivatives -Re(f (B E + z)), and Re(f B e) with all others. */
+static void add_carrier_stiffness(const Rows *rows, int i, double lam, const Complex *e, double *K_t) {
+    const System *system = rows->system;
+    const int on = rows->on[i];
+    const Complex f = scaled(lam, carrier_arm(rows, i, e)), *B = rows->B + i * system->d;
+    for (int j = 0; j < system->d; j++) {
+        double across = product(f, product(B[arm_of(system, j)], e[j])).re;
+        stiffen(system, on, j, -across, K_t);
+        stiffen(system, j, on, -across, K_t);
+    }
+    stiffen(system, on, on, lam * seen_value(rows, i, e).re, K_t);
+}
+
+/* K_t is that of the elements plus Phi^T diag(Re(p)) Phi, with the pull p = (lam^T f B - i w) e of each
+ * arm, plus that of the bodies that carry rows. */
+PRBM void tangent_stiffness(const Rows *rows, double share, const Complex *w, const double *lam,
+                            const Complex *e, double *K_t, Scratch *scratch) {
     size_t mark = scratch->used;
+    const System *system = rows->system;
     int d = system->d;
     Complex *pulled = take_complex(scratch, d, 1);
     element_tangent(system, e, share, K_t, scratch);
     for (int j = 0; j < d; j++) {
-        Complex row = complex_of(w[j].im, -w[j].re);
-        for (int i = 0; i < r; i++) {
-            row = plus(row, scaled(lam[i], B[i * d + j]));
+        pulled[j] = complex_of(w[j].im, -w[j].re);
+    }
+    for (int i = 0; i < rows->count; i++) {
+        Complex f = scaled(lam[i], carrier_arm(rows, i, e));
+        for (int j = 0; j < d; j++) {
+            pulled[j] = plus(pulled[j], product(f, rows->B[i * d + j]));
         }
-        pulled[j] = product(row, e[j]);
+        if (seen_from(rows, i) != FIXED) {
+            add_carrier_stiffness(rows, i, lam[i], e, K_t);
+        }
+    }
+    for (int j = 0; j < d; j++) {
+        pulled[j] = product(pulled[j], e[j]);
     }
     add_geometric_stiffness(system, pulled, K_t);
     scratch->used = mark;
@@ -159,13 +184,15 @@ static void unbalanced(const Balance *balance, const double *state, const Comple
     scalars(&balance->rows, e, open_by);
 }
 
-/* Add a stiffness that is round-off beside that of the springs to the coordinates of bodies that only
- * springs hold, which have motions without stiffness and load. */
-static void hold_idle(const System *system, double *K_t) {
+/* Add a stiffness that is round-off beside that of the springs, or the loads w, to the coordinates of
+ * bodies that only springs and guides hold, which have motions without stiffness and load. */
+static void hold_idle(const System *system, const Complex *w, double *K_t) {
     const Mechanism *m = system->mechanism;
     int n = system->n;
     bool sprung = m->floating_count > system->placed_count;
-    double least = sprung ? SPRING_IDLE_RTOL * largest(n * n, system->stiffness) : 0.0;
+    double stiffest = sprung ? largest(n * n, system->stiffness) : 0.0;
+    stiffest = sprung && stiffest == 0.0 ? largest_modulus(system->d, w) : stiffest;
+    double least = SPRING_IDLE_RTOL * (stiffest > 0.0 ? stiffest : 1.0);
     for (int k = 0; sprung && k < m->floating_count; k++) {
         K_t[m->floating[k] * n + m->floating[k]] += least;
     }
@@ -180,9 +207,8 @@ static bool newton_step(const Balance *balance, const Complex *e, double *torque
     double *K_t = take_matrix(scratch, n, n), *kkt = take_matrix(scratch, size, size);
     double *change = take(scratch, (size_t)size);
     Problem ignored;
-    tangent_stiffness(system, balance->fraction, r, balance->w, balance->rows.B, state + n, e, K_t,
-                      scratch);
-    hold_idle(system, K_t);
+    tangent_stiffness(&balance->rows, balance->fraction, balance->w, state + n, e, K_t, scratch);
+    hold_idle(system, balance->w, K_t);
     saddle(n, r, K_t, rows, rows, kkt);
     remove_placed(system, size, kkt);
     copy(n, torque, change);
@@ -240,8 +266,8 @@ static Balance balance_at(const System *system, bool held, double displacement, 
     int d = system->d, r = system->r;
     Complex *B = take_complex(scratch, r + 1, d);
     double *c = take(scratch, (size_t)r + 1);
-    Balance balance = {system, plain_rows(system, r + held, B, c), take_complex(scratch, 1, d),
-                       fraction};
+    Balance balance = {system, rows_beside_loops(system, r + held, B, c, scratch),
+                       take_complex(scratch, 1, d), fraction};
     stack_holding(system, fraction * displacement, B, c);
     field_row(d, system->S, scaled(fraction, system->gravity), balance.w);
     spread(system, 1, balance.w, balance.w);
@@ -270,7 +296,7 @@ static int sign_at(const System *system, bool held, double displacement, double 
     double *rows = take_matrix(scratch, r, n);
     directions(system, state, e);
     jacobian(&balance.rows, e, rows);
-    tangent_stiffness(system, fraction, r, balance.w, balance.rows.B, state + n, e, K_t, scratch);
+    tangent_stiffness(&balance.rows, fraction, balance.w, state + n, e, K_t, scratch);
     saddle(n, r, K_t, rows, rows, kkt);
     remove_placed(system, size, kkt);
     int sign = determinant_sign(n, r, kkt, system->length, scratch);
@@ -299,7 +325,7 @@ static bool turns_about_point(const System *system, Scratch *scratch) {
     double *rows = take_matrix(scratch, r + 1, n), *kkt = take_matrix(scratch, size, size);
     double *response = take(scratch, (size_t)size + 1);
     stack_release(system, B, response);
-    Rows held = plain_rows(system, r + 1, B, NULL);
+    Rows held = rows_beside_loops(system, r + 1, B, NULL, scratch);
     jacobian(&held, system->e0, rows);
     saddle(n, r, system->stiffness, rows, rows, kkt);
     remove_placed(system, size, kkt);
@@ -461,7 +487,7 @@ static bool load_fully(const System *system, bool held, double displacement, dou
 static bool drawn_closed(const System *system, Scratch *scratch) {
     size_t used = scratch->used;
     double *open_by = take(scratch, (size_t)system->r);
-    Rows loops = plain_rows(system, system->r, system->loops, system->loops_c);
+    Rows loops = loop_rows(system);
     scalars(&loops, system->e0, open_by);
     bool closed = largest(system->r, open_by) <= STATICS_CONSTRAINT_RTOL * system->length;
     scratch->used = used;
@@ -496,6 +522,7 @@ PRBM bool resting(const System *system, Equilibrium *shape, bool *balanced, Scra
         return *balanced;
     }
     System placed = with_bodies_placed(system);
+    zeros(system->r, shape->lam); /* That of the placed system may have fewer rows. */
     return equilibrium(&placed, false, 0.0, shape, scratch, problem);
 }
 
@@ -513,7 +540,7 @@ PRBM bool release_velocity(const System *system, const double *q, double speed, 
     directions(system, q, e);
     mass_matrix(system, e, M, scratch);
     stack_release(system, B, rates);
-    Rows held = plain_rows(system, r, B, NULL);
+    Rows held = rows_beside_loops(system, r, B, NULL, scratch);
     jacobian(&held, e, rows);
     zeros(r, rates);
     rates[r - 1] = -speed;

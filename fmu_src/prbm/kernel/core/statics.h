@@ -2,7 +2,7 @@
 #ifndef PRBM_STATICS_H
 #define PRBM_STATICS_H
 
-#include "core/system.h"
+#include "core/constraints.h"
 
 typedef struct {
     double *q, *lam; /* (n,), (r,) */
@@ -19,16 +19,15 @@ PRBM void stack_holding(const System *system, double amount, Complex *B, double 
 PRBM void stack_holding_at(const System *system, const double *q, Complex *B, double *c);
 /* Return whether the released body is free, so that it is placed instead of held by a force. */
 PRBM bool released_free(const System *system);
-/* Return a system in which bodies without flexures and joints to the ground are placed, springs or
- * not. */
+/* Return a system in which bodies without flexures and joints to the ground are placed, springs and
+ * guides or not.  It has no rows of guides that only such bodies move. */
 PRBM System with_bodies_placed(const System *system);
 /* Set the coordinates q (n,) of the free bodies: as drawn, and the released one displaced or turned. */
 PRBM void place_bodies(const System *system, double amount, double *q);
-/* Compute the tangent stiffness K_t (n, n) with a share of initial strains and pretension.  The row w
- * has columns for stretches, B does not. */
-PRBM void tangent_stiffness(const System *system, double share, int r, const Complex *w,
-                            const Complex *B, const double *lam, const Complex *e, double *K_t,
-                            Scratch *scratch);
+/* Compute the tangent stiffness K_t (n, n) with a share of initial strains and pretension, under dead
+ * loads w (d,), with columns for stretches, and forces lam (r,) along the rows. */
+PRBM void tangent_stiffness(const Rows *rows, double share, const Complex *w, const double *lam,
+                            const Complex *e, double *K_t, Scratch *scratch);
 /* Compute the equilibrium; held: whether the released body is held at the displacement or angle. */
 PRBM bool equilibrium(const System *system, bool held, double displacement, Equilibrium *shape,
                       Scratch *scratch, Problem *problem);

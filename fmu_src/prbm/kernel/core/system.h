@@ -33,6 +33,14 @@ typedef struct {
     double stiffness, cubic_stiffness, damping, free_length, drawn_length;
 } SpringLaw;
 
+/* The rows of a guide among those of the loops: across the line and, if the body keeps its angle, of the
+ * sine of its angle times the size, otherwise FIXED.  normal: the unit vector to the left of the line
+ * as drawn. */
+typedef struct {
+    int across, turn;
+    Complex normal;
+} GuideRows;
+
 /* The index TURNED - j stands for an arm that turns with coordinate j. */
 enum { TURNED = -2 };
 
@@ -109,8 +117,12 @@ typedef struct {
     Complex *H, *A, *c;       /* (d, d), (p, d), (p,) */
     double *m;                /* (p,) */
     Complex *S;               /* (d,) first mass moments */
-    Complex *loops;           /* (r, d) */
+    Complex *loops;           /* (r, d) loop closures, then guides */
     double *loops_c;          /* (r,) */
+    Complex *loops_z;         /* (r,) */
+    int *loops_on;            /* (r,) direction of the body that carries a guide, or FIXED */
+    GuideRows *guided;        /* (guides,) */
+    int tied;                 /* Rows before those of guides that only bodies that float move. */
     int placed_count;         /* Coordinates that no balance determines: those of the mechanism, or, */
     const int *placed;        /* where a motion begins, of all bodies that float. */
     int coil_count;

@@ -198,6 +198,21 @@ static void read_coils(Reader *reader, Mechanism *m) {
     m->coils = coils;
 }
 
+static void read_guides(Reader *reader, Mechanism *m) {
+    Guide *guides = kept(reader, (size_t)m->guide_count, sizeof *guides);
+    for (int i = 0; i < m->guide_count && !reader->wrong; i++) {
+        guides[i].name = read_text(reader);
+        guides[i].between = read_connection(reader, m);
+        guides[i].along = read_point(reader, m);
+        guides[i].keeps_angle = read_flag(reader);
+        m->guided_count += 1 + guides[i].keeps_angle;
+        if (guides[i].between.start == GROUND) {
+            reader->wrong = reader->wrong ? reader->wrong : "a guide for a point of the ground";
+        }
+    }
+    m->guides = guides;
+}
+
 static void read_stops(Reader *reader, Mechanism *m) {
     Stop *stops = kept(reader, (size_t)m->stop_count, sizeof *stops);
     for (int i = 0; i < m->stop_count && !reader->wrong; i++) {
@@ -365,6 +380,7 @@ static void read_mechanism(Reader *reader, Mechanism *m) {
     m->flexure_count = read_count(reader, 4);
     m->joint_count = read_count(reader, 4);
     m->coil_count = read_count(reader, 4);
+    m->guide_count = read_count(reader, 4);
     m->stop_count = read_count(reader, 4);
     m->friction_count = read_count(reader, 4);
     m->force_count = read_count(reader, 4);
@@ -385,6 +401,7 @@ static void read_mechanism(Reader *reader, Mechanism *m) {
     read_flexures(reader, m);
     read_joints(reader, m);
     read_coils(reader, m);
+    read_guides(reader, m);
     read_stops(reader, m);
     read_frictions(reader, m);
     read_forces(reader, m);

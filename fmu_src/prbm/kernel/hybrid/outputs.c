@@ -171,6 +171,7 @@ static bool output_motion(Simulation *sim, bool near, Problem *problem) {
         int i = eq->pressed[k];
         out[slots->stops + PER_STOP * i + STOP_FORCE] = present->evaluation.pressure[i];
     }
+    guide_loads(system_of(sim), present->evaluation.lam, out + slots->guides);
     out[slots->energies + ENERGY_KINETIC] = kinetic_energy_of(&present->evaluation);
     return true;
 }
@@ -258,7 +259,8 @@ PRBM int output_groups(const Simulation *sim, int slot) {
     const Slots *slots = &sim->configuration.mechanism->slots;
     bool of_stop = slot >= slots->stops && slot < slots->springs;
     bool force = of_stop && (slot - slots->stops) % PER_STOP == STOP_FORCE;
-    if (force || slot == slots->energies + ENERGY_KINETIC) {
+    bool of_guide = slot >= slots->guides && slot < slots->base;
+    if (force || of_guide || slot == slots->energies + ENERGY_KINETIC) {
         return PLACES | MOTION;
     }
     if (of_stop && (slot - slots->stops) % PER_STOP == STOP_POINT_MOBILITY) {

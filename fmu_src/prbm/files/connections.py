@@ -1,0 +1,80 @@
+"""Tables of joints, springs and guides, which connect points, and their conversion to parts."""
+
+from typing import Annotated, Any
+
+from pydantic import Field, StrictBool
+
+from ..mechanism import parts
+from ..mechanism.expressions import Quantity
+from .tables import Named, RepeatTable
+from .values import LineOrLines, Reference, measured
+
+
+# Each field has an object of its own: releases of pydantic before 2.12 change it with its class.
+def mirror_key() -> Any:
+    """Return the field of the lines of symmetry of a part."""
+    return Field((), description='Line of symmetry, "x = ..." or "y = ...", or a list of both')
+
+
+def repeat_key() -> Any:
+    """Return the field of equal parts in a row or on a circle."""
+    return Field(None, description="Equal parts in a row or on a circle")
+
+
+class JointTable(Named):
+    """A pin between two points that are drawn at the same position."""
+
+    start: Reference = Field(description="First point, body.point or ground.point")
+    end: Reference = Field(description="Second point, body.point or ground.point")
+    stiffness: Annotated[Quantity, measured(parts.Joint, "stiffness")] | None = None
+    mirror: LineOrLines = mirror_key()
+    repeat: RepeatTable | None = repeat_key()
+
+
+class SpringTable(Named):
+    """A coil spring and a damper between two points."""
+
+    start: Reference = Field(description="First end, body.point or ground.point")
+    end: Reference = Field(description="Second end, body.point or ground.point")
+    stiffness: Annotated[Quantity, measured(parts.Spring, "stiffness")]
+    free_length: Annotated[Quantity, measured(parts.Spring, "free_length")] | None = None
+    cubic_stiffness: Annotated[Quantity, measured(parts.Spring, "cubic_stiffness")] = (
+        parts.Spring.cubic_stiffness
+    )
+    damping: Annotated[Quantity, measured(parts.Spring, "damping")] = parts.Spring.damping
+    mirror: LineOrLines = mirror_key()
+    repeat: RepeatTable | None = repeat_key()
+
+
+class GuideTable(Named):
+    """A straight line that a point of a body stays on: a pin in a slot, or a slider."""
+
+    point: Reference = Field(description="Guided point, body.point")
+    start: Reference = Field(description="A point of the line, body.point or ground.point")
+    end: Reference = Field(
+        description="Another point of the line, on the same body or on the ground; the line is "
+        "unlimited"
+    )
+    turning: StrictBool = Field(
+        True,
+        description="Whether the guided body may turn; otherwise it keeps its angle relative to "
+        "the line",
+    )
+    mirror: LineOrLines = mirror_key()
+    repeat: RepeatTable | None = repeat_key()
+
+
+def joint_of(table: JointTable) -> parts.Joint:
+    """Return the joint of a table."""
+    return parts.Joint(table.name, table.start, table.end, table.stiffness)
+
+
+def spring_of(table: SpringTable) -> parts.Spring:
+    """Return the spring of a table."""
+    given = dict(table)
+    return parts.Spring(**{key: given[key] for key in given if key not in ("mirror", "repeat")})
+
+
+def guide_of(table: GuideTable) -> parts.Guide:
+    """Return the guide of a table."""
+    return parts.Guide(table.name, table.point, table.start, table.end, table.turning)
