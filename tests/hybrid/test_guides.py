@@ -360,9 +360,7 @@ def test_dependent_guides_are_named(engine):
     (block,) = model.bodies
     block = replace(block, points={"c": (0.0, 0.0), "d": (0.1, 0.0)})
     twice = broken(model, Guide("again", "block.d", "ground.o", "ground.up"), bodies=(block,))
-    with pytest.raises(
-        PrbmError, match=r"constraints of (way|again) depend on those of other loops and"
-    ):
+    with pytest.raises(PrbmError, match=r"constraints of again, way depend on each other"):
         start(twice, engine)
     cross = Guide("cross", "block.c", "ground.o", "ground.side")
     stuck = broken(model, cross, ground={**model.ground, "side": (0.0, 0.1)})

@@ -509,7 +509,19 @@ def test_messages_about_redundant_loops_are_the_same():
     guide = replace(guide, flexure_types=types, flexures=(one, other, *more))
     theirs, ours = refused(guide, 3)
     assert ours == theirs
-    assert "constraints of a_fourth, third depend" in ours
+    assert "constraints of a_fourth, third depend on each other" in ours
+
+
+def test_messages_about_dependent_guides_are_the_same():
+    model = beaded()
+    again = replace(model.guides[1], name="again", point="rider.d")
+    *others, rider = model.bodies
+    rider = replace(rider, points={**rider.points, "d": (0.055, "L + 0.01 + 24e-3/4.9")})
+    twice = replace(model, bodies=(*others, rider), guides=(*model.guides, again))
+    drawn = assembly.assemble(model, model.values())
+    theirs, ours = refused(twice, drawn.n - len(drawn.loops) - 2)
+    assert ours == theirs
+    assert "constraints of again, rail depend on each other" in ours
 
 
 def test_messages_about_points_that_a_joint_cannot_connect_are_the_same():

@@ -379,7 +379,7 @@ def check_masses(M: Real, names: Sequence[str]) -> None:
 
 
 def dependent_rows(rows: Real, tolerance: float) -> list[int]:
-    """Return the rows that depend on others, by Gram-Schmidt orthogonalisation with pivoting.
+    """Return the rows that take part in linear dependences, by Gram-Schmidt orthogonalisation.
 
     Parameters
     ----------
@@ -390,19 +390,22 @@ def dependent_rows(rows: Real, tolerance: float) -> list[int]:
 
     Examples
     --------
-    >>> dependent_rows(np.array([[1.0, 0.0], [3.0, 4.0], [0.0, 2.0]]), 1e-9)
-    [0]
+    >>> dependent_rows(np.array([[1.0, 0.0], [0.0, 3.0], [4.0, 0.0]]), 1e-9)
+    [0, 2]
     """
     rest, left = rows.copy(), list(range(len(rows)))
+    shares = np.eye(len(rows))  # Each remainder is a sum of shares of the rows.
     while left:
         lengths = np.linalg.norm(rest[left], axis=1)
         k = left[int(lengths.argmax())]
         if lengths.max() <= tolerance:
             break
         left.remove(k)
-        along = rest[k] / lengths.max()
-        rest -= np.outer(rest @ along, along)
-    return left
+        part = rest[left] @ rest[k] / lengths.max() ** 2
+        rest[left] -= np.outer(part, rest[k])
+        shares[left] -= np.outer(part, shares[k])
+    taking = np.abs(shares[left]) > DEPENDENT_LOOP_RTOL
+    return [int(k) for k in np.flatnonzero(taking.any(axis=0))]
 
 
 def check_loops(jacobian: Real, names: Sequence[str]) -> None:
@@ -428,9 +431,9 @@ def check_loops(jacobian: Real, names: Sequence[str]) -> None:
     every = ", ".join(repeated or dict.fromkeys(names))
     if repeated or rows > n:
         raise MechanismError(
-            f"the constraints of {every} depend on those of other loops and guides at the straight "
-            "shape: rigid links are over-constrained there; remove a part, move it out of line, or "
-            "let flexures stretch (axial = true) or bodies turn in their guides (turning = true)"
+            f"the constraints of {every} depend on each other at the straight shape: rigid links "
+            "are over-constrained there; remove a part, move it out of line, or let flexures "
+            "stretch (axial = true) or bodies turn in their guides (turning = true)"
         )
     if rows >= n:
         raise MechanismError(

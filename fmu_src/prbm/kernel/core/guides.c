@@ -117,9 +117,9 @@ PRBM bool add_guides(System *system, Scratch *scratch, Problem *problem) {
 
 /* --- independence ------------------------------------------------------------------------------ */
 
-/* Find the longest of the rows k to r - 1, exchange it with row k, and return its length.  The loop
- * numbers of both rows are exchanged, too. */
-static double choose_row(int k, int r, int n, double *rows, int *loop) {
+/* Find the longest of the rows k to r - 1, exchange it with row k, and return its length.  The shares
+ * (r, r) of both rows are exchanged, too. */
+static double choose_row(int k, int r, int n, double *rows, double *shares) {
     int best = k;
     double most = dot(n, rows + k * n, rows + k * n);
     for (int i = k + 1; i < r; i++) {
@@ -127,26 +127,28 @@ static double choose_row(int k, int r, int n, double *rows, int *loop) {
         best = square > most ? i : best;
         most = greater(square, most);
     }
-    int chosen = loop[best];
-    loop[best] = loop[k];
-    loop[k] = chosen;
+    exchange(r, shares + k * r, shares + best * r);
     exchange(n, rows + k * n, rows + best * n);
     return square_root(most);
 }
 
-/* Find the loops with linearly dependent rows by Gram-Schmidt orthogonalisation with pivoting. */
-static bool repeated_loops(int r, int n, double *rows, int *loop, double tolerance,
-                           bool *repeated) {
+/* Find the loops whose rows take part in linear dependences, by Gram-Schmidt orthogonalisation with
+ * pivoting.  Each remainder is a sum of shares (r, r) of the rows. */
+static bool repeated_loops(int r, int n, double *rows, double *shares, const int *loop,
+                           double tolerance, bool *repeated) {
     bool any = false;
     for (int k = 0; k < r; k++) {
-        double length = choose_row(k, r, n, rows, loop), *row = rows + k * n;
-        if (!(length > tolerance)) {
-            repeated[loop[k]] = any = true;
-            continue;
+        double length = choose_row(k, r, n, rows, shares), *row = rows + k * n;
+        bool depends = !(length > tolerance);
+        for (int i = 0; depends && i < r; i++) {
+            bool takes = fabs(shares[k * r + i]) > DEPENDENT_LOOP_RTOL;
+            repeated[loop[i]] = repeated[loop[i]] || takes;
+            any = true;
         }
-        for (int i = k + 1; i < r; i++) {
+        for (int i = k + 1; !depends && i < r; i++) {
             double share = dot(n, row, rows + i * n) / (length * length);
             add_scaled(n, -share, row, rows + i * n);
+            add_scaled(r, -share, shares + k * r, shares + i * r);
         }
     }
     return any;
@@ -189,7 +191,7 @@ PRBM bool check_loops(const System *system, const Complex *e0, Scratch *scratch,
     size_t mark = scratch->used;
     const Mechanism *m = system->mechanism;
     int r = system->r, n = system->n, closures = (r - m->guided_count) / 2;
-    double *rows = take_matrix(scratch, r, n);
+    double *rows = take_matrix(scratch, r, n), *shares = take_matrix(scratch, r, r);
     int *loop = take_integers(scratch, r);
     bool *repeated = (bool *)take_integers(scratch, r);
     const char **every = (const char **)take_matrix(scratch, r, 1);
@@ -209,13 +211,18 @@ PRBM bool check_loops(const System *system, const Complex *e0, Scratch *scratch,
     Rows loops = loop_rows(system);
     jacobian(&loops, e0, rows);
     double scale = largest(r * n, rows);
-    bool any = repeated_loops(r, n, rows, loop, DEPENDENT_LOOP_RTOL * scale, repeated);
+    zeros(r * r, shares);
+    for (int i = 0; i < r; i++) {
+        shares[i * r + i] = 1.0;
+    }
+    double tolerance = DEPENDENT_LOOP_RTOL * scale;
+    bool any = repeated_loops(r, n, rows, shares, loop, tolerance, repeated);
     name_loops(closures + m->guide_count, every, repeated, names, sizeof names);
     scratch->used = mark;
     return !any || fail(problem,
-                        "the constraints of %s depend on those of other loops and guides at the "
-                        "straight shape: rigid links are over-constrained there; "
-                        "remove a part, move it out of line, or let flexures stretch (axial = true) "
-                        "or bodies turn in their guides (turning = true)",
+                        "the constraints of %s depend on each other at the straight shape: rigid "
+                        "links are over-constrained there; remove a part, move it out of line, or "
+                        "let flexures stretch (axial = true) or bodies turn in their guides (turning "
+                        "= true)",
                         names);
 }
