@@ -723,7 +723,7 @@ def test_the_importers_tolerance_overrides_the_parameter(native, fmi, kind):
 @each_shipped
 def test_values_in_initialization_mode_follow_the_parameters(native, model, fmi, kind):
     it, values = case(model), mechanism(model).values()
-    modulus = next(name for name in values if name.endswith(".youngs_modulus"))
+    modulus = next(n for n in values if n.endswith((".youngs_modulus", ".stiffness")))
     change = {modulus: 2.0 * values[modulus], "release.displacement": 0.5 * it.displacement}
     with Instance(native[model, fmi], kind).enter() as instance:
         softer = instance.values()
