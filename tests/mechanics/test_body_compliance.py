@@ -106,3 +106,11 @@ def test_a_body_that_turns_freely_has_no_compliance():
     (body,) = system.bodies.values()
     with pytest.raises(EquilibriumError, match="is infinite"):
         compliance_matrix(system, equilibrium(system), body)
+
+
+def test_the_mirrored_rest_of_a_bistable_mechanism_has_the_stiffness_of_the_drawn_one() -> None:
+    """Its pins turn freely: round-off of their stiffness is not their scale."""
+    system = assembled(mechanism("Bistable"))
+    rise = 2.0 * system.mechanism.values()["strut.rise"]
+    drawn, mirrored = (holding_stiffness(system, equilibrium(system, x)) for x in (0.0, rise))
+    assert mirrored == pytest.approx(drawn, rel=1e-9)

@@ -21,7 +21,6 @@ from ..mechanics.system import System
 
 NEWTON_MAX = 8  # Iterations of a correction.
 CORRECTION_ATOL = 1e-10  # rad: last correction of a point.
-ROUND_OFF_RTOL = 1e-12  # Of the largest stiffness: smaller ones are round-off.
 RATE_RTOL = 1e-9  # Of the largest change of the displacement: smaller ones are round-off.
 
 
@@ -121,8 +120,6 @@ class EquilibriumCurve:
         system, shape = self.system, self.shape(state)
         n, e = system.n, system.directions(shape.q)
         kkt = balance_matrix(system, shape, held=False)
-        stiff = kkt[:n, :n]  # Round-off would determine the scale of a motion without springs.
-        stiff[np.abs(stiff) < ROUND_OFF_RTOL * np.abs(stiff).max()] = 0.0
         pin_idle(system, kkt)
         loads, by_share = (
             system.Phi.pull((w * e).real) + moment

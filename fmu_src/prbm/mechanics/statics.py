@@ -38,6 +38,7 @@ from ..base.tolerances import (
     STATICS_SHRINK,
     STATICS_SHRINK_MIN,
     STATICS_STEP_ATOL,
+    STIFFNESS_ROUNDING_RTOL,
     STATICS_TURN_AIM,
     STATICS_TURN_MAX,
     STATICS_TURN_MIN,
@@ -597,6 +598,8 @@ def balance_matrix(system: System, shape: Equilibrium, held: bool) -> Real:
     rows = held_rows(system, system.amount(shape.q))
     lam = np.append(shape.lam, shape.force / _holding_unit(system))
     kkt = _linear_balance(system, shape.q, (shape.load, 1.0), rows, lam)
+    K_t = kkt[: system.n, : system.n]  # Round-off would be the scale of a motion without stiffness.
+    K_t[np.abs(K_t) < STIFFNESS_ROUNDING_RTOL * np.abs(K_t).max(initial=0.0)] = 0.0
     return kkt if held else kkt[:-1, :-1]
 
 
