@@ -33,11 +33,26 @@ def test_a_registered_model_moves_like_the_shipped_one_with_its_coefficients(eng
     np.testing.assert_allclose(columns[0], columns[1], rtol=1e-9, atol=1e-12)
 
 
+def test_another_process_names_a_model_that_it_does_not_know(tmp_path):
+    """With a timeout, the simulations of a study run in other processes."""
+    prbm.register_model("Own", (0.44, 0.46), (3.471, 2.0682))
+    path = tmp_path / "own.toml"
+    text = (ROOT / "fmu_src/prbm/shipped/PRBDM2R.toml").read_text(encoding="utf-8")
+    path.write_text(text.replace('model = "2R"', 'model = "Own"'), encoding="utf-8")
+    samples = {"stop.position": [0.0, 1e-3]}
+    with pytest.raises(prbm.PrbmError, match="'Own'") as found:
+        rows = prbm.study(
+            prbm.load(path), samples, ["impacts"], stop_time=0.05, workers=1, timeout=60.0
+        )
+        raise prbm.PrbmError("; ".join(rows.messages))  # Of each simulation.
+    assert "SIGABRT" not in str(found.value)
+
+
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (("2R", (0.9,), (2.0,)), "choose an identifier other than 1R"),
-        (("my model", (0.9,), (2.0,)), "choose an identifier"),
+        (("2R", (0.9,), (2.0,)), "choose another name than 1R"),
+        (("my model", (0.9,), (2.0,)), "of letters, digits and _"),
         (("Own", (0.4, 0.4), (2.0,)), "2 lengths gamma and 1 stiffnesses"),
         (("Own", (), ()), "0 lengths"),
         (("Own", (0.6, 0.6), (2.0, 2.0)), "the sum of gamma at most 1"),

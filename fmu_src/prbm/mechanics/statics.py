@@ -38,10 +38,10 @@ from ..base.tolerances import (
     STATICS_SHRINK,
     STATICS_SHRINK_MIN,
     STATICS_STEP_ATOL,
-    STIFFNESS_ROUNDING_RTOL,
     STATICS_TURN_AIM,
     STATICS_TURN_MAX,
     STATICS_TURN_MIN,
+    STIFFNESS_ROUNDING_RTOL,
 )
 from . import constraints
 from .arrays import Complex, Real, Whole

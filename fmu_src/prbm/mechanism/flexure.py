@@ -208,8 +208,9 @@ def register_model(
 ) -> FlexureModel:
     """Add a model of flexures with pivots, for mechanism files that are loaded afterwards.
 
-    The springs have the rates K_theta_i EI/h, and each segment is a slender rod.  A model is known
-    in this process only: a program registers it before it loads the mechanism.
+    The springs have the rates K_theta_i EI/h, unlike those of the model 1R, gamma K_theta EI/h, and
+    each segment is a slender rod.  A model is known in this process only: a program registers it
+    before it loads the mechanism.  Commands, FMUs and other processes do not know it.
 
     Parameters
     ----------
@@ -217,7 +218,7 @@ def register_model(
         Name of the model in mechanism files, an identifier.
     gamma : sequence of float
         Lengths of the moving links of a cantilever of the length h, from the clamp to the tip, in
-        units of h [-].  Their sum is below 1; the rest is fixed at the clamp.
+        units of h [-].  Their sum is at most 1; the rest is fixed at the clamp.
     K_theta : sequence of float
         Stiffness coefficients of the pivots, from the clamp to the tip, as many [-].
     reference : str
@@ -236,7 +237,10 @@ def register_model(
     >>> _ = MODELS.pop("Yu2012")
     """
     if not name.isidentifier() or name in MODELS:
-        raise ParameterError(f"model {name!r}: choose an identifier other than {', '.join(MODELS)}")
+        raise ParameterError(
+            f"model {name!r}: choose another name than {', '.join(MODELS)}, of letters, digits and "
+            "_, that does not begin with a digit"
+        )
     if not 0 < len(gamma) == len(K_theta):
         raise ParameterError(
             f"model {name}: {len(gamma)} lengths gamma and {len(K_theta)} stiffnesses K_theta; "

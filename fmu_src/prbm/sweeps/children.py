@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import traceback
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
 from itertools import chain
@@ -51,6 +52,17 @@ class Job(Protocol):
 
 
 def main() -> None:
+    """Run the batches; end this process at once, while its other thread waits for more."""
+    try:
+        _run_batches()
+    except BaseException:
+        traceback.print_exc()
+        sys.stderr.flush()
+        os._exit(1)
+    os._exit(0)
+
+
+def _run_batches() -> None:
     """Run the batches read from standard input until it closes; write one outcome per run."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     replies = os.fdopen(os.dup(1), "wb")
