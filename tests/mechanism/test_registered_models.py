@@ -40,12 +40,12 @@ def test_another_process_names_a_model_that_it_does_not_know(tmp_path):
     text = (ROOT / "fmu_src/prbm/shipped/PRBDM2R.toml").read_text(encoding="utf-8")
     path.write_text(text.replace('model = "2R"', 'model = "Own"'), encoding="utf-8")
     samples = {"stop.position": [0.0, 1e-3]}
-    with pytest.raises(prbm.PrbmError, match="'Own'") as found:
-        rows = prbm.study(
-            prbm.load(path), samples, ["impacts"], stop_time=0.05, workers=1, timeout=60.0
-        )
-        raise prbm.PrbmError("; ".join(rows.messages))  # Of each simulation.
-    assert "SIGABRT" not in str(found.value)
+    found = prbm.study(
+        prbm.load(path), samples, ["impacts"], stop_time=0.05, workers=1, timeout=60.0
+    )
+    for message in found.messages:
+        assert "Own" in message
+        assert "SIGABRT" not in message
 
 
 @pytest.mark.parametrize(

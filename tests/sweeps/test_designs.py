@@ -1,6 +1,7 @@
 """Designs of studies: lists, tolerances, yield and sensitivities with closed forms; optima."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -295,3 +296,24 @@ def test_a_tolerance_of_an_unknown_parameter_is_rejected_before_the_simulations(
             mechanisms["PRBDM"], {"flexure.width": [7e-3, 8e-3]}, values={"gravity.x": 0.0},
             tolerances={"gravity.x": "1 %"}, **arguments,
         )  # fmt: skip
+
+
+def test_an_output_without_indices_is_named_with_its_missing_values(tmp_path, capsys):
+    """Not every simulation settles; the number of impacts has indices, which are written."""
+    words = ["study", "PRBDM2R", "--vary", "stop.restitution=0.3:0.8", "--runs", "8"]
+    words += ["--vary", "stop.position=-4:2 mm"]
+    words += ["--method", "sensitivity", "--stop-time", "0.3", "--of", "settling", "impacts"]
+    assert main([*words, "--out", str(tmp_path)]) == 0
+    printed = capsys.readouterr().out
+    assert re.search(r"no shares of settling: \d+ of 32 simulations have no value", printed)
+    assert "shares of the variance of impacts" in printed
+    rows = (tmp_path / "PRBDM2R-sensitivity.csv").read_text(encoding="utf-8").splitlines()
+    assert rows[0].startswith("output,parameter,alone")
+    names = ["stop.restitution", "stop.position"]
+    assert [row.split(",")[:2] for row in rows[1:]] == [["impacts", name] for name in names]
+
+
+def test_indices_of_a_single_parameter_are_refused(mechanisms):
+    with pytest.raises(ParameterError, match="needs two parameters"):
+        study(mechanisms["PRBDM"], {"stop.restitution": (0.3, 0.8)}, ["impacts"], runs=8,
+              method="sensitivity")  # fmt: skip

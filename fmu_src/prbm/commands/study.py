@@ -27,7 +27,7 @@ from ..fmu.start import interface
 from ..mechanics.arrays import Real
 from ..mechanism.description import Mechanism
 from ..runs.inputs import placeholders
-from ..sweeps.design import Yield
+from ..sweeps.design import SENSITIVITY, Yield
 from ..sweeps.optimum import FLAT_RTOL, Optimum
 from ..sweeps.study import Study, study
 from .duration import given_inputs
@@ -37,11 +37,18 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 EXAMPLE = '--vary "stop.position=-4:2 mm:25"'
-FILES = ("study.csv", "study.png", "best.ssv")  # Ends of the names of the written files.
+FILES = (
+    "study.csv",
+    "study.png",
+    "best.ssv",
+    "sensitivity.csv",
+)  # Ends of the names of the written files.
 NUMBER = re.compile(r"[+-]?[\d.]+([eE][+-]?\d+)?")
 ROWS_PRINTED_MAX = 45  # Longer tables are only written.
 SPREAD = (0.0, 0.025, 0.5, 0.975, 1.0)  # Printed quantiles of drawn values.
 DIGITS = 5  # Significant digits of printed numbers.
+SHARES_HEAD = ["output", "parameter", "alone", "alone, low", "alone, high",
+               "in total", "in total, low", "in total, high"]  # fmt: skip
 
 
 def run_study(options: argparse.Namespace) -> None:
@@ -51,8 +58,8 @@ def run_study(options: argparse.Namespace) -> None:
     output = Output(options.out)
     inputs = given_inputs(options)
     names = {**units_of(mechanism), **dict.fromkeys(placeholders(inputs), "")}
-    table, figure, best = (f"{mechanism.name}-{end}" for end in FILES)
-    output.check(table, figure, best)
+    table, figure, best, shares = (f"{mechanism.name}-{end}" for end in FILES)
+    output.check(table, figure, best, shares)
     found = study(
         mechanism, _vary(options, names, mechanism), options.of or [], runs=options.runs,
         method=options.method, seed=options.seed,
@@ -74,7 +81,9 @@ def run_study(options: argparse.Namespace) -> None:
     print(f"{len(found.points)} simulations, {len(failed)} failed")
     for message in dict.fromkeys(failed[:3]):
         print(f"failed: {message}")
-    _print_sensitivities(found)
+    if options.method == SENSITIVITY:
+        _print_sensitivities(found)
+        output.table(shares, SHARES_HEAD, _shares(found))
     if found.optimum is not None:
         verb = "least" if options.maximise is None else "largest"
         if len(found.varied) > 1:
@@ -240,6 +249,24 @@ def _print_sensitivities(found: Study) -> None:
                          f"{indices.total[k]:.3f}", f"{c:.3f} to {d:.3f}"])  # fmt: skip
         print(f"shares of the variance of {output}:")
         print(aligned(["parameter", "alone", "95 %", "in total", "95 %"], rows))
+    for output in found.outputs.keys() - found.sensitivities.keys():
+        missing = int(np.isnan(found.outputs[output]).sum())
+        print(
+            f"no shares of {output}: {missing} of {len(found.points)} simulations have no value; "
+            "simulate longer, or choose another output"
+            if missing
+            else f"no shares of {output}: it is constant"
+        )
+
+
+def _shares(found: Study) -> list[list[object]]:
+    """Return the rows of the table of indices."""
+    return [
+        [output, name, *map(float, (one.first[k], *one.first_interval[k])),
+         *map(float, (one.total[k], *one.total_interval[k]))]
+        for output, one in found.sensitivities.items()
+        for k, name in enumerate(one.names)
+    ]  # fmt: skip
 
 
 def _yield_line(share: Yield, constraints: Sequence[str], toleranced: Sequence[str]) -> str:

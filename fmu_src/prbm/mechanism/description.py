@@ -370,8 +370,8 @@ class Mechanism:
         """Reject a flexure type with an unknown model, or with options of another model."""
         if kind.model not in MODELS:
             raise MechanismError(
-                f"{kind.name}.model = {kind.model!r} is unknown: choose one of {', '.join(MODELS)}, "
-                "or register it in this process (prbm.register_model)"
+                f"{kind.name}.model = {kind.model!r} is unknown: choose one of "
+                f"{', '.join(MODELS)}, or register it in this process (prbm.register_model)"
             )
         self._check_order(kind)
         _check_profile(kind)

@@ -140,6 +140,10 @@ def _unit(n: int, d: int, seed: int, method: str) -> Real:
 def _saltelli(n: int, d: int, seed: int) -> Real:
     """Return the probabilities of Saltelli's design, (n (d + 2), d)."""
     _check_power(n)
+    if d < 2:
+        raise ParameterError(
+            "the method sensitivity needs two parameters: a single one has the whole variance"
+        )
     both = np.asarray(qmc.Sobol(2 * d, seed=seed).random(n))
     a, b = both[:, :d], both[:, d:]
     mixed = [np.where(np.arange(d) == k, b, a) for k in range(d)]
