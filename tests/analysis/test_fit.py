@@ -166,6 +166,21 @@ def test_one_frequency_cannot_separate_two_coefficients(ambiguous):
     assert "not determined" in str(ambiguous)
 
 
+@pytest.mark.parametrize("given", [None, (2e-5, 2e-3)])
+def test_a_force_cannot_separate_thickness_and_modulus_with_any_bounds(given):
+    """The force over the deflection of leaves depends on E h^3 alone; a length is no ratio."""
+    own, x = mechanism("GuideBeam"), np.linspace(-4e-3, 4e-3, 9)
+    stiffness = 24.0 * own.values()["flexure.youngs_modulus"] / own.values()["flexure.length"] ** 3
+    second = own.values()["flexure.width"] * own.values()["flexure.thickness"] ** 3 / 12.0
+    noise = 1e-4 * np.random.default_rng(1).standard_normal(len(x))
+    target = ForceDeflection(x, stiffness * second * x + noise, 1e-4)
+    thickness = Free("flexure.thickness", *(given or ()))
+    free = [thickness, "flexure.youngs_modulus"]
+    found = fit(own, free, target, {"gravity.x": 0.0, "gravity.y": 0.0})
+    assert found.singular[1] == 0.0
+    assert all(math.isinf(found[name].uncertainty) for name in found.problem.names)
+
+
 def test_the_frequency_is_constant_along_the_valley(ambiguous):
     """A step of 1e-3 has an effect of second order along the valley, of first order across it."""
     direction = np.array(list(ambiguous.valleys[0].shares.values())) * ambiguous.p

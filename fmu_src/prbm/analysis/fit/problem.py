@@ -36,7 +36,8 @@ class Free:
         Name in the mechanism; or ``record.shift``, the time of the model at the time zero of a
         response [s]; or ``record.zero``, the reading of the sensor at zero output of the model.
     lower, upper : float or None
-        Bounds; None: a tenth and ten times the start, within the mechanism's bounds.
+        Bounds; None: a tenth and ten times the start, within the mechanism's bounds, or these
+        bounds of a dimensionless ratio, from 0 to 1.
     start : float or None
         Start value; None: the value of the mechanism.
     """
@@ -235,9 +236,10 @@ def _own_bounds(mechanism: Mechanism, name: str) -> tuple[float, float]:
 def _bounds(mechanism: Mechanism, one: Free, default: float) -> tuple[float, float]:
     """Return the bounds of a parameter in a fit."""
     least, most = _own_bounds(mechanism, one.name)
+    units = {parameter.name: parameter.unit for parameter in mechanism.parameters}
     start = default if one.start is None else one.start
     wide = sorted((start / DEFAULT_RATIO, start * DEFAULT_RATIO))
-    if least >= 0.0 and most <= 1.0:  # The parameter is a ratio.
+    if least >= 0.0 and most <= 1.0 and not units.get(one.name):  # The parameter is a ratio.
         wide = [least, most]
     lower = max(least, wide[0] if one.lower is None else one.lower)
     upper = min(most, wide[1] if one.upper is None else one.upper)
