@@ -25,7 +25,7 @@ PRBM Rows rows_beside_loops(const System *system, int count, const Complex *B, c
     Rows rows = plain_rows(system, count, B, c);
     if (system->mechanism->guide_count > 0) {
         Complex *z = take_complex(scratch, count, 1);
-        int *on = take_integers(scratch, (size_t)count);
+        int *on = take_integers(scratch, count);
         for (int i = 0; i < count; i++) {
             z[i] = i < system->r ? system->loops_z[i] : complex_of(0.0, 0.0);
             on[i] = i < system->r ? system->loops_on[i] : FIXED;
