@@ -2,6 +2,7 @@
  *
  * A closed stop is a constraint on accelerations.  Its drift, caused by the errors of the
  * importer's solver, is corrected in event mode. */
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -173,7 +174,7 @@ static double nearest_power_of_ten(double value) {
         }
         return 1.0 / power;
     }
-    while (power < value && isfinite(10.0 * power)) { /* The value may be infinite. */
+    while (power < value && power < DBL_MAX / 10.0) { /* The value may be infinite. */
         power *= 10.0;
     }
     return power;
