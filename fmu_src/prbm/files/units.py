@@ -25,7 +25,7 @@ COHERENT = (
     "m", "kg", "s", "rad", "N", "Pa", "kg/m3", "kg.m2", "N/m", "N.m", "m/s", "m/s2", "Hz", "rad/s",
     "1/m", "N.m/rad", "N/m3", "N.s/m",
 )  # fmt: skip
-COMMON = {
+COMMON = {unit: {unit: 0} for unit in COHERENT} | {
     "m": {"m": 0, "cm": -2, "mm": -3, "um": -6, "µm": -6, "μm": -6, "nm": -9},
     "kg": {"kg": 0, "g": -3, "mg": -6},
     "kg/m3": {"kg/m3": 0, "g/cm3": 3},
