@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .analysis.linear_model import linearize as linearize
     from .analysis.static_shape import equilibrium as equilibrium
+    from .analysis.static_shape import holding_curve as holding_curve
     from .analysis.static_shape import modes as modes
     from .base.errors import EquilibriumError as EquilibriumError
     from .base.errors import MechanismError as MechanismError
@@ -46,6 +47,7 @@ __all__ = [
     "UnknownColumnError",
     "__version__",
     "equilibrium",
+    "holding_curve",
     "linearize",
     "load",
     "modes",
@@ -68,6 +70,7 @@ _MODULES = {
     "UnknownColumnError": ("runs.result", "UnknownColumnError"),
     "__version__": ("base.version", "__version__"),
     "equilibrium": ("analysis.static_shape", "equilibrium"),
+    "holding_curve": ("analysis.static_shape", "holding_curve"),
     "linearize": ("analysis.linear_model", "linearize"),
     "load": ("files.mechanism_file", "load"),
     "modes": ("analysis.static_shape", "modes"),

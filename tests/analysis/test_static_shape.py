@@ -50,3 +50,56 @@ def test_the_compliance_at_a_point_is_that_at_the_centre_moved_by_the_lever():
 def test_unknown_bodies_and_points_are_rejected(body, at, message):
     with pytest.raises(prbm.ParameterError, match=message):
         prbm.equilibrium(CURVED).compliance(body, at)
+
+
+def test_the_curve_passes_through_held_shapes_and_its_slope_is_the_stiffness():
+    found = prbm.holding_curve(CURVED, start="-0.5 mm", end="0.5 mm", points=3)
+    assert [p.displacement for p in found.points] == pytest.approx([-5e-4, 0.0, 5e-4])
+    for point in found.points:
+        assert point.force == pytest.approx(
+            prbm.equilibrium(CURVED, held=point.displacement).force, rel=1e-6, abs=1e-9
+        )
+    stiffness = prbm.equilibrium(CURVED, held=5e-4).stiffness_matrix("shuttle")
+    assert stiffness is None  # The held body is rigid along the direction.
+    free = prbm.equilibrium(CURVED)
+    np.testing.assert_allclose(
+        free.stiffness_matrix("shuttle") @ free.compliance("shuttle"), np.eye(3), atol=1e-6
+    )
+
+
+def test_texts_with_units_equal_numbers_in_si():
+    one = prbm.equilibrium(CURVED, {"beam.thickness": "0.5 mm"}, loads={"force.y": "-2 N"})
+    other = prbm.equilibrium(CURVED, {"beam.thickness": 5e-4}, loads={"force.y": -2.0})
+    assert one.displacement == other.displacement
+    held = prbm.equilibrium(CURVED, held="0.3 mm")
+    assert held.force == prbm.equilibrium(CURVED, held=3e-4).force
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"held": "3 kg"}, "held = 3 kg: the unit 'kg' has another dimension"),
+        ({"held": -10.0}, "held = -10 m: more than the size of the mechanism"),
+        ({"held": [1.0]}, r"held = \[1.0\] must be a number in m, or a text"),
+        ({"loads": {"force.y": "much"}}, "force.y = much"),
+        ({"loads": [1.0]}, r"loads = \[1.0\] must be a mapping"),
+        ({"values": {"beam.thickness": "1 N"}}, "beam.thickness = 1 N"),
+    ],
+)
+def test_invalid_arguments_of_shapes_are_rejected(arguments, message):
+    for function in (prbm.equilibrium, prbm.modes):
+        with pytest.raises(prbm.PrbmError, match=message):
+            function(CURVED, **arguments)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"start": "1 mm", "end": "1 mm"}, "start = 0.001 m must be below end = 0.001 m"),
+        ({"start": 0.0, "end": "1 N"}, "end = 1 N"),
+        ({"start": 0.0, "end": 1e-4, "points": 1}, "points = 1 must be at least 2"),
+    ],
+)
+def test_invalid_ranges_of_curves_are_rejected(arguments, message):
+    with pytest.raises(prbm.PrbmError, match=message):
+        prbm.holding_curve(CURVED, **arguments)

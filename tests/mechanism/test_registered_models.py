@@ -2,10 +2,12 @@
 
 import re
 
+import fmpy
 import numpy as np
 import pytest
 
 import prbm
+from prbm.fmu import native_fmu, python_fmu
 from prbm.mechanism.flexure import MODELS
 from support import ROOT
 
@@ -33,6 +35,21 @@ def test_a_registered_model_moves_like_the_shipped_one_with_its_coefficients(eng
     np.testing.assert_allclose(columns[0], columns[1], rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.native
+def test_a_python_fmu_is_refused_and_a_native_one_has_the_model(tmp_path):
+    prbm.register_model("Own", (0.44, 0.46), (3.471, 2.0682))
+    path = tmp_path / "own.toml"
+    text = (ROOT / "fmu_src/prbm/shipped/PRBDM2R.toml").read_text(encoding="utf-8")
+    path.write_text(text.replace('model = "2R"', 'model = "Own"'), encoding="utf-8")
+    own = prbm.load(path)
+    with pytest.raises(prbm.MechanismError, match=r"the model Own is registered .* native FMU"):
+        python_fmu.build(own)
+    (tmp_path / "own.fmu").write_bytes(native_fmu.build(own, fmi=2))
+    found = fmpy.simulate_fmu(str(tmp_path / "own.fmu"), stop_time=0.02, output=["shuttle.x"])
+    column = prbm.simulate(own, stop_time=0.02)["shuttle.x"]
+    assert found["shuttle.x"][-1] == pytest.approx(column[-1], rel=1e-9)
+
+
 def test_another_process_names_a_model_that_it_does_not_know(tmp_path):
     """With a timeout, the simulations of a study run in other processes."""
     prbm.register_model("Own", (0.44, 0.46), (3.471, 2.0682))
@@ -58,6 +75,10 @@ def test_another_process_names_a_model_that_it_does_not_know(tmp_path):
         (("Own", (0.6, 0.6), (2.0, 2.0)), "the sum of gamma at most 1"),
         (("Own", (0.9,), (-2.0,)), "must be positive"),
         (("Own", (float("nan"),), (2.0,)), "must be positive"),
+        (("Own", (0.9,), (float("inf"),)), "must be positive and finite"),
+        (("Own", 0.9, 2.0), "gamma = 0.9 must be a sequence of numbers; write one as (0.85,)"),
+        (("Own", ("a",), (2.0,)), "gamma[0] = 'a' must be a number"),
+        ((3, (0.9,), (2.0,)), "model 3: choose another name"),
     ],
 )
 def test_an_invalid_model_is_rejected_and_not_added(arguments, sentence):

@@ -23,6 +23,7 @@ PUBLIC = [
     "UnknownColumnError",
     "__version__",
     "equilibrium",
+    "holding_curve",
     "linearize",
     "load",
     "modes",

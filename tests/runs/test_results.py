@@ -105,7 +105,7 @@ def test_progress_ends_at_one(mechanisms: dict[str, Mechanism]) -> None:
         ({"changes": ["stop.restitution"]}, r"changes = \['stop.restitution'\] must be a mapping"),
         ({"inputs": "force.x"}, "inputs = 'force.x' must be a mapping from names to values"),
         ({"stop_time": "a"}, "stop_time = a: write a number in s, or a number and a unit"),
-        ({"stop_time": [1.0]}, r"stop_time = \[1\.0\]: must be a number, in s, or a text"),
+        ({"stop_time": [1.0]}, r"stop_time = \[1\.0\] must be a number in s, or a text"),
         ({"step": "5 mm"}, "step = 5 mm: the unit 'mm' has another dimension"),
         ({"tolerance": "fine"}, "tolerance = fine: write a number"),
         ({"tolerance": 1.0}, "tolerance = 1 must lie between"),

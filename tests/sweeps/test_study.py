@@ -291,7 +291,7 @@ MISTAKES = [
     ({"vary": {"stop.position": [1e-3, 0.0]}}, "finite and increasing, in m"),
     ({"vary": {"stop.position": ["0", "1 kg"]}}, "1 kg: the unit 'kg' has another dimension"),
     ({"vary": {"stop.position": 1e-3}}, "at least two samples are needed"),
-    ({"vary": {"stop.position": [0.0, None]}}, "None: must be a number, in m"),
+    ({"vary": {"stop.position": [0.0, None]}}, "None must be a number in m"),
     ({"vary": {}}, "0 parameters are varied; vary at least one"),
     ({"vary": {"stop.position": np.arange(200_000)}}, "the study has 200000 simulations"),
     ({"outputs": []}, "no output is selected; name one, for instance settling"),

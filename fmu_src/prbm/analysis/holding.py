@@ -168,7 +168,7 @@ class Branch:
     ended: str | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Curve(Branch):
     """The holding force over a range of displacements.
 
@@ -188,6 +188,12 @@ class Curve(Branch):
     points: tuple[Held, ...]
     snaps: tuple[tuple[float, float], ...]
     branches: tuple[Branch, ...]
+
+    def __repr__(self) -> str:
+        return (
+            f"<Curve of {len(self.displacements)} shapes: rest positions {len(self.rests)}, "
+            f"events {len(self.events)}, snap-throughs {len(self.snaps)}>"
+        )
 
 
 def curve(

@@ -13,6 +13,7 @@ from scipy.io import savemat
 from scipy.optimize import brentq, minimize_scalar
 
 from ..base.errors import ParameterError, PrbmError
+from ..files.settings import in_si
 from ..mechanics.arrays import Complex, Real
 from ..mechanics.assembly import assemble
 from ..mechanics.linear import StateSpace, input_units, output_units, state_space
@@ -51,7 +52,7 @@ class Response(NamedTuple):
     bandwidth: float | None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class LinearModel:
     """x' = A x + B u, y = C x + D u of small motions about a shape at rest, in SI units.
 
@@ -75,6 +76,10 @@ class LinearModel:
     space: StateSpace
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        name, given, seen = self.system.mechanism.name, ", ".join(self.inputs), self.outputs
+        return f"<LinearModel of {name}: {len(self.A)} states, {', '.join(seen)} by {given}>"
 
     @property
     def A(self) -> Real:
@@ -251,11 +256,11 @@ class LinearModel:
 
 def linearize(
     mechanism: Mechanism,
-    values: Mapping[str, float] | None = None,
+    values: Mapping[str, float | str] | None = None,
     *,
     inputs: Sequence[str],
     outputs: Sequence[str],
-    loads: Mapping[str, float] | None = None,
+    loads: Mapping[str, float | str] | None = None,
     resting: Sequence[str] = (),
 ) -> LinearModel:
     """Return the linear model of small motions about the shape at rest under gravity and loads.
@@ -268,7 +273,8 @@ def linearize(
     mechanism : Mechanism
         The mechanism, as :func:`prbm.load` returns it.
     values : mapping or None
-        Values of parameters by name, in SI units; None: the defaults.
+        Values of parameters by name: numbers in SI units, or texts with a unit, ``"0.2 mm"``; None:
+        the defaults.
     inputs : sequence of str
         Forces and moments, such as ``force.x``, or ``base.acceleration.x``.
     outputs : sequence of str
@@ -283,6 +289,8 @@ def linearize(
     ------
     ParameterError
         If a name is unknown, or a value out of its bounds.
+    UserMistake
+        If a text is not a quantity of the right dimension.
     EquilibriumError
         If no such shape is found.
     MechanismError
@@ -293,12 +301,14 @@ def linearize(
     >>> import prbm
     >>> guide = prbm.load("PRBDM2R")
     >>> model = prbm.linearize(guide, inputs=["force.x"], outputs=["shuttle.x"])
+    >>> model
+    <LinearModel of PRBDM2R: 10 states, shuttle.x by force.x>
     >>> model.A.shape, model.states[0]
     ((10, 10), 'mode[1].amplitude')
     """
     mechanism.check_connected("a linear model")
-    system = assemble(mechanism, mechanism.values(dict(values or {})))
-    given = dict(loads or {})
+    system = assemble(mechanism, mechanism.values(in_si(mechanism, values, "values")))
+    given = in_si(mechanism, loads, "loads")
     free = equilibrium(system, None, given)
     stops = [stop_index(mechanism, name) for name in resting]
     shape = RestingShape(free.q, system.loop_rows, free.lam, free.load)

@@ -5,11 +5,14 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
+import numpy as np
+
 from ..base.errors import ParameterError
+from ..files.settings import in_si, in_unit
 from ..mechanics import modal, statics
 from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble
-from ..mechanics.body_compliance import compliance_matrix
+from ..mechanics.body_compliance import compliance_matrix, stiffness_matrix
 from ..mechanics.modal import Modes
 from ..mechanics.places import BodyFrame
 from ..mechanics.statics import Equilibrium, holding_stiffness
@@ -17,6 +20,8 @@ from ..mechanics.stress import Stress, static_stresses
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import Probe
+from .held import check_held, held_unit
+from .holding import Curve, curve
 
 
 class Place(NamedTuple):
@@ -123,6 +128,14 @@ class StaticShape:
         """
         return compliance_matrix(self.system, self.shape, self._frame(body, at), self.held)
 
+    def stiffness_matrix(self, body: str, at: str | None = None) -> Real | None:
+        """Return the inverse of :meth:`compliance`, (3, 3) [N, N, N m by m, m, rad].
+
+        None: the body is rigid in a direction.  Arguments and errors are those of
+        :meth:`compliance`.
+        """
+        return stiffness_matrix(self.compliance(body, at), self.system.length)
+
     def _frame(self, body: str, at: str | None) -> BodyFrame:
         system = self.system
         if body not in system.bodies:
@@ -138,10 +151,10 @@ class StaticShape:
 
 def equilibrium(
     mechanism: Mechanism,
-    values: Mapping[str, float] | None = None,
+    values: Mapping[str, float | str] | None = None,
     *,
-    loads: Mapping[str, float] | None = None,
-    held: float | None = None,
+    loads: Mapping[str, float | str] | None = None,
+    held: float | str | None = None,
 ) -> StaticShape:
     """Return the static shape of a mechanism under gravity and loads, without stops.
 
@@ -150,38 +163,45 @@ def equilibrium(
     mechanism : Mechanism
         The mechanism, as :func:`prbm.load` returns it.
     values : mapping or None
-        Values of parameters by name, in SI units; None: the defaults.
+        Values of parameters by name: numbers in SI units, or texts with a unit, ``"0.2 mm"``; None:
+        the defaults.
     loads : mapping or None
         Forces [N] and moments [N m] by the names of the inputs, such as ``force.y``.
-    held : float or None
+    held : float, str or None
         Displacement at which the released body is held, along the direction of the release [m];
         its rotation [rad] if the release is by an angle.  None: it is free.
 
     Raises
     ------
     ParameterError
-        If a parameter or a load is unknown or out of its bounds.
+        If a parameter or a load is unknown or out of its bounds, or the held displacement is larger
+        than the mechanism.
+    UserMistake
+        If a text is not a quantity of the right dimension.
     EquilibriumError
         If no static shape is found.
 
     Examples
     --------
     >>> import prbm
-    >>> shape = prbm.equilibrium(prbm.load("CurvedBistable"), loads={"force.y": -5.0})
+    >>> shape = prbm.equilibrium(prbm.load("CurvedBistable"), loads={"force.y": "-5 N"})
     >>> shape.stable, round(1e3 * shape.positions["shuttle"].y, 3)
     (True, -0.263)
     """
-    system = assemble(mechanism, mechanism.values(dict(values or {})))
-    shape = statics.equilibrium(system, held, loads)
-    return StaticShape(system, shape, held is not None, dict(loads or {}))
+    system = assemble(mechanism, mechanism.values(in_si(mechanism, values, "values")))
+    given = in_si(mechanism, loads, "loads")
+    amount = None
+    if held is not None:
+        amount = check_held(in_unit("held", held, held_unit(mechanism).si), system, "held =")
+    return StaticShape(system, statics.equilibrium(system, amount, given), held is not None, given)
 
 
 def modes(
     mechanism: Mechanism,
-    values: Mapping[str, float] | None = None,
+    values: Mapping[str, float | str] | None = None,
     *,
-    loads: Mapping[str, float] | None = None,
-    held: float | None = None,
+    loads: Mapping[str, float | str] | None = None,
+    held: float | str | None = None,
 ) -> Modes:
     """Return the modes of a mechanism about a static shape, without stops.
 
@@ -194,3 +214,63 @@ def modes(
     [4.91, 130.98]
     """
     return equilibrium(mechanism, values, loads=loads, held=held).modes
+
+
+def holding_curve(
+    mechanism: Mechanism,
+    values: Mapping[str, float | str] | None = None,
+    *,
+    start: float | str,
+    end: float | str,
+    points: int = 101,
+    branches: int = 0,
+) -> Curve:
+    """Return the holding force of the released body over its displacement, without stops.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The mechanism, as :func:`prbm.load` returns it.
+    values : mapping or None
+        As for :func:`equilibrium`.
+    start, end : float or str
+        First and last displacement [m]; rotations [rad] if the release is by an angle.
+    points : int
+        Number of displacements in equal distances, at which stiffness and frequency are computed.
+    branches : int
+        Number of branches at bifurcations that are followed.
+
+    Returns
+    -------
+    Curve
+        Displacements and forces along the path, rest positions, limit points, bifurcations and
+        snap-throughs.
+
+    Raises
+    ------
+    ParameterError
+        If a parameter or a displacement is out of its bounds, the displacements are not ascending,
+        or there are fewer than two points.
+    UserMistake
+        If a text is not a quantity of the right dimension.
+    EquilibriumError
+        If no shape is found at the displacement at which the path begins.
+
+    Examples
+    --------
+    >>> import prbm
+    >>> found = prbm.holding_curve(prbm.load("Bistable"), start="-12 mm", end="12 mm", points=25)
+    >>> [rest.stable for rest in found.rests]
+    [True, False, True]
+    """
+    system = assemble(mechanism, mechanism.values(in_si(mechanism, values, "values")))
+    si = held_unit(mechanism).si
+    low, high = (
+        check_held(in_unit(name, x, si), system, f"{name} =")
+        for name, x in (("start", start), ("end", end))
+    )
+    if not low < high:
+        raise ParameterError(f"start = {low:g} {si} must be below end = {high:g} {si}")
+    if not points >= 2:
+        raise ParameterError(f"points = {points!r} must be at least 2")
+    return curve(system, np.linspace(low, high, points), branches=branches)

@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 
+from ..analysis.held import held_scale, held_unit
 from ..analysis.linear_model import LinearModel, linearize
 from ..base.unit_text import mode_text
 from ..files.settings import UserMistake, quantity
@@ -13,7 +14,7 @@ from ..mechanics.linear import input_units, output_units
 from ..plots.response import response_figure
 from .load_paths import given_loads, load_text
 from .output import Output, aligned
-from .systems import assembled, held_scale, held_unit, rounded
+from .systems import assembled, rounded
 
 PAIRS_SHOWN = 24
 

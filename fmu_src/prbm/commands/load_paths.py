@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..analysis.equilibrium_curve import LoadPath, PathPoint
+from ..analysis.held import held_scale, held_unit
 from ..analysis.load_path import load_path
 from ..files.settings import UserMistake, quantity
 from ..mechanics.arrays import Real
@@ -13,7 +14,7 @@ from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from ..plots.load_path import load_path_figure
 from .output import Output, aligned
-from .systems import held_scale, held_unit, rounded
+from .systems import rounded
 
 ROWS_SHOWN = 12
 

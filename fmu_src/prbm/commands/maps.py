@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 
 from ..analysis import adequacy, impact_map
+from ..analysis.held import check_length
 from ..analysis.impact_map import ImpactMap
 from ..analysis.touching import lever, stop_index
 from ..base.progress import Progress, reporter
@@ -25,7 +26,6 @@ from ..mechanism.description import Mechanism
 from ..mechanism.parts import value
 from ..plots import impact_map as figures
 from .output import Output
-from .systems import check_length
 
 # The default grid has about the proportions of the grid in the thesis, in round numbers.
 WALL_SHARE = 5 / 9  # Largest default wall position over the displacement at release.

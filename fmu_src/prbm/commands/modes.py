@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..analysis.adequacy import Impact, Shape, Vibration, notes
+from ..analysis.held import check_held, held_scale, held_unit
 from ..base.unit_text import mode_text, prefixed_unit
 from ..files.settings import UserMistake, quantity
 from ..mechanics.arrays import Complex, Real
@@ -19,7 +20,7 @@ from ..mechanism.parts import value
 from ..runs.released import released_label
 from .load_paths import given_loads, load_text
 from .output import Output, aligned
-from .systems import assembled, check_held, held_scale, held_unit, rounded
+from .systems import assembled, rounded
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..analysis import holding
+from ..analysis.held import HeldUnit, check_held, held_scale, held_unit
 from ..analysis.static_shape import StaticShape
 from ..base.progress import reporter
 from ..base.tolerances import RIGID_RTOL
@@ -19,7 +20,7 @@ from ..plots.holding import holding_figure
 from ..runs.released import released_label
 from .load_paths import given_loads, load_text, vary
 from .output import Output, aligned
-from .systems import ZERO_RTOL, HeldUnit, assembled, check_held, held_scale, held_unit, rounded
+from .systems import ZERO_RTOL, assembled, rounded
 
 POINTS_MAX = 100_000
 MATRIX_UNITS = {  # Heads of the columns and of the rows.

@@ -4,6 +4,7 @@ import argparse
 import math
 from collections.abc import Sequence
 
+from ..analysis.held import check_held, held_unit
 from ..analysis.strength import Loading, counts_cycles, loadings
 from ..analysis.stress_field import StressRecorder
 from ..base.progress import reporter
@@ -21,7 +22,6 @@ from ..runs.struck import UNRELIABLE, first_rigid_impact, peak_before
 from .duration import given_inputs, span
 from .missing import missing_package
 from .output import Output, aligned
-from .systems import check_held, held_unit
 
 ROWS_PER_STEP = 5  # Rows of the counted history per communication step.
 HEAD = ("flexure", "peak [MPa]", "at t", "from start", "yield/peak", "damage", "runs to failure")

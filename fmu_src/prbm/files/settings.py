@@ -3,12 +3,14 @@
 import math
 import re
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from ..base.errors import MechanismError, ParameterError, PrbmError
 from ..base.names import unknown
 from ..mechanics.inputs import input_units
+from ..mechanism import parameters
 from ..mechanism.description import Mechanism
-from ..mechanism.parameters import Tolerance
+from ..mechanism.parameters import Tolerance, by_name
 from .units import contact_stiffness, number
 
 PERCENT = re.compile(r"(.*\d)\s*%")
@@ -224,6 +226,67 @@ def units_of(mechanism: Mechanism) -> dict[str, str]:
     ('m', 'N.m', 'm/s2')
     """
     return input_units(mechanism) | {p.name: p.unit for p in mechanism.parameters}
+
+
+def in_si(
+    mechanism: Mechanism, given: Mapping[str, float | str] | None, argument: str = "changes"
+) -> dict[str, float]:
+    """Return values of parameters and inputs with texts converted to numbers in SI.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The mechanism.
+    given : mapping or None
+        Numbers in SI units, or texts with a unit, by name.
+    argument : str
+        Name of the argument, for messages.
+
+    Raises
+    ------
+    ParameterError
+        If the name of a text is unknown.
+    UserMistake
+        If a text is not a quantity of the right dimension.
+
+    Examples
+    --------
+    >>> from prbm.files.mechanism_file import load
+    >>> in_si(load("PRBDM"), {"release.displacement": "-10 mm", "stop.restitution": 0.5})
+    {'release.displacement': -0.01, 'stop.restitution': 0.5}
+    """
+    units = units_of(mechanism)
+    result: dict[str, float] = {}
+    for name, x in by_name(argument, given).items():
+        if isinstance(x, str):
+            if name not in units:
+                raise ParameterError(unknown(name, units))
+            x = quantity(x, units[name], f"{name} =")
+        result[name] = x
+    return result
+
+
+def in_unit(name: str, value: Any, unit: str) -> float:
+    """Return a number in a unit, from a number in this unit or a text with a unit.
+
+    Raises
+    ------
+    ParameterError
+        If the value is neither a number nor a text.
+    UserMistake
+        If a text is not a quantity of the right dimension.
+
+    Examples
+    --------
+    >>> in_unit("step", "20 ms", "s"), in_unit("step", 0.1, "s")
+    (0.02, 0.1)
+    """
+    if isinstance(value, str):
+        return quantity(value, unit, f"{name} =")
+    try:
+        return parameters.number(name, value, unit)
+    except ParameterError as error:
+        raise ParameterError(f'{error}, or a text, "1 {unit}"' if unit else str(error)) from None
 
 
 def settings(mechanism: Mechanism, texts: Sequence[str]) -> dict[str, float]:

@@ -15,6 +15,7 @@ from ..base.text import printable
 from ..interface.variables import Variable
 from ..kernel.sources import files_digest
 from ..mechanism.description import Mechanism
+from ..mechanism.flexure import PUBLISHED
 from . import documentation
 from .archive import zipped
 from .description import Heading, model_description
@@ -94,7 +95,8 @@ def build(
     Raises
     ------
     PrbmError
-        If the mechanism cannot start with these values, or one of them is out of bounds.
+        If the mechanism cannot start with these values, one of them is out of bounds, or a model of
+        its flexures has been registered by a program.
     """
     return build_export(Export(mechanism, changes), progress)
 
@@ -102,6 +104,7 @@ def build(
 def build_export(export: Export, progress: Callable[[str], None] = lambda step: None) -> bytes:
     """Return the Python FMU of an export, as :func:`build`."""
     mechanism = export.mechanism
+    check_models(mechanism)
     progress("checking the start")
     listed = export.start.variables
     progress(f"collecting {len(listed)} variables and the engine")
@@ -121,6 +124,22 @@ def build_export(export: Export, progress: Callable[[str], None] = lambda step: 
     contents |= related_files([default_set(mechanism, listed)])
     progress("packing")
     return zipped(contents)
+
+
+def check_models(mechanism: Mechanism) -> None:
+    """Reject a mechanism with a model that a program has registered.
+
+    Raises
+    ------
+    MechanismError
+        If a type of flexures has such a model.
+    """
+    for kind in mechanism.flexure_types:
+        if kind.model not in PUBLISHED:
+            raise MechanismError(
+                f"flexure type {kind.name}: the model {kind.model} is registered in this process, "
+                "and a Python FMU would not know it; build a native FMU, which contains it"
+            )
 
 
 def _sources(

@@ -19,8 +19,10 @@ from .forces import field_row
 from .statics import Equilibrium, held_rows, resting, sprung, tangent_stiffness
 from .system import Rows, System
 
+SHOWN = 6  # Frequencies in the text of modes.
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Modes:
     """Mass-normalised modes in rising order of frequency.
 
@@ -37,6 +39,11 @@ class Modes:
     frequency: Real
     shape: Real
     M: Real
+
+    def __repr__(self) -> str:
+        first = ", ".join(f"{f:.6g}" for f in self.frequency[:SHOWN])
+        more = ", ..." if len(self.frequency) > SHOWN else ""
+        return f"<Modes: {len(self.frequency)}, at {first}{more} Hz>"
 
     @property
     def rounding(self) -> float:

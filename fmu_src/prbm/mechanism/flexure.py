@@ -28,11 +28,14 @@ A beam has no coefficients either: its bending moment is a polynomial, see
 Each model in :data:`MODELS` names its publications.
 """
 
+import math
+import reprlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..base.errors import ParameterError
 from ..base.tolerances import STUB_RTOL
+from .parameters import number
 
 
 @dataclass(frozen=True)
@@ -202,6 +205,9 @@ MODELS = {
     )
 }
 
+PUBLISHED = frozenset(MODELS)
+"""Models that every process knows; others are registered by a program."""
+
 
 def register_model(
     name: str, gamma: Sequence[float], K_theta: Sequence[float], *, reference: str = ""
@@ -236,19 +242,20 @@ def register_model(
     0.772
     >>> _ = MODELS.pop("Yu2012")
     """
-    if not name.isidentifier() or name in MODELS:
+    if not isinstance(name, str) or not name.isidentifier() or name in MODELS:
         raise ParameterError(
             f"model {name!r}: choose another name than {', '.join(MODELS)}, of letters, digits and "
             "_, that does not begin with a digit"
         )
+    gamma, K_theta = _numbers("gamma", gamma), _numbers("K_theta", K_theta)
     if not 0 < len(gamma) == len(K_theta):
         raise ParameterError(
             f"model {name}: {len(gamma)} lengths gamma and {len(K_theta)} stiffnesses K_theta; "
             "give as many of each"
         )
-    if not (all(x > 0.0 for x in (*gamma, *K_theta)) and sum(gamma) < 1.0 + STUB_RTOL):
+    if not (all(0.0 < x < math.inf for x in (*gamma, *K_theta)) and sum(gamma) < 1.0 + STUB_RTOL):
         raise ParameterError(
-            f"model {name}: gamma = {tuple(gamma)}, K_theta = {tuple(K_theta)} must be positive, "
+            f"model {name}: gamma = {gamma}, K_theta = {K_theta} must be positive and finite, "
             "and the sum of gamma at most 1"
         )
     lengths = tuple(
@@ -260,6 +267,17 @@ def register_model(
     references = (f"{reference} ({name}).",) if reference else ()
     MODELS[name] = FlexureModel(name, lengths, stiffnesses, False, False, reference, references)
     return MODELS[name]
+
+
+def _numbers(name: str, given: Sequence[float]) -> tuple[float, ...]:
+    """Return the coefficients of a model; reject what is no sequence of numbers."""
+    try:
+        each = tuple(given)
+    except TypeError:
+        raise ParameterError(
+            f"{name} = {reprlib.repr(given)} must be a sequence of numbers; write one as (0.85,)"
+        ) from None
+    return tuple(number(f"{name}[{i}]", x) for i, x in enumerate(each))
 
 
 LEAF, TAPER, NOTCH = "leaf", "taper", "notch"

@@ -10,6 +10,7 @@ from typing import Any, cast
 from ..base import reading
 from ..base.errors import ParameterError
 from ..base.names import proposal, unknown
+from ..files.settings import quantity
 from ..mechanics.inputs import input_units
 from ..mechanism.description import Mechanism
 from .signals import (
@@ -243,8 +244,6 @@ def read_signal(name: str, text: str, unit: str) -> Signal:
     >>> read_signal("force.x", "half-sine(2 N, duration=4 ms)", "N")
     Wave(amplitude=2.0, f=125.0, f1=125.0, start=0.0, end=0.004, phase=0.0)
     """
-    from ..files.settings import quantity  # imported here: pint takes half a second
-
     shape, bracket, rest = (part.strip() for part in text.partition("("))
     if not (shape and bracket and rest.endswith(")")):
         return Steps((), (quantity(text, unit, f"{name} ="),))
@@ -264,8 +263,6 @@ def read_signal(name: str, text: str, unit: str) -> Signal:
 
 def _numbers(where: str, shape: str, words: Sequence[str], unit: str) -> dict[str, float]:
     """Return the arguments of a shape by name, in SI and within their bounds."""
-    from ..files.settings import quantity  # imported here: pint takes half a second
-
     known, numbers = SHAPES[shape], {}
     given = _named(where, words, known)
     for key, (dimension, default) in known.items():
@@ -400,8 +397,6 @@ def _name_and_unit(head: str) -> tuple[str, str]:
 
 def _factor(where: str, head: str, unit: str) -> float:
     """Return the factor from the unit in the head of a column to SI; 1 without a unit."""
-    from ..files.settings import quantity  # imported here: pint takes half a second
-
     _, written = _name_and_unit(head)
     if written in ("", "-"):
         return 1.0

@@ -3,13 +3,12 @@
 import logging
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
 from ..base.errors import ParameterError, SimulationError
-from ..base.names import unknown
 from ..base.progress import Progress
+from ..files.settings import in_si, in_unit
 from ..hybrid.configuration import replaced_tolerance
 from ..hybrid.records import Impact
 from ..mechanics.arrays import Real
@@ -271,36 +270,6 @@ def _check_steps(motion: Engine, steps_max: float, fraction: float) -> None:
             f"the simulation takes {motion.step_count} integration steps until t = "
             f"{motion.time:.6g} s; at most {steps_max:g} are permitted in total"
         )
-
-
-def in_si(mechanism: Mechanism, changes: Mapping[str, float | str] | None) -> Mapping[str, float]:
-    """Return changes with texts converted to numbers in SI."""
-    given = by_name("changes", changes)
-    texts = {name: x for name, x in given.items() if isinstance(x, str)}
-    if not texts:
-        return given  # type: ignore[return-value]
-    from ..files.settings import units_of  # imported here: pint takes half a second
-
-    units = units_of(mechanism)
-    for name in texts:
-        if name not in units:
-            raise ParameterError(unknown(name, units))
-    return {
-        name: in_unit(name, x, units[name]) if isinstance(x, str) else x
-        for name, x in given.items()
-    }
-
-
-def in_unit(name: str, value: Any, unit: str) -> float:
-    """Return a number in a unit, from a number or a text with a unit."""
-    if isinstance(value, str):
-        from ..files.settings import quantity  # imported here: pint takes half a second
-
-        return quantity(value, unit, f"{name} =")
-    if isinstance(value, bool | bytes) or not hasattr(value, "__float__"):
-        remedy = f', in {unit}, or a text, "1 {unit}"' if unit else ""
-        raise ParameterError(f"{name} = {value!r}: must be a number{remedy}")
-    return float(value)
 
 
 def check_duration(name: str, value: float) -> None:

@@ -12,13 +12,13 @@ import numpy as np
 
 from ..base.errors import ParameterError
 from ..base.progress import Progress
+from ..files.settings import in_si
 from ..hybrid.records import Impact
 from ..mechanics.arrays import Real
 from ..mechanism.description import Mechanism
 from ..runs.driving import Driver
 from ..runs.engine import simulation
 from ..runs.inputs import Source, filled, placeholders, signals
-from ..runs.run import in_si
 
 START = "start"  # Placeholder of the time at which the signals of a value begin.
 RETURN_RTOL = 1e-3  # Differences of stroboscopic values of a periodic motion, relative to them.
@@ -121,7 +121,7 @@ def behaviour(
         raise ParameterError(f"write the varied number as {{{name}}} in the inputs, and no other")
     if not len(x) or not (spans > 0.0).all() or transient < 0 or periods < 1:
         raise ParameterError("give at least one value, one period and positive durations")
-    given = dict(in_si(mechanism, values))
+    given = in_si(mechanism, values)
     record: list[Impact] = []
 
     def driver(k: int, begin: float) -> Driver:

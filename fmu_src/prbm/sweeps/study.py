@@ -23,6 +23,7 @@ from ..base.errors import ParameterError
 from ..base.names import proposal
 from ..base.progress import Progress
 from ..base.version import __version__
+from ..files.settings import in_si, in_unit
 from ..hybrid.configuration import checked_tolerance
 from ..hybrid.given import start_values
 from ..hybrid.simulation import Simulation
@@ -35,7 +36,7 @@ from ..mechanism.parameters import Tolerance
 from ..runs.engine import PYTHON, check_engine, kernel_available
 from ..runs.experiment import experiment
 from ..runs.inputs import Source, filled, placeholders, signals
-from ..runs.run import communication_points, in_si, in_unit
+from ..runs.run import communication_points
 from ..runs.signals import Signal
 from .design import (
     SENSITIVITY,
@@ -364,7 +365,7 @@ def _plan(
     listed = isinstance(vary, str | Path)
     columns = _columns(vary, runs, mechanism, known)
     _check_names(mechanism, columns, placeholders(inputs or {}))
-    given = dict(in_si(mechanism, values))
+    given = in_si(mechanism, values)
     if listed:
         varied, points = dict(columns), np.column_stack([*columns.values()])
         _check_count(len(points))
