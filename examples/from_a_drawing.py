@@ -57,7 +57,7 @@ def draw(path: str = "stage.dxf") -> None:
 
 def imported(path: str = "stage.dxf") -> Imported:
     """Return the imported drawing; write its file and its picture."""
-    result = import_drawing(path, Options(1e-3 * DEPTH, "steel", ground_drawn=[-5 - 5j]))
+    result = import_drawing(path, Options(1e-3 * DEPTH, "steel", ground=(-5, -5)))
     Path("stage.toml").write_text(result.text, encoding="utf-8")
     Path("stage.png").write_bytes(check_picture(result))
     return result

@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 import shapely
 
+import prbm
 from drawn_plates import box, disc, filleted_stage, framed_stage, rings, strip, svg, write
 from prbm.cad import curves, dxf
 from prbm.cad.curves import DrawingError
 from prbm.cad.importing import Options, import_drawing
 from prbm.cad.numbers import plain, roundest
+from prbm.files.settings import UserMistake
 from support import possible
 
 OPTIONS = Options(8e-3)
@@ -28,7 +30,7 @@ def drawing(tmp_path, change, plate=None, **options):
         document.modelspace().add_lwpolyline(ring[:-1], close=True)
     path = tmp_path / "plate.dxf"
     document.saveas(path)
-    return import_drawing(path, Options(8e-3, **options))
+    return import_drawing(path, Options(**{"thickness": 8e-3} | options))
 
 
 def thickness(result) -> float:
@@ -79,7 +81,8 @@ def test_a_damaged_binary_file_is_refused(tmp_path):
 
 @pytest.mark.parametrize(("unit", "length"), [(1, 25.4), (4, 1.0), (5, 10.0), (13, 1e-3)])
 def test_the_unit_of_the_file_scales_the_mechanism(tmp_path, unit, length):
-    result = import_drawing(write(tmp_path / "plate.dxf", framed_stage(), unit=unit), OPTIONS)
+    path = write(tmp_path / "plate.dxf", framed_stage(), unit=unit)
+    result = import_drawing(path, Options(8e-3 * length))
     assert thickness(result) == pytest.approx(0.4 * length, rel=1e-6)
 
 
@@ -102,10 +105,10 @@ def test_marks_name_the_ground_instead_of_the_largest_body(tmp_path):
 
 
 def test_a_given_point_names_the_ground_in_units_of_the_drawing(tmp_path):
-    result = drawing(tmp_path, lambda *_: None, ground_drawn=[50 + 40j])
+    result = drawing(tmp_path, lambda *_: None, ground=(50, 40))
     assert result.draft.found.bodies[result.draft.stage].bounds[0] == pytest.approx(-0.01)
     with pytest.raises(ValueError, match=r"the point \(20, 20\) mm is on no body; the nearest"):
-        drawing(tmp_path, lambda *_: None, ground=[0.02 + 0.02j])
+        drawing(tmp_path, lambda *_: None, ground=["20mm,20mm"])
 
 
 @pytest.mark.parametrize(
@@ -149,6 +152,79 @@ def test_blocks_in_blocks_are_placed(tmp_path):
     assert result.draft.found.plate.shape.bounds == pytest.approx((-0.08, 0.01, 0.02, 0.13))
 
 
+BLOCK = [(71, 36), (90, 36), (90, 44), (71, 44)]
+
+
+@pytest.mark.parametrize(
+    ("draw", "direction", "gap", "place"),
+    [
+        (lambda s, at: s.add_lwpolyline(BLOCK, close=True, dxfattribs=at), 0.0, 1.0, 70 + 40j),
+        (lambda s, at: s.add_lwpolyline(BLOCK[2:] + BLOCK[:2], dxfattribs=at), 0.0, 1.0, 70 + 40j),
+        (lambda s, at: [s.add_line(*ends, dxfattribs=at)
+                        for ends in zip(BLOCK, BLOCK[1:] + BLOCK[:1], strict=True)],
+         0.0, 1.0, 70 + 40j),
+        (lambda s, at: s.add_circle((75, 38), 3, dxfattribs=at), 0.0, 2.0, 70 + 38j),
+        (lambda s, at: s.add_circle((74, 53), 3, dxfattribs=at), 36.8699, 2.0, 70 + 50j),
+        (lambda s, at: s.add_line((71, 38), (71, 42), dxfattribs=at), 0.0, 1.0, 70 + 40j),
+        (lambda s, at: s.add_line((71, 38), (71, 90), dxfattribs=at), 0.0, 1.0, 70 + 44j),
+        (lambda s, at: s.add_line((71, 45), (71, 55), dxfattribs=at), 0.0, 1.0, 70 + 50j),
+    ],
+    ids=["block", "bent", "lines", "pin", "pin at a corner", "line", "beyond", "about a corner"],
+)  # fmt: skip
+def test_the_nearest_face_of_a_drawn_stop_is_the_wall(tmp_path, draw, direction, gap, place):
+    """The hit point is in front of the middle of the face, or of its part beside the body."""
+
+    def stop(document, space):
+        draw(space, {"layer": "stops"})
+
+    (found,) = drawing(tmp_path, stop).draft.stops
+    chords = 1.5  # deg; half the angle of the chords of an arc
+    assert np.degrees(np.angle(found.direction)) == pytest.approx(direction, abs=chords)
+    assert 1e3 * found.gap == pytest.approx(gap, abs=2e-3)
+    assert 1e3 * found.point == pytest.approx(place, abs=0.02)
+
+
+def test_an_open_outline_is_named_with_its_place(tmp_path):
+    """The leaf at the gap has one wall only; without the rest there is no flexure."""
+    path = tmp_path / "plate.dxf"
+    document = ezdxf.new("R2010", units=4)
+    plate = box(0, 0, 40, 20).union(box(0, 60, 40, 80)).union(box(19.8, 10, 20.2, 70))
+    (ring,) = rings(plate)
+    k = next(k for k, (a, b) in enumerate(pairwise(ring)) if abs(b[1] - a[1]) == 40)
+    for i, (a, b) in enumerate(pairwise(ring)):
+        document.modelspace().add_line(a, (b[0], b[1] - 0.3 * (i == k)))
+    document.saveas(path)
+    with pytest.raises(DrawingError, match=r"0\.3 mm at .*; close them, or increase --gap"):
+        import_drawing(path, OPTIONS)
+
+
+@pytest.mark.parametrize("name", ["thickness", "gap", "tolerance", "flexures_below"])
+def test_a_length_that_is_larger_than_the_drawing_is_a_mistake(tmp_path, name):
+    path = write(tmp_path / "plate.dxf", framed_stage())
+    message = f"--{name.replace('_', '-')} 4: 4 m is more than the diagonal of the drawing"
+    with pytest.raises(UserMistake, match=message):
+        prbm.read_drawing(path, **{"thickness": 8e-3} | {name: 4})
+    with pytest.raises(UserMistake, match="write a positive length"):
+        prbm.read_drawing(path, **{"thickness": 8e-3} | {name: -4e-3})
+
+
+@pytest.mark.parametrize(
+    "ground", [(-5, -5), [-5, -5], "-5,-5", "-5mm,-5mm", [(-5, -5)], ["-5,-5", (105, 40)]]
+)
+def test_the_ground_is_a_point_or_several(tmp_path, ground):
+    path = write(tmp_path / "plate.dxf", framed_stage())
+    found = prbm.read_drawing(path, thickness="8 mm", ground=ground)
+    assert [body.name for body in found.bodies] == ["stage"]
+    assert found.values()["leaf.width"] == 8e-3
+
+
+@pytest.mark.parametrize("ground", [(1, 2, 3), "5", [5], [("a", "b")], 5, 1j])
+def test_what_is_no_point_is_rejected(tmp_path, ground):
+    path = write(tmp_path / "plate.dxf", framed_stage())
+    with pytest.raises(prbm.PrbmError, match="--ground"):
+        prbm.read_drawing(path, thickness="8 mm", ground=ground)
+
+
 def test_gaps_and_lines_that_are_drawn_twice_are_repaired_and_reported(tmp_path):
     document = ezdxf.new("R2010", units=4)
     space = document.modelspace()
@@ -160,7 +236,8 @@ def test_gaps_and_lines_that_are_drawn_twice_are_repaired_and_reported(tmp_path)
     document.saveas(tmp_path / "plate.dxf")
     result = import_drawing(tmp_path / "plate.dxf", OPTIONS)
     assert len(result.mechanism.flexures) == 4
-    assert any("gaps of at most 0.005 mm were closed" in note for note in result.notes)
+    start = "5 gaps were closed, of at most 0.005 mm: (110, 90), "
+    assert any(note.startswith(start) for note in result.notes)
     assert any("are drawn twice" in note for note in result.notes)
 
 
@@ -210,7 +287,7 @@ def test_transformations_shapes_and_layers_of_svg_files_are_read(tmp_path):
     head = 'xmlns="http://www.w3.org/2000/svg" width="100mm" viewBox="0 0 100 100"'
     path = tmp_path / "plate.svg"
     path.write_text(f"<svg {head}>{body}</svg>", encoding="utf-8")
-    result = import_drawing(path, Options(8e-3, ground=[-0.09j]))
+    result = import_drawing(path, Options(8e-3, ground="0,-90mm"))
     (flexure,) = result.draft.found.flexures
     assert abs(flexure.shape.end - flexure.shape.start) == pytest.approx(0.04, rel=1e-3)
     assert len(result.draft.found.bodies[result.draft.stage].interiors) == 1
@@ -329,7 +406,7 @@ def test_crossing_leaves_of_two_plates_are_bolted_to_the_same_bodies(tmp_path):
         for ring in rings(plate.difference(shapely.unary_union(holes))):
             document.modelspace().add_lwpolyline(ring[:-1], close=True, dxfattribs={"layer": layer})
     document.saveas(tmp_path / "plate.dxf")
-    result = import_drawing(tmp_path / "plate.dxf", Options(8e-3, ground=[-0.03j - 0.03]))
+    result = import_drawing(tmp_path / "plate.dxf", Options(8e-3, ground=[(-30, -30)]))
     mechanism = result.mechanism
     assert [body.name for body in mechanism.bodies] == ["stage"]
     assert len(mechanism.flexures) == 2

@@ -22,7 +22,9 @@ LENGTH_RTOL, THICKNESS_RTOL = 5e-3, 1e-2
 
 
 def imported(tmp_path, plate, **options) -> Imported:
-    return import_drawing(write(tmp_path / "plate.dxf", plate), Options(8e-3, **options))
+    return import_drawing(
+        write(tmp_path / "plate.dxf", plate), Options(**{"thickness": 8e-3} | options)
+    )
 
 
 def only(result: Imported):
@@ -155,7 +157,7 @@ def test_an_arc_has_the_curvature_of_its_circle(size, tmp_path):
     edge = 60 * np.sin(0.3)
     plate = strip(60j * (np.exp(-1j * angle) - 1), 0.5)
     plate = plate.union(box(edge, -10, 40, 5)).union(box(-40, -10, -edge, 5))
-    shape = only(imported(tmp_path, scale(plate, size, size, origin=(0, 0))))
+    shape = only(imported(tmp_path, scale(plate, size, size, origin=(0, 0)), thickness=8e-3 * size))
     assert abs(shape.dimensions["curvature"]) == pytest.approx(1 / (0.06 * size), rel=1e-4)
     assert length(shape) == pytest.approx(2 * edge * size, rel=1e-3)
 

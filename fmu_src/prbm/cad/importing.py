@@ -1,19 +1,23 @@
 """From a drawing to a mechanism."""
 
+import math
 import re
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..base.errors import PrbmError
 from ..files.mechanism_file import read_mechanism
+from ..files.settings import UserMistake, quantity
 from ..mechanics.assembly import assemble
 from ..mechanics.modal import modes
 from ..mechanics.statics import equilibrium
 from ..mechanism.description import Mechanism
+from ..mechanism.parameters import number
 from .bolted import bolted
 from .curves import Curves, DrawingError, diagonal
 from .draft import Draft, draft
@@ -25,6 +29,9 @@ from .plates import plate
 from .recognition import recognised
 from .writing import Heading, file_text
 
+INCH = 0.0254  # m
+INCHES = ("in", "inch", "inches")
+NO_POINT = "--ground {}: write a point x,y, for instance 5,5 or 5mm,5mm"
 NOISE_RTOL = 5e-6  # Default accuracy of coordinates, as a share of the diagonal.
 AXIAL_RTOL = 0.01  # Change of the fundamental frequency, above which flexures stretch.
 AMPLITUDE_SHARE = 0.02  # Released amplitude over the size without a stop,
@@ -32,45 +39,118 @@ AMPLITUDE_GAPS = 2.0  # or over the gap.
 STILL_SHARE = 0.05  # A body whose centre moves less, over its other motions, is not released so.
 
 
+Ground = str | Sequence[Any]
+
+
 @dataclass(frozen=True)
 class Options:
     """What a drawing does not say, and tolerances.
 
+    Lengths are numbers in metres, or texts with a unit, ``"8 mm"``.
+
     Parameters
     ----------
-    thickness : float
-        Thickness of the plate [m].
+    thickness : float or str
+        Thickness of the plate.
     material : str
         Name of its material.
     youngs_modulus, density : str or None
         Own properties of the material with units.
-    ground : sequence of complex
-        Points of bodies that are fixed [m]; empty: marks in the drawing, or the largest body.
-    ground_drawn : sequence of complex
-        The same in units of the drawing.
-    unit : float or None
-        Length of a unit of the drawing [m]; None: that of the file.
-    gap : float or None
-        Largest distance of two ends of curves that are joined [m].
-    tolerance : float or None
-        Accuracy of the coordinates, within which numbers are rounded [m].
-    flexures_below : float or None
-        Largest thickness of a flexure [m].
+    ground : str, pair of float, or sequence of these
+        Points of bodies that are fixed: ``(5, 5)`` and ``"5,5"`` in units of the drawing, or
+        ``"5mm,5mm"``; empty: marks in the drawing, or the largest body.
+    unit : float, str or None
+        Length of a unit of the drawing, also ``"in"``; None: that of the file.
+    gap : float, str or None
+        Largest distance of two ends of curves that are joined.
+    tolerance : float, str or None
+        Accuracy of the coordinates, within which numbers are rounded.
+    flexures_below : float, str or None
+        Largest thickness of a flexure.
     name : str or None
         Name of the mechanism; None: that of the file.
     """
 
-    thickness: float
+    thickness: float | str
     material: str = "steel"
     youngs_modulus: str | None = None
     density: str | None = None
-    ground: Sequence[complex] = ()
-    ground_drawn: Sequence[complex] = ()
-    unit: float | None = None
-    gap: float | None = None
-    tolerance: float | None = None
-    flexures_below: float | None = None
+    ground: Ground = ()
+    unit: float | str | None = None
+    gap: float | str | None = None
+    tolerance: float | str | None = None
+    flexures_below: float | str | None = None
     name: str | None = None
+
+    def length(self, name: str, size: float = math.inf) -> float | None:
+        """Return an option that is a length [m], None if it is not given.
+
+        Parameters
+        ----------
+        name : str
+            Name of the option.
+        size : float
+            Diagonal of the drawing [m], which it must not exceed.
+
+        Raises
+        ------
+        UserMistake
+            If it is not a length, not positive, or larger than the drawing.
+        """
+        given = getattr(self, name)
+        if given is None:
+            return None
+        if isinstance(given, str) and name == "unit" and given.strip().lower() in INCHES:
+            return INCH
+        option = f"--{name.replace('_', '-')}"
+        if isinstance(given, str):
+            value = quantity(f"1 {given}" if name == "unit" else given, "m", option)
+        else:
+            value = number(option, given, "m")
+        if not 0.0 < value < math.inf:
+            raise UserMistake(f"{option} {given}: write a positive length, for instance 8mm")
+        if value > size:
+            raise UserMistake(
+                f"{option} {given}: {value:g} m is more than the diagonal of the drawing, "
+                f"{size:.3g} m; check the unit, for instance {option} {value:g}mm"
+            )
+        return value
+
+    def grounds(self, unit: float) -> list[complex]:
+        """Return the points of the ground [m].
+
+        Parameters
+        ----------
+        unit : float
+            Length of a unit of the drawing [m].
+
+        Raises
+        ------
+        UserMistake
+            If one of them is not a point.
+        """
+        given = [self.ground] if isinstance(self.ground, str) else _listed(self.ground)
+        if given and not any(isinstance(x, str) or np.ndim(x) for x in given):
+            given = [given]  # A pair of numbers is one point.
+        return [_point(x, unit) for x in given]
+
+
+def _listed(given: Any) -> list[Any]:
+    try:
+        return [*given]
+    except TypeError:
+        raise UserMistake(NO_POINT.format(given)) from None
+
+
+def _point(given: Any, unit: float) -> complex:
+    """Return a point of a drawing [m]; numbers are in units of the drawing."""
+    words = given.split(",") if isinstance(given, str) else _listed(given)
+    if len(words) != 2:
+        raise UserMistake(NO_POINT.format(given))
+    try:
+        return unit * complex(*map(float, words))
+    except (TypeError, ValueError):
+        return complex(*(quantity(str(word), "m", "--ground") for word in words))
 
 
 @dataclass(frozen=True)
@@ -123,47 +203,79 @@ def import_drawing(path: str | Path, options: Options) -> Imported:
     """
     path = Path(path)
     made_of = material(options.material, options.youngs_modulus, options.density)
-    curves = read_curves(path, options.unit, options.tolerance)
+    curves = read_curves(path, options.length("unit"), options.length("tolerance"))
     outlines = curves.plates()
     if not outlines:
         raise DrawingError(f"{path}: there are no lines or curves; {_skipped(curves)}")
-    noise = options.tolerance or NOISE_RTOL * diagonal([c for group in outlines for c in group])
-    cut = [plate(group, options.gap) for group in outlines]
-    found = bolted([recognised(one, noise, options.flexures_below) for one in cut])
+    size = diagonal([c for group in outlines for c in group])
+    thickness, gap, tolerance, thickest = (
+        options.length(name, size) for name in ("thickness", "gap", "tolerance", "flexures_below")
+    )
+    cut = [plate(group, gap) for group in outlines]
+    noise = tolerance or NOISE_RTOL * size
+    found = bolted([recognised(one, noise, thickest) for one in cut])
     loose = "a free end of a line: not part of an outline"
     found.doubts += [(z, loose) for z in found.plate.loose]
-    drawn = [curves.unit * z for z in options.ground_drawn]
-    find_ground(found, curves, [*options.ground, *drawn])
+    find_ground(found, curves, options.grounds(curves.unit))
     stops = find_stops(found, curves)
     notes = [*curves.notes, *found.plate.notes]
     if curves.skipped:
         notes.append(_skipped(curves))
-    heading = _heading(path, options, made_of)
+    assert thickness is not None
+    heading = _heading(path, options, thickness, made_of)
     return _written(draft(found, stops), heading, notes)
 
 
 def read_drawing(
-    path: str | Path, *, thickness: float, material: str = "steel", **options: object
+    path: str | Path,
+    *,
+    thickness: float | str,
+    material: str = "steel",
+    youngs_modulus: str | None = None,
+    density: str | None = None,
+    ground: Ground = (),
+    unit: float | str | None = None,
+    gap: float | str | None = None,
+    tolerance: float | str | None = None,
+    flexures_below: float | str | None = None,
+    name: str | None = None,
 ) -> Mechanism:
     """Return the mechanism of the plate in a drawing (DXF or SVG).
+
+    Lengths are numbers in metres, or texts with a unit, ``"8 mm"``.
 
     Parameters
     ----------
     path : str or Path
         The drawing.
-    thickness : float
-        Thickness of the plate [m].
+    thickness : float or str
+        Thickness of the plate.
     material : str
         Name of its material.
-    **options
-        Further fields of :class:`Options`.
+    youngs_modulus, density : str or None
+        Own properties of the material with units.
+    ground : str, pair of float, or sequence of these
+        Points of bodies that are fixed: ``(5, 5)`` and ``"5,5"`` in units of the drawing, or
+        ``"5mm,5mm"``; empty: marks in the drawing, or the body with the largest box.
+    unit : float, str or None
+        Length of a unit of the drawing, also ``"in"``; None: that of the file.
+    gap, tolerance, flexures_below : float, str or None
+        Largest gap of the outline that is closed, accuracy of coordinates, and largest thickness of
+        a flexure.
+    name : str or None
+        Name of the mechanism; None: that of the file.
 
     Raises
     ------
     DrawingError
         If the drawing cannot be read, or is not the outline of a mechanism.
+    UserMistake
+        If an argument is not a quantity of the right dimension, or larger than the drawing.
     """
-    chosen = Options(thickness, material, **options)  # type: ignore[arg-type]
+    chosen = Options(
+        thickness, material, youngs_modulus, density, ground, unit, gap, tolerance, flexures_below,
+        name,
+    )  # fmt: skip
     return import_drawing(path, chosen).mechanism
 
 
@@ -175,14 +287,14 @@ def _skipped(curves: Curves) -> str:
     return f"not read: {listed}"
 
 
-def _heading(path: Path, options: Options, made_of: Material) -> Heading:
+def _heading(path: Path, options: Options, thickness: float, made_of: Material) -> Heading:
     words = re.findall(r"[A-Za-z0-9]+", options.name or path.stem) or ["Drawing"]
     name = "".join(word[0].upper() + word[1:] for word in words)
     name = name if not name[0].isdigit() else f"Drawing{name}"
     source = "".join(c if c.isprintable() else "?" for c in path.name)
     safe = source.replace("\\", "/").replace('"', "'")
     title = f"Mechanism from the drawing {safe}"
-    return Heading(name, title, source, options.thickness, made_of)
+    return Heading(name, title, source, thickness, made_of)
 
 
 # --- the file -----------------------------------------------------------------------------------
@@ -211,8 +323,8 @@ def _comments(drafted: Draft, heading: Heading, notes: Sequence[str]) -> list[st
     lines = " and ".join(f"{m.axis} = {1e3 * m.at:.4g} mm" for m in drafted.lines)
     return [
         f"From the drawing {heading.source}: {len(drafted.names)} moving "
-        f"bod{'y' if len(drafted.names) == 1 else 'ies'}, {flexures} flexures, "
-        f"{len(drafted.stops)} stops" + (f"; symmetric about {lines}." if lines else "."),
+        f"bod{'y' if len(drafted.names) == 1 else 'ies'}, {flexures} flexures"
+        + (f"; symmetric about {lines}." if lines else "."),
         *notes,
         *(f"At ({1e3 * z.real:.4g}, {1e3 * z.imag:.4g}) mm: {text}." for z, text in found.doubts),
     ]

@@ -1,5 +1,6 @@
 """Materials of plates by name."""
 
+import re
 from dataclasses import dataclass
 
 from .curves import DrawingError
@@ -18,6 +19,7 @@ MATERIALS = {
     one.name: one
     for one in (
         Material("steel", "200 GPa", "7.85 g/cm3"),
+        Material("spring_steel", "206 GPa", "7.85 g/cm3"),  # EN 13906-1
         Material("stainless", "195 GPa", "7.9 g/cm3"),
         Material("aluminium", "71 GPa", "2.8 g/cm3"),
         Material("titanium", "114 GPa", "4.43 g/cm3"),
@@ -44,8 +46,10 @@ def material(name: str, youngs_modulus: str | None = None, density: str | None =
     --------
     >>> material("steel").density
     '7.85 g/cm3'
+    >>> material("spring steel").name
+    'spring_steel'
     """
-    known = MATERIALS.get(name.lower())
+    known = MATERIALS.get(re.sub(r"[\s-]+", "_", name.strip().lower()))
     if known is None and (youngs_modulus is None or density is None):
         raise DrawingError(
             f"the material {name!r} is unknown: choose one of {', '.join(MATERIALS)}, or give "

@@ -133,7 +133,7 @@ def _join(lines: list[Complex], same: float, gap: float, notes: list[str]) -> No
     ends = [(i, k) for i, z in enumerate(lines) for k in (0, -1)]
     z = np.array([lines[i][k] for i, k in ends])
     waiting = np.arange(len(z))
-    closed: list[float] = []
+    closed: list[tuple[float, complex]] = []
     limit = same
     while len(waiting):
         groups = _groups(z[waiting], limit)
@@ -142,7 +142,7 @@ def _join(lines: list[Complex], same: float, gap: float, notes: list[str]) -> No
             members = waiting[groups == g]
             spread = float(np.abs(z[members] - z[members].mean()).max())
             if limit > same:
-                closed.append(2.0 * spread)
+                closed.append((2.0 * spread, complex(z[members].mean())))
             z[members] = z[members].mean()
         waiting = waiting[sizes[groups] == 1]
         if limit >= gap:
@@ -151,7 +151,11 @@ def _join(lines: list[Complex], same: float, gap: float, notes: list[str]) -> No
     for (i, k), value in zip(ends, z, strict=True):
         lines[i][k] = value
     if closed:
-        notes.append(f"{len(closed)} gaps of at most {1e3 * max(closed):.2g} mm were closed")
+        widest = sorted(closed, key=lambda one: -one[0])[:LISTED_MAX]
+        places = ", ".join(f"({1e3 * at.real:.5g}, {1e3 * at.imag:.5g})" for _, at in widest)
+        count = "a gap was" if len(closed) == 1 else f"{len(closed)} gaps were"
+        among = ", among others" if len(closed) > LISTED_MAX else ""
+        notes.append(f"{count} closed, of at most {1e3 * widest[0][0]:.2g} mm: {places} mm{among}")
 
 
 def _groups(z: Complex, limit: float) -> NDArray[np.int64]:
@@ -182,6 +186,18 @@ def _far_apart(points: Sequence[complex], near: float) -> list[complex]:
         if all(abs(z - other) > near for other in kept):
             kept.append(z)
     return kept
+
+
+def open_ends(loose: Sequence[complex]) -> str:
+    """Return a sentence with the places of ends of lines that meet nothing; empty without them."""
+    if not loose:
+        return ""
+    places = ", ".join(f"({1e3 * z.real:.5g}, {1e3 * z.imag:.5g})" for z in loose[:LISTED_MAX])
+    more = f" and {len(loose) - LISTED_MAX} others" if len(loose) > LISTED_MAX else ""
+    return (
+        f"lines end at {places}{more} mm without meeting another: the outline is open there; "
+        "close it, or join ends that are near with --gap"
+    )
 
 
 def _open(lines: Sequence[Complex], gap: float) -> str:

@@ -37,7 +37,12 @@ def _export(commands: Commands) -> None:
     parser.add_argument(
         "--out", type=Path, metavar="FILE.dxf", help="file to write (default: MECHANISM.dxf)"
     )
+    _overwrite(parser)
     set_argument(parser)
+
+
+def _overwrite(parser: ArgumentParser) -> None:
+    parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
 
 
 def import_arguments(parser: ArgumentParser) -> None:
@@ -78,6 +83,7 @@ def import_arguments(parser: ArgumentParser) -> None:
         "--out", type=Path, metavar="FILE.toml",
         help="file to write (default: the drawing's name with .toml)",
     )  # fmt: skip
+    _overwrite(parser)
     add(
         "--check", type=Path, metavar="FILE.png",
         help="picture of the drawing with the recognised parts (default: none)",
