@@ -290,7 +290,7 @@ def test_keys_have_the_defaults_of_the_fields_of_the_parts(tmp_path):
         own = {f.name: f for f in fields(part)}
         more = {"mirror", "repeat"} if part in (Body, Joint) else set()
         if part is Body:
-            more |= {"thickness", "material", "density"}
+            more |= {"thickness", "material", "density", "payload"}
         assert set(table.model_fields) == set(own) | more
         for name, field in table.model_fields.items():
             computed = {Body: ("mass", "inertia", "centre"), Stop: ("rest_speed",)}

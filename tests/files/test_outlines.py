@@ -338,3 +338,13 @@ def test_the_smallest_outlines_have_a_mass_or_are_rejected(size: float) -> None:
             plate("body", corners, [], 1.0, 1.0)
     else:
         assert plate("body", corners, [], 1.0, 1.0)["mass"] == pytest.approx(size**2 / 2)
+
+
+def test_a_payload_adds_its_mass_at_the_centre_of_the_plate() -> None:
+    corners = tuple((z.real, z.imag) for z in rectangle(0.04, 0.03, 0.01j))
+    alone = plate("stage", corners, (), 4e-3, 7850.0)
+    loaded = plate("stage", corners, (), 4e-3, 7850.0, "0.05 + 2*load.mass")
+    assert loaded["centre"] == alone["centre"]
+    assert loaded["inertia"] == alone["inertia"]
+    mass = affine(loaded["mass"])({"load.mass": 0.1})
+    assert mass == pytest.approx(affine(alone["mass"])({}) + 0.25, rel=1e-14)

@@ -510,6 +510,26 @@ CHANGES = {
         'inertia = 1e-6\nmaterial = "steel"',
         "anvil has mass and inertia and centre as well as material: give mass, inertia and centre,",
     ),
+    "mass and payload": (
+        "inertia = 1e-6",
+        "inertia = 1e-6\npayload = 1e-3",
+        "anvil has mass and inertia and centre as well as payload: give mass, inertia and centre,",
+    ),
+    "negative payload": (
+        ANVIL,
+        TRIANGLE.replace("thickness = 1e-3\n", 'thickness = 1e-3\npayload = "-5 g"\n'),
+        "anvil.payload = -0.005 kg must not be negative",
+    ),
+    "ground part of two corners": (
+        "[[bodies]]",
+        "[[ground_parts]]\noutline = [[0, 0], [1, 0]]\n\n[[bodies]]",
+        "ground_parts: write at least 3 corners",
+    ),
+    "ground part far away": (
+        "[[bodies]]",
+        "[[ground_parts]]\noutline = [[0, 0], [1, 0], [0, 1e9]]\n\n[[bodies]]",
+        "ground_parts is drawn at (0 m, 1e+09 m): draw the mechanism within 1000 m",
+    ),
     "plate without a thickness": (
         ANVIL,
         TRIANGLE.replace("thickness = 1e-3\n", ""),

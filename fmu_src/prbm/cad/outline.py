@@ -1,6 +1,6 @@
 """The outline of a mechanism as one plate: bodies, flexures, and pads where they meet."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 
@@ -28,6 +28,7 @@ SLOT_SHARE = 0.02  # at most this share of the size.
 OVERLAP_RTOL = 1e-6  # Overlap of parts that are joined, as a share of the size.
 AREA_RTOL = 1e-6  # Overlap of parts that are apart, as a share of the square of the size.
 STOP_SHARE = 0.05  # Length of the line of a stop.
+CORNERS_MIN = 3
 CURVE_POINTS = 161  # Points of an arc of a notch, or of a curved flexure.
 SAME_RTOL = 1e-9  # Points nearer than this share of the length coincide.
 CONTACT_MIN = 0.99  # Share of the end of a flexure that lies on its body.
@@ -184,20 +185,22 @@ class _Plate:
         return min(SLOT_THICKNESSES * float(strip.thickness.max()), SLOT_SHARE * self.size)
 
     def _bodies(self) -> dict[str, BaseGeometry]:
-        """Return the bodies with pads, and the ground as pads."""
-        parts: dict[str, list[BaseGeometry]] = {GROUND: []}
+        """Return the bodies and the ground, with pads where their outlines end."""
+        parts: dict[str, list[BaseGeometry]] = {
+            GROUND: [_area(GROUND, rings) for rings in self.shapes.ground_areas]
+        }
         for body in self.mechanism.bodies:
             rings = self.shapes.areas(body.name, self.shapes.straight)
-            shape = shapely.Polygon(_pairs(rings[0]), [_pairs(hole) for hole in rings[1:]])
-            parts[body.name] = [shape]
+            parts[body.name] = [_area(body.name, rings)]
         drawn = {body.name: bool(body.outline) for body in self.mechanism.bodies}
+        drawn[GROUND] = bool(self.shapes.ground_areas)
         for strip in self.strips:
             for owner, z, out, thickness in strip.ends():
                 half = 0.5j * thickness * out
                 edge = shapely.LineString(_pairs(np.array([z - half, z + half])))
                 known = shapely.unary_union(parts[owner]).buffer(OVERLAP_RTOL * self.size)
                 inside = edge.intersection(known).length >= CONTACT_MIN * edge.length
-                if owner == GROUND or not (drawn[owner] and inside):
+                if not (drawn[owner] and inside):
                     size = max(PAD_SHARE * self.size, PAD_THICKNESSES * thickness)
                     size = max(size, thickness + 2.0 * self._slot(strip))
                     if owner != GROUND:
@@ -264,6 +267,18 @@ def _pad(z: complex, out: complex, size: float) -> shapely.Polygon:
     across = 0.5j * size * out
     return _polygon(
         np.array([z - across, z + across, z + across + size * out, z - across + size * out])
+    )
+
+
+def _area(owner: str, rings: Sequence[Complex]) -> shapely.Polygon:
+    """Return the area of a part; reject an outline without an area."""
+    if min(map(len, rings)) >= CORNERS_MIN:
+        area = shapely.Polygon(_pairs(rings[0]), [_pairs(hole) for hole in rings[1:]])
+        if area.is_valid:
+            return area
+    raise MechanismError(
+        f"the outline of {owner} crosses or touches itself, or has fewer than {CORNERS_MIN} "
+        "corners, or a hole is not inside it: it cannot be cut from a plate; correct the outline"
     )
 
 

@@ -86,17 +86,21 @@ class _Writer:
         yield ""
         yield f'name = "{h.name}"'
         yield f'title = "{h.title}"'
+        yield "# damping_zeta = 0.002  # of the first mode; without damping nothing settles"
         yield ""
         yield "[[materials]]"
         yield f'name = "{h.material.name}"'
         yield f'youngs_modulus = "{h.material.youngs_modulus}"'
         yield f'density = "{h.material.density}"'
+        yield '# yield_strength = "... MPa"  # for safety factors'
         for kind in self.draft.kinds:
             yield ""
             yield from self._kind(kind)
         yield ""
         yield "[ground]"
         yield from self._points({*self.draft.found.ground})
+        for k in sorted(self.draft.found.ground):
+            yield from self._ground_part(k)
         for body in self.draft.bodies:
             yield ""
             yield from self._body(body)
@@ -230,13 +234,7 @@ class _Writer:
         yield f'name = "{copied.name}"'
         if len(parts) > 1:
             yield from self._bolted(parts)
-        outline, holes = self.rings(max(parts, key=lambda part: part.area))
-        yield from self._ring("outline = ", outline, "")
-        if holes:
-            yield "holes = ["
-            for hole in holes:
-                yield from self._ring("    ", hole, ",")
-            yield "]"
+        yield from self._rings(max(parts, key=lambda part: part.area))
         if len(parts) == 1:
             yield f"thickness = {self.unit.text(self.heading.thickness, 0.0)}"
             yield f'material = "{self.heading.material.name}"'
@@ -246,6 +244,22 @@ class _Writer:
             yield ""
             yield "[bodies.points]"
             yield from points
+
+    def _ground_part(self, index: int) -> Iterator[str]:
+        """Yield the outlines of a fixed body, for pictures and drawings."""
+        for part in shapely.get_parts(self.draft.found.bodies[index]):
+            yield from ("", "[[ground_parts]]")
+            yield from self._rings(part)
+
+    def _rings(self, part: shapely.Polygon) -> Iterator[str]:
+        """Yield the outline and the holes of a part."""
+        outline, holes = self.rings(part)
+        yield from self._ring("outline = ", outline, "")
+        if holes:
+            yield "holes = ["
+            for hole in holes:
+                yield from self._ring("    ", hole, ",")
+            yield "]"
 
     def _bolted(self, parts: Sequence[shapely.Polygon]) -> Iterator[str]:
         """Yield mass, inertia and centre of parts of several plates, with their outline drawn."""

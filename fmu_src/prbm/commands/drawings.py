@@ -14,6 +14,8 @@ from ..files.mechanism_file import load
 from ..files.settings import UserMistake, settings
 from ..plots.drawing_check import check_picture, flexure_names
 
+NOT_DRAWN = "masses, damping, strengths and contact laws are in the mechanism file only"
+
 
 def import_file(options: argparse.Namespace) -> None:
     """Write the mechanism file of a drawing, and a picture to check it."""
@@ -49,7 +51,7 @@ def export_file(options: argparse.Namespace) -> None:
     _check_new(path, options.overwrite)
     drawn = outline(mechanism, settings(mechanism, options.set))
     write(path, dxf(drawn))
-    for note in drawn.notes:
+    for note in (*drawn.notes, NOT_DRAWN):
         print(f"note: {note}")
     print(path)
 

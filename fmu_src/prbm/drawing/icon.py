@@ -52,6 +52,7 @@ STYLES = {
     "spring": Style(3.1, STEEL, 0.9),
     "profile": Style(1.0, STEEL, fill=BODY),
     "body": Style(2.0, STEEL, fill=BODY),
+    "fixed": Style(-1.0, WALL, 0.7, fill="#dedede"),
     "centre": Style(4.0, STEEL, fill=STEEL, diameter=3.5),
     "pin": Style(5.0, STEEL, fill="#ffffff", diameter=4.5),
     "ground": Style(3.2, WALL),
@@ -177,6 +178,8 @@ def _parts(shapes: Shapes, E: Complex) -> Iterator[Part]:
 
 def _fixed_parts(shapes: Shapes, E: Complex) -> Iterator[Part]:
     """Yield the ground and the walls."""
+    for rings in shapes.ground_areas:
+        yield Area("fixed", rings)
     for ground in shapes.ground():
         yield Line("ground", ground)
     for i, stop in enumerate(shapes.system.mechanism.stops):

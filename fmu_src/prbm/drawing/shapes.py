@@ -260,6 +260,11 @@ class Shapes:
     ----------
     system : System
         The mechanism.
+
+    Attributes
+    ----------
+    ground_areas : list of list of complex arrays
+        Corners of each part of the ground, counter-clockwise, and of its holes, clockwise [m].
     """
 
     def __init__(self, system: System) -> None:
@@ -272,6 +277,10 @@ class Shapes:
         self.hits = [self._hit(stop) for stop in system.mechanism.stops]
         self.bodies = {name: self._body(name) for name in system.bodies}
         self.holes = {name: self._holes(name) for name in system.bodies}
+        self.ground_areas = [
+            [self._ring(part.outline), *(self._ring(hole)[::-1] for hole in part.holes)]
+            for part in system.mechanism.ground_parts
+        ]
 
     def arms(self, q: Real) -> Complex:
         """Return the arms E of a shape; entries at stretches are undefined and have no effect."""
@@ -334,9 +343,13 @@ class Shapes:
 
     def _reach(self, name: str, drawn: Sequence[Point]) -> Complex:
         """Return corners about the centre of mass of a body, counter-clockwise [m]."""
+        return self._ring(drawn) - self.system.bodies[name].drawn
+
+    def _ring(self, drawn: Sequence[Point]) -> Complex:
+        """Return corners, counter-clockwise [m]."""
         z = np.array([complex(self._number(x), self._number(y)) for x, y in drawn])
-        z -= self.system.bodies[name].drawn
-        return z if float((z.conj() * np.roll(z, -1)).imag.sum()) > 0.0 else z[::-1]
+        about = z - z[0]
+        return z if float((about.conj() * np.roll(about, -1)).imag.sum()) > 0.0 else z[::-1]
 
     def carried(self, body: str, drawn: complex, E: Complex) -> complex:
         """Return the position in a shape of a drawn point of a body or of the ground [m]."""

@@ -17,6 +17,7 @@ from matplotlib.rcsetup import cycler
 from ..mechanics.arrays import Complex
 
 LINK, FLEXURE, BODY, WALL = "#1f4e79", "#8fb4d8", "#9dc3e6", "#595959"
+GROUND_COLOUR = "#dedede"
 STRAIGHT, GRID, PROBE = "#b4bcc6", "#eeeeee", "#cc79a7"
 PAST, FUTURE, IMPACT, REST = "#1f4e79", "#c8ced6", "#d55e00", "#009e73"
 

@@ -41,6 +41,8 @@ def check_drawing(mechanism: Mechanism) -> None:
 def _places(mechanism: Mechanism) -> Iterator[tuple[str, Point]]:
     """Yield the names and coordinates of all drawn points."""
     yield from ((f"{GROUND}.{name}", point) for name, point in mechanism.ground.items())
+    for part in mechanism.ground_parts:
+        yield from (("ground_parts", corner) for corner in part.outline)
     for body in mechanism.bodies:
         yield f"{body.name}.centre", body.centre
         yield from ((f"{body.name}.{name}", point) for name, point in body.points.items())

@@ -13,6 +13,7 @@ from ..mechanism.expressions import Affine, Quantity, affine
 from ..mechanism.parts import Point
 from .images import same, written
 
+CORNERS_MIN = 3
 CORNERS_MAX = 1000  # Corners of an outline; every pair of its sides is checked.
 LENGTH_MIN = 1e-60  # m; the fourth powers of shorter lengths lose digits.
 TOUCHING_RTOL = 1e-9  # Sides that are nearer than this share of the size of an outline touch.
@@ -75,6 +76,7 @@ def plate(
     holes: Sequence[Sequence[Point]],
     thickness: float,
     density: Quantity,
+    payload: Quantity = 0.0,
 ) -> dict[str, Quantity | Point]:
     """Return mass, inertia and centre of a body that is cut from a plate.
 
@@ -90,11 +92,14 @@ def plate(
         Thickness of the plate, across the plane of motion [m].
     density : Quantity
         Density [kg/m^3].
+    payload : Quantity
+        Mass of a point that is added at the centre of mass [kg].
 
     Returns
     -------
     dict
-        ``mass`` [kg] and ``inertia`` [kg m^2] in proportion to the density, and ``centre`` [m].
+        ``mass`` [kg], that of the plate in proportion to the density, ``inertia`` [kg m^2] in
+        proportion to it, and ``centre`` [m].
 
     Raises
     ------
@@ -124,7 +129,7 @@ def plate(
     x, y = (written(affine(c).plus(Affine(offset))) for c, offset in parts)
     per_density = affine(density).scaled(thickness)
     return {
-        "mass": written(per_density.scaled(total.area)),
+        "mass": written(per_density.scaled(total.area).plus(affine(payload))),
         "inertia": written(per_density.scaled(total.moment)),
         "centre": (x, y),
     }
@@ -141,9 +146,10 @@ def mean(corners: Sequence[Point]) -> Point:
 
 def _shape(key: str, corners: Sequence[Point], origin: Point) -> Complex:
     """Return the corners of a simple polygon relative to a point [m]; reject other ones."""
-    if not 3 <= len(corners) <= CORNERS_MAX:
+    if not CORNERS_MIN <= len(corners) <= CORNERS_MAX:
         raise MechanismError(
-            f"{key} has {len(corners)} corners: write 3 to {CORNERS_MAX} corners, [x, y] each"
+            f"{key} has {len(corners)} corners: write {CORNERS_MIN} to {CORNERS_MAX} corners, [x, "
+            "y] each"
         )
     relative = []
     for corner in corners:

@@ -57,7 +57,7 @@ from .copies import (
     origins,
 )
 from .drawn import check_drawing
-from .outlines import mean, plate
+from .outlines import CORNERS_MIN, mean, plate
 from .settings import has_unit, is_tolerance, tolerance
 from .tables import STRENGTHS, MaterialTable, Named, ParameterTable, RepeatTable, Table
 from .units import check_coherent, contact_stiffness
@@ -80,7 +80,8 @@ from .values import (
 )
 
 GIVEN = ("mass", "inertia", "centre")
-PLATE = ("thickness", "material", "density")
+PLATE = ("thickness", "material", "density", "payload")
+PAYLOAD = Measured("Mass added at the plate's centre of mass", "kg", 0.0, 1e6)
 MATERIAL = ("youngs_modulus", "density")
 SECTION = ("thickness", "width")
 PROFILE = (
@@ -192,6 +193,15 @@ _NOT_GIVEN_TWICE: list[Any] = [
 ]
 
 
+class GroundPartTable(Table):
+    """A fixed part, for pictures and drawings only."""
+
+    outline: tuple[Point, ...] = Field(description="Corners in order as drawn [m]")
+    holes: tuple[tuple[Point, ...], ...] = Field(
+        (), description="Corners of each hole in the outline [m]"
+    )
+
+
 class BodyTable(Named):
     """A rigid body, with mass, inertia and centre, or cut from a plate."""
 
@@ -221,6 +231,7 @@ class BodyTable(Named):
         None, description="Name of the material of the plate, in place of density"
     )
     density: Annotated[Quantity, measured(parts.FlexureType, "density")] | None = None
+    payload: Annotated[Quantity, PAYLOAD] | None = None
     mirror: LineOrLines = mirror_key()
     repeat: RepeatTable | None = repeat_key()
 
@@ -330,6 +341,9 @@ class MechanismTable(Table):
         (), description="Parameters for points and other quantities"
     )
     materials: tuple[MaterialTable, ...] = Field((), description="Materials")
+    ground_parts: tuple[GroundPartTable, ...] = Field(
+        (), description="Outlines of fixed parts, for pictures and drawings only"
+    )
     bodies: tuple[BodyTable, ...] = Field(description="Rigid bodies")
     flexure_types: tuple[FlexureTypeTable, ...] = Field(
         (), description="Sections, materials and models that several flexures share"
@@ -364,6 +378,9 @@ def mechanism(file: MechanismTable, drawing: str = "") -> Mechanism:
         If a default is outside its bounds.
     """
     _check_names(file)
+    for part in file.ground_parts:
+        if min(map(len, (part.outline, *part.holes))) < CORNERS_MIN:
+            raise MechanismError(f"ground_parts: write at least {CORNERS_MIN} corners, [x, y] each")
     materials = _materials(file)
     misshapen: list[MechanismError] = []
     bodies = copied_bodies(file.bodies, [_body(t, materials, misshapen) for t in file.bodies])
@@ -413,6 +430,7 @@ def _assembled(
         release=_release(file.release, points),
         geometry=tuple(_parameters(file)),
         drawing=drawing,
+        ground_parts=tuple(parts.GroundPart(t.outline, t.holes) for t in file.ground_parts),
     )
 
 
@@ -557,7 +575,8 @@ def _body(
     if given and cut:
         raise MechanismError(
             f"{table.name} has {' and '.join(given)} as well as {' and '.join(cut)}: give mass, "
-            "inertia and centre, or outline, thickness and material (or density)"
+            "inertia and centre, or outline, thickness and material (or density); what a plate "
+            "carries is its payload"
         )
     if not cut:
         for key in GIVEN:
@@ -579,8 +598,11 @@ def _body(
         f"{table.name}.thickness", table.thickness, "m", "", LENGTH_MIN, LENGTH_MAX
     )
     density = _density(table, materials)
+    payload = 0.0 if table.payload is None else table.payload
+    if not isinstance(payload, str) and payload < 0.0:
+        raise MechanismError(f"{table.name}.payload = {payload:g} kg must not be negative")
     try:
-        computed: Any = plate(table.name, outline, holes, table.thickness, density)
+        computed: Any = plate(table.name, outline, holes, table.thickness, density, payload)
     except MechanismError as error:
         misshapen.append(error)
         computed = {"mass": "1", "inertia": "1", "centre": mean(outline)}

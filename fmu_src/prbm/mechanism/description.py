@@ -54,6 +54,7 @@ from .parts import (
     FlexureType,
     Force,
     Friction,
+    GroundPart,
     Guide,
     Joint,
     Part,
@@ -103,6 +104,8 @@ class Mechanism:
         Drawing of the mechanism in characters.
     tolerances : mapping
         Tolerances of parameters by name, which studies draw values from.
+    ground_parts : tuple of GroundPart
+        Fixed parts that are drawn; no result depends on them.
 
     Raises
     ------
@@ -133,6 +136,7 @@ class Mechanism:
     description: str = ""
     drawing: str = ""
     tolerances: Mapping[str, Tolerance] = field(default_factory=dict)
+    ground_parts: tuple[GroundPart, ...] = ()
 
     def __repr__(self) -> str:
         return f"<Mechanism {self.name}: {self.title}>"
@@ -573,6 +577,9 @@ class Mechanism:
         """Yield the names and values of all coordinates, coefficients and fields of parts."""
         for name, point in self.ground.items():
             yield from ((f"{GROUND}.{name}", c) for c in point)
+        for fixed in self.ground_parts:
+            rings = (fixed.outline, *fixed.holes)
+            yield from (("ground_parts", c) for ring in rings for corner in ring for c in corner)
         for body in self.bodies:
             for name, point in body.points.items():
                 yield from ((f"{body.name}.{name}", c) for c in point)

@@ -49,6 +49,22 @@ class Body:
 
 
 @dataclass(frozen=True)
+class GroundPart:
+    """A fixed part, for pictures and drawings only.
+
+    Parameters
+    ----------
+    outline : tuple of Point
+        Corners of the outline, in order [m].
+    holes : tuple of tuples of Point
+        Corners of the holes in the outline [m].
+    """
+
+    outline: tuple[Point, ...]
+    holes: tuple[tuple[Point, ...], ...] = ()
+
+
+@dataclass(frozen=True)
 class FlexureType:
     """Section, material and model of flexures.
 

@@ -19,6 +19,7 @@ from ..drawing.shapes import SPRING_WIDTH, Shapes, corners
 from ..drawing.style import (
     BODY,
     FLEXURE,
+    GROUND_COLOUR,
     IMPACT,
     LINK,
     PROBE,
@@ -95,7 +96,8 @@ def picture(
     if not 0 <= shown <= MODES_MAX:
         raise ParameterError(f"{shown} modes: choose a number from 0 to {MODES_MAX}")
     start, reason = _released(shapes)
-    z = np.concatenate([*_places(shapes, shapes.straight), *_walls(shapes)])
+    fixed = [*_walls(shapes), *(rings[0] for rings in shapes.ground_areas)]
+    z = np.concatenate([*_places(shapes, shapes.straight), *fixed])
     if start is not None:
         z = np.concatenate([z, *_places(shapes, start)])
     vibrating = _vibrating(shapes, held, loads) if shown else None
@@ -241,11 +243,11 @@ class Drawing:
             ha=ha, va=va, zorder=9, path_effects=[withStroke(linewidth=2.2, foreground="white")],
         )  # fmt: skip
 
-    def patch(self, rings: Sequence[Complex], color: str, zorder: float) -> None:
+    def patch(self, rings: Sequence[Complex], color: str, zorder: float, edge: str = LINK) -> None:
         """Draw an area, see :func:`prbm.drawing.style.area`."""
         self.axes.add_patch(
             PathPatch(
-                area(rings, self.factor), facecolor=color, edgecolor=LINK, linewidth=1.0,
+                area(rings, self.factor), facecolor=color, edgecolor=edge, linewidth=1.0,
                 alpha=0.9, joinstyle="round", zorder=zorder,
             )
         )  # fmt: skip
@@ -254,6 +256,7 @@ class Drawing:
 
     def ghost(self, E: Complex) -> None:
         """Draw a shape in dashed, pale lines."""
+        self.ground_areas()
         for ground in self.shapes.ground():
             self.line(ground, WALL, 0.9, 1.0)
         for line in self.shapes.flexures:
@@ -280,9 +283,15 @@ class Drawing:
         self.pivots(self.shapes.pins(E), 6.0, 5.0, 1.5)
         self.axes.autoscale_view()
 
+    def ground_areas(self) -> None:
+        """Draw the fixed parts."""
+        for rings in self.shapes.ground_areas:
+            self.patch(rings, GROUND_COLOUR, 0.2, WALL)
+
     def parts(self) -> None:
         """Draw the straight shape with all its parts and their names."""
         shapes, E = self.shapes, self.shapes.straight
+        self.ground_areas()
         for ground in shapes.ground():
             self.line(ground, WALL, 1.2, 3.2)
         self.shape(E, pivots=True)

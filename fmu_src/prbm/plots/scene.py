@@ -25,6 +25,7 @@ from ..drawing.style import (
     FLEXURE,
     FUTURE,
     GRID,
+    GROUND_COLOUR,
     IMPACT,
     LINK,
     PAST,
@@ -53,6 +54,7 @@ COLOURS = (
     FLEXURE,
     BODY,
     WALL,
+    GROUND_COLOUR,
     STRAIGHT,
     GRID,
     FUTURE,
@@ -149,6 +151,13 @@ class Scene:
         stage.set_xlabel(f"x [{self.unit}]", fontsize=9, labelpad=1)
         stage.set_ylabel(f"y [{self.unit}]", fontsize=9, labelpad=1)
         quiet(stage)
+        for rings in self.shapes.ground_areas:
+            stage.add_patch(
+                PathPatch(
+                    area(rings, self.factor), facecolor=GROUND_COLOUR,
+                    edgecolor=WALL, linewidth=1.0, zorder=0.2,
+                )
+            )  # fmt: skip
         for line in self.shapes.ground():
             self._line(line, WALL, 1.2, zorder=3.2)
         for flexure in self.shapes.flexures:
@@ -276,7 +285,7 @@ class Scene:
     def _set_limits(self) -> None:
         """Set limits of the axes that contain the whole film."""
         rows = np.unique(np.linspace(0, len(self.film.times) - 1, 60).astype(int))
-        places = []
+        places = [rings[0] for rings in self.shapes.ground_areas]
         for t in (self.film.times[0], self.film.times[-1], *self.film.times[rows]):
             q, walls = self.motion.shape(float(t))
             E = self.shapes.arms(q)

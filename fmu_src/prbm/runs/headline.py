@@ -18,6 +18,7 @@ from .struck import UNRELIABLE, first_rigid_impact, peak_before
 
 REST = "came to rest"
 SECONDS_MIN = 0.1  # Times of shorter runs are printed in ms or µs [s].
+UNDAMPED = "only impacts and friction take energy: damping_zeta or damping_beta damp the motion"
 
 
 def length(x: float, size: float) -> str:
@@ -154,7 +155,7 @@ def headline(
     lines += _stress(columns, mechanism, system.length)
     rests = any(line.startswith(REST) for line in lines)
     last = max((mark.time for mark in impacts), default=float(time[0]))
-    return [*lines, _settled(columns, span, rests, last)] if moving else lines
+    return [*lines, _settled(columns, span, rests, last, _damped(values))] if moving else lines
 
 
 def _in_impact(columns: Columns, stop: str) -> bool:
@@ -210,7 +211,12 @@ def stress_text(flexure: str, peak: float, strength: float | None, at: str = "")
     return f"stress in {flexure:10} {1e-6 * peak:.4g} MPa{at}{factor}"
 
 
-def _settled(columns: Columns, span: float, rests: bool, last: float) -> str:
+def _damped(values: Mapping[str, float]) -> bool:
+    """Return whether a flexure, a joint or a spring is damped."""
+    return any(x for name, x in values.items() if "damping" in name.split("."))
+
+
+def _settled(columns: Columns, span: float, rests: bool, last: float, damped: bool) -> str:
     """Return the line about the end of the motion.
 
     Parameters
@@ -223,12 +229,16 @@ def _settled(columns: Columns, span: float, rests: bool, last: float) -> str:
         Whether a body rests on a stop.
     last : float
         Time of the last impact, or of the start [s].
+    damped : bool
+        Whether the mechanism has damping.
     """
     for name in (KINETIC, FREQUENCY):
         column(columns, name)  # Raises an error if it is missing.
     when = settling(columns)
     vibrates = bool(column(columns, FREQUENCY).any())
-    expected = _expected(settling_estimate(columns, last), vibrates)
+    estimate = settling_estimate(columns, last)
+    undamped = not damped and not math.isfinite(estimate)
+    expected = UNDAMPED if undamped else _expected(estimate, vibrates)
     if math.isnan(when) and rests:
         return (
             "settled              not yet: a body rests on its stop, but the mechanism still "

@@ -18,6 +18,7 @@ from ...mechanism.flexure import BEAM, LEAF, PIN
 from ...mechanism.parts import (
     Flexure,
     FlexureType,
+    GroundPart,
     Guide,
     Joint,
     Part,
@@ -90,6 +91,7 @@ def content(
             }
             for body in mechanism.bodies
         ],
+        "groundParts": [_rings(part) for part in mechanism.ground_parts],
         "flexures": _flexures(mechanism, system),
         "joints": [
             {"name": joint.name, "ends": _ends(mechanism, joint)} for joint in mechanism.joints
@@ -193,6 +195,10 @@ def _point(point: Point) -> Json:
     return [_expression(coordinate) for coordinate in point]
 
 
+def _rings(part: GroundPart) -> Json:
+    return [[_point(corner) for corner in ring] for ring in (part.outline, *part.holes)]
+
+
 def _given(part: Part, name: str) -> str | None:
     """Return the parameter of a field; None if the field is an expression."""
     return None if isinstance(getattr(part, name), str) else f"{part.name}.{name}"
@@ -234,6 +240,7 @@ def _expressions(mechanism: Mechanism) -> str:
         "frictions",
         "forces",
         "ground",
+        "ground_parts",
         "release",
     )
     return " ".join(repr(getattr(mechanism, part)) for part in parts)

@@ -65,6 +65,7 @@ class Stage {
     this.walls = stops.map(() => add("walls", "path", { class: "wall" }));
     this.hits = stops.map(() => add("marks", "circle", { class: "hit", r: 3 }));
     this.flashes = stops.map(() => add("marks", "circle", { class: "flash", r: 0 }));
+    this.fixed = add("ground", "path", { class: "fixed" });
     this.ground = add("ground", "path", { class: "ground" });
     this.scale = add("scale", "path", { class: "scale" });
     this.scaleText = add("scale", "text", { class: "scale-text", "text-anchor": "middle" });
@@ -154,7 +155,9 @@ class Stage {
     if (this.bounds && this.holding) {
       return; // The drawing keeps its scale below a pointer.
     }
-    const points = [];
+    const points = this.description.groundParts.flatMap(([outline]) =>
+      outline.map((corner) => pointOf(corner, shapes.values)),
+    );
     const every = Math.max(1, Math.floor(run.count / BOUND_SHAPES));
     for (let row = 0; row < run.count; row += every) {
       const shape = shapes.at(run.node(row).q);
@@ -285,6 +288,10 @@ class Stage {
       });
     }
     this.ground.setAttribute("d", parts.join(""));
+    const rings = this.description.groundParts
+      .flat()
+      .map((ring) => `${this.path(ring.map((corner) => pointOf(corner, shapes.values)))}Z`);
+    this.fixed.setAttribute("d", rings.join(""));
     this.drawScale(width, height);
   }
 

@@ -14,6 +14,7 @@ from ...mechanism.parts import (
     FlexureType,
     Force,
     Friction,
+    GroundPart,
     Guide,
     Joint,
     Probe,
@@ -35,6 +36,7 @@ PARTS: dict[str, Callable[..., Any]] = {
     "forces": Force,
     "probes": Probe,
     "geometry": Parameter,
+    "ground_parts": GroundPart,
 }
 EMPTY: dict[str, Any] = {"Real": float("nan"), "Integer": 0, "Boolean": False, "String": ""}
 
