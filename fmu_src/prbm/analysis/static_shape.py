@@ -259,7 +259,7 @@ def holding_curve(
     Examples
     --------
     >>> import prbm
-    >>> found = prbm.holding_curve(prbm.load("Bistable"), start="-12 mm", end="12 mm", points=25)
+    >>> found = prbm.holding_curve(prbm.load("Bistable"), start=0.0, end="26 mm", points=27)
     >>> [rest.stable for rest in found.rests]
     [True, False, True]
     """
