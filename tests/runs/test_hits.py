@@ -9,6 +9,7 @@ import pytest
 from point_mass import point_mass
 from prbm.runs.headline import headline
 from prbm.runs.hits import HITS_MAX, hits
+from prbm.runs.marks import marks
 from prbm.runs.run import simulate
 
 MASS, STIFFNESS, SPEED, FORCE = 2.0, 8e5, 0.5, 400.0
@@ -57,3 +58,17 @@ def test_a_mass_on_a_compliant_stop_comes_to_rest():
     result = run(0.1, restitution=0.1, stiffness=STIFFNESS)
     lines = headline(result, result.mechanism, result.start_values)
     assert [line for line in lines if line.startswith("came to rest")]
+
+
+@pytest.mark.parametrize("step", [1e-3, 2e-2])
+def test_columns_alone_have_the_peak_forces_of_the_impacts(step):
+    """Contacts of 5 ms: some rows lie within a contact; with the longer step none does."""
+    guide = point_mass(
+        mass=MASS, velocity=SPEED, displacement=-1e-6, restitution=0.8, stiffness=STIFFNESS
+    )
+    result = simulate(guide, inputs={"push.x": FORCE / 20}, stop_time=0.4, step=step)
+    known = {mark.count: mark for mark in marks(result, guide)}
+    found = marks(result.columns, guide)
+    assert len(found) > 2
+    for mark in found[:-1]:  # The last one may not have ended.
+        assert mark.force == pytest.approx(known[mark.count].force, rel=1e-12)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -26,8 +27,7 @@ class Mark:
     count : int
         Number of impacts at the stop, including this one.
     force : float
-        Peak force of the hit [N]; 0 at a rigid stop, and if only columns are known, whose row of
-        the impact is before the peak.
+        Peak force of the hit [N]; 0 at a rigid stop, or if it is not recorded.
     """
 
     stop: int
@@ -94,6 +94,12 @@ def _latched(i: int, columns: Columns, mechanism: Mechanism) -> Iterator[Mark]:
     count, when, speed = (columns[name] for name in needed)
     opening = f"{stop}.rebound_speed"
     rebound = columns[opening] if opening in names(columns) else np.full(len(columns), np.nan)
-    for row in np.flatnonzero(np.diff(count, prepend=0) > 0):
+    peak = f"{stop}.peak_force"
+    force = columns[peak] if peak in names(columns) else np.zeros(len(columns))
+    rows = np.flatnonzero(np.diff(count, prepend=0) > 0)
+    for row, following in pairwise([*rows.tolist(), len(columns)]):
         if columns["time"][0] <= when[row] <= columns["time"][-1]:
-            yield Mark(i, float(when[row]), float(speed[row]), float(rebound[row]), int(count[row]))
+            largest = float(force[row:following].max())  # The row of the impact is before the peak.
+            yield Mark(
+                i, float(when[row]), float(speed[row]), float(rebound[row]), int(count[row]), largest
+            )
