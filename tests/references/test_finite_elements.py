@@ -315,7 +315,9 @@ def test_beams_that_are_curved_or_have_a_profile_are_rejected(name):
         FiniteElements(mechanism(name), elements=2)
 
 
-@pytest.mark.parametrize("name", sorted(set(shipped()) - set(PROFILED) - {"SliderCrank"}))
+@pytest.mark.parametrize(
+    "name", sorted(set(shipped()) - set(PROFILED) - {"SliderCrank", "ToggleLatch"})
+)
 def test_elements_and_model_agree_for_every_shipped_mechanism(name):
     """The fundamental frequencies at rest agree to 2.5 %."""
     parts = mechanism(name)

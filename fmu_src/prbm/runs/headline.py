@@ -237,7 +237,7 @@ def _settled(columns: Columns, span: float, rests: bool, last: float, damped: bo
     when = settling(columns)
     vibrates = bool(column(columns, FREQUENCY).any())
     estimate = settling_estimate(columns, last)
-    undamped = not damped and not math.isfinite(estimate)
+    undamped = vibrates and not damped and not math.isfinite(estimate)
     expected = UNDAMPED if undamped else _expected(estimate, vibrates)
     if math.isnan(when) and rests:
         return (

@@ -99,7 +99,12 @@ def _latched(i: int, columns: Columns, mechanism: Mechanism) -> Iterator[Mark]:
     rows = np.flatnonzero(np.diff(count, prepend=0) > 0)
     for row, following in pairwise([*rows.tolist(), len(columns)]):
         if columns["time"][0] <= when[row] <= columns["time"][-1]:
-            largest = float(force[row:following].max())  # The row of the impact is before the peak.
+            largest = float(force[row:following].max())  # The peak is after the first row.
             yield Mark(
-                i, float(when[row]), float(speed[row]), float(rebound[row]), int(count[row]), largest
+                i,
+                float(when[row]),
+                float(speed[row]),
+                float(rebound[row]),
+                int(count[row]),
+                largest,
             )
