@@ -100,11 +100,5 @@ def _latched(i: int, columns: Columns, mechanism: Mechanism) -> Iterator[Mark]:
     for row, following in pairwise([*rows.tolist(), len(columns)]):
         if columns["time"][0] <= when[row] <= columns["time"][-1]:
             largest = float(force[row:following].max())  # The peak is after the first row.
-            yield Mark(
-                i,
-                float(when[row]),
-                float(speed[row]),
-                float(rebound[row]),
-                int(count[row]),
-                largest,
-            )
+            numbers = float(when[row]), float(speed[row]), float(rebound[row]), int(count[row])
+            yield Mark(i, *numbers, largest)
