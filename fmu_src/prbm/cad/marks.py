@@ -188,7 +188,7 @@ def _stop(found: Recognised, lines: Sequence[Complex], used: set[int]) -> FoundS
     others = [k for k in moving if k != on]
     if on >= 0 and not others:  # The wall touches the body that hits it: the gap is zero.
         others, on = [on], -1
-    if not others or distances[others[0]] > NEAR_SHARE * size or wall.geom_type == "Point":
+    if not others or distances[others[0]] > NEAR_SHARE * size or not wall.length > 0.0:
         return None
     body = others[0]
     start, along, length = _face(found.bodies[body], wall, lines, TOUCHING_SHARE * size)

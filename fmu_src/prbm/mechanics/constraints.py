@@ -6,6 +6,7 @@ Sources
 .. [2] N. J. Higham, Accuracy and Stability of Numerical Algorithms, SIAM, 2002, section 9.4.
 """
 
+import math
 from contextlib import suppress
 from functools import cache
 from types import ModuleType
@@ -286,6 +287,7 @@ def satisfied(residual: Real, length: float) -> bool:
     return not len(residual) or float(np.abs(residual).max()) <= CONSTRAINT_RTOL * length
 
 
+@np.errstate(over="ignore", invalid="ignore")  # Of an iteration that diverges.
 def project_positions(
     system: System, rows: Rows, q: Real, c: Real | None = None
 ) -> tuple[Real, Complex]:
@@ -325,6 +327,8 @@ def project_positions(
         stalled = CONSTRAINT_STALLED_RTOL * system.length >= best <= error
         if stalled or error <= CONSTRAINT_RTOL * system.length:
             return q, e
+        if not math.isfinite(error):
+            break
         best = min(best, error)
         G = rows.jacobian(e)
         right = np.zeros(n + len(rows))
