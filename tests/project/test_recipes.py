@@ -1,4 +1,4 @@
-"""The recipe of a flexure model in CONTRIBUTING.md, followed on a copy of the tree."""
+"""Recipes in CONTRIBUTING.md, followed on a copy of the tree."""
 
 import os
 import re
@@ -80,3 +80,46 @@ def test_a_flexure_model_is_added_by_its_recipe(tmp_path):
     changed(limits, '    "1R": (5.9, None),', before='    "4R": (100.0, 100.0),\n')
     changed(limits, '    "1R": (10.42,', before=f'    "4R": ({guide}),\n')
     assert " passed" in run(root, check)
+
+
+BODY_TEST = """
+import prbm
+
+guide = prbm.load("PRBDM2R")
+light = {name: 1.0 for name in guide.values() if name.endswith(".density")}
+result = prbm.simulate(guide, light, stop_time=0.02, engine=ENGINE)
+total, own = result["energy.kinetic"], result["shuttle.kinetic"]
+print(abs(total - own).max() < 1e-3 * total.max(), own.max() > 0.99 * total.max())
+"""
+
+
+@pytest.mark.slow
+def test_an_output_is_added_by_its_recipe(tmp_path):
+    """Engines, derivatives and FMUs agree, and the energy of the body is that of the motion."""
+    root, text = copied(tmp_path), recipe("An output")
+    blocks = [
+        textwrap.indent(textwrap.dedent(block), (len(block) - len(block.lstrip()) - 3) * " ")
+        for block in re.findall(r"   ```(?:python|c)\n(.*?)   ```", text, re.DOTALL)
+    ]
+    described, depends, computed, in_c, changes = blocks
+    package = root / "fmu_src" / "prbm"
+    variables = package / "interface" / "variables.py"
+    changed(variables, ')\nPROBE_OUTPUTS = ("x"', before=', "kinetic"')
+    changed(variables, "\n\ndef _stop(", before=described)
+    structure = package / "interface" / "structure.py"
+    changed(structure, "    for probe in (p.name for p in mech", before=depends)
+    outputs = package / "hybrid" / "outputs.py"
+    changed(outputs, "    for frame in system.probes:\n        place,", before=computed)
+    kernel = package / "kernel"
+    changed(kernel / "hybrid" / "outputs.c", "    }\n}\n\nstatic void output_probes", before=in_c)
+    changed(kernel / "tangent.c", "    }\n}\n\nstatic void probe_changes", before=changes)
+    names = root / "tests" / "fmu" / "test_fmu_interface.py"
+    changed(names, 'omega "\n    "stop.gap stop.gap_rate', before="kinetic shuttle.")
+    (commands,) = re.findall(COMMANDS, text, re.DOTALL)
+    header, *checks = commands.strip().splitlines()
+    run(root, header)
+    for engine in ("python", "kernel"):
+        script = BODY_TEST.replace("ENGINE", repr(engine))
+        assert run(root, f"python -c {shlex.quote(script)}").split() == ["True", "True"]
+    for check in checks:
+        assert " passed" in run(root, check)
