@@ -42,7 +42,7 @@ def resting(**stop):
     """Return a simulation of a body that a force of 1 N holds on the settled stop."""
     sim = Simulation(point_mass(velocity=0.0, **stop), {"push.x": 1.0})
     sim.advance(0.02)
-    assert sim.contacts.touching[0].phase is Phase.SETTLED
+    assert sim.contacts.touching[0].phase is Phase.FROZEN
     return sim
 
 
@@ -378,7 +378,7 @@ def test_a_vibration_below_the_speed_of_rest_settles_in_its_balance(restitution)
     sim.advance(0.45 * period)
     assert sim.contacts.touching[0].phase is Phase.PRESSED
     sim.advance(1.3 * period)
-    assert sim.contacts.touching[0].phase is Phase.SETTLED
+    assert sim.contacts.touching[0].phase is Phase.FROZEN
     out = sim.outputs()
     assert out["stop.gap"] == pytest.approx(-1e-7, rel=5e-3)
     assert out["stop.force"] == pytest.approx(1.0, rel=5e-3)
@@ -396,10 +396,10 @@ def test_a_settled_stop_is_released_when_its_force_changes():
     for force, settled in ((1.004, True), (1.05, False)):
         sim.set({"push.x": force})
         sim.advance(sim.time + 1e-7)
-        assert (sim.contacts.touching[0].phase is Phase.SETTLED) == settled
+        assert (sim.contacts.touching[0].phase is Phase.FROZEN) == settled
     gap = sim.outputs()["stop.gap"]
     sim.advance(sim.time + 0.01)
-    assert sim.contacts.touching[0].phase is Phase.SETTLED
+    assert sim.contacts.touching[0].phase is Phase.FROZEN
     out = sim.outputs()
     assert out["stop.force"] == pytest.approx(1.05, rel=1e-6)
     assert -out["stop.gap"] == pytest.approx(1.05e-7, rel=0.01)

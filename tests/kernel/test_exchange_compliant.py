@@ -21,7 +21,7 @@ INPUTS = {
 FRICTION = {"stop.friction": 0.3, "damping.zeta": 0.05}
 CONTACTS = [
     (phase, slides)
-    for phase in ("PRESSED", "RISING", "SETTLED")
+    for phase in ("PRESSED", "RISING", "FROZEN")
     for slides in (2, 1, -1, 0)
 ] + [("FREE", 2)]  # fmt: skip
 
@@ -38,7 +38,7 @@ def soft(name, stiffness, **changes):
 def test_directional_derivatives_in_contact_equal_differences(exponent, phase, slides):
     """The contact is pressed, rises, is free or settled, and slides, sticks or has no friction."""
     own = soft("PRBDM2R", 1e4 if exponent == 1.0 else 1e5, exponent=exponent, direction=10.0)
-    contact = constants()[f"PHASE_{phase}"], 0.7, 1e-4 if phase == "SETTLED" else 0.0
+    contact = constants()[f"PHASE_{phase}"], 0.7, 1e-4 if phase == "FROZEN" else 0.0
     assert_directional(own, FRICTION, INPUTS, (1, slides, 2), contact)
 
 
@@ -170,7 +170,7 @@ def test_a_resting_body_settles_and_is_pulled_off_in_model_exchange():
     for _, z in integrate(kernel, 0.45, h=1e-4, inputs=forces):
         assert (z > 0.0).all()
         phases.append(kernel.touching(0))
-    settled = constants()["PHASE_SETTLED"]
+    settled = constants()["PHASE_FROZEN"]
     assert settled in phases
     assert phases[-1] != settled or phases.count(settled) > 1
     assert kernel.get("stop.contact") == 1.0

@@ -57,7 +57,7 @@ from prbm.mechanics import (
 from prbm.mechanics import inputs as input_data
 from prbm.mechanics import start as starts
 from prbm.mechanics import system as system_arrays
-from prbm.mechanics.contact_state import ContactMode, ContactState, Phase, Touching
+from prbm.mechanics.contact_state import ContactMode, ContactPhase, ContactState, Phase
 from prbm.mechanism import flexure
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.expressions import Affine
@@ -1362,7 +1362,7 @@ class KernelEquations:
         self.inputs = structures()["Inputs"](
             self.arrays[0].ctypes.data, base, *(part.ctypes.data for part in self.arrays[1:])
         )
-        kind = structures()["Touching"]
+        kind = structures()["ContactPhase"]
         self.touching = (kind * max(len(contacts.touching), 1))()
         for to, one in zip(self.touching, contacts.touching, strict=False):
             if one:
@@ -1624,7 +1624,7 @@ def test_contact_forces_are_the_same(name):
 def test_equations_with_pressed_stops_are_the_same(phase, mode):
     """The wall gives way to the force, which has friction."""
     for system, ours, rng in systems("Soft", 3):
-        stops, q, contact = len(system.gaps), near_loops(system, rng), Touching(phase, 0.3)
+        stops, q, contact = len(system.gaps), near_loops(system, rng), ContactPhase(phase, 0.3)
         free = ContactState.free(stops, len(system.rubs))
         contacts = replace(free, touching=(contact,) + (None,) * (stops - 1)).with_mode(0, mode)
         inputs = random_inputs(system, system.directions(q), rng, 1.0)
@@ -1673,8 +1673,8 @@ def test_laws_of_compliant_stops_are_the_same():
         assert kernel().damping_factor(e) == pytest.approx(a, rel=1e-9)
         theirs = compliance.ComplianceLaw(10 ** rng.uniform(0, 9), n, a)
         mine = structures()["ComplianceLaw"](*theirs)
-        one = Touching(phase, 10 ** rng.uniform(-4, 1), 1e-6)
-        touching = structures()["Touching"](*astuple(one))
+        one = ContactPhase(phase, 10 ** rng.uniform(-4, 1), 1e-6)
+        touching = structures()["ContactPhase"](*astuple(one))
         d, rate = rng.normal() * 1e-4, rng.normal()
         pairs = [
             (kernel().elastic_force(mine, d), theirs.elastic_force(d)),

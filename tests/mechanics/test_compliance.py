@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from prbm.mechanics.compliance import ComplianceLaw, damping_factor
-from prbm.mechanics.contact_state import Phase, Touching
+from prbm.mechanics.contact_state import ContactPhase, Phase
 
 
 def work_ratio(a, e):
@@ -41,10 +41,10 @@ def test_the_factor_is_continuous_between_its_formulas(e):
 
 def test_the_phases_join_continuously():
     law = ComplianceLaw(1e6, 1.5, damping_factor(0.5))
-    pressed, d = Touching(Phase.PRESSED, 0.2), 1e-5
-    rising = law.force(Touching(Phase.RISING, 0.2), d, 0.3)
+    pressed, d = ContactPhase(Phase.PRESSED, 0.2), 1e-5
+    rising = law.force(ContactPhase(Phase.RISING, 0.2), d, 0.3)
     assert law.force(pressed, d, 0.2) == pytest.approx(rising, rel=1e-14)
-    free = law.force(Touching(Phase.FREE, 0.2), d, -0.3)
+    free = law.force(ContactPhase(Phase.FREE, 0.2), d, -0.3)
     assert law.force(pressed, d, -0.2 / law.damping) == pytest.approx(free, abs=1e-12)
 
 

@@ -68,7 +68,7 @@ REBOUND_RTOL = 1e-12  # Interval of s, the share of restitution, at which bisect
 # --- contact modes -----------------------------------------------------------------------------
 TOUCHING_RTOL = 1e-10  # Of the size: stops with smaller gaps join an impact at another stop.
 RELEASE_PENETRATION_RTOL = 1e-8  # Of the size: largest penetration of a wall at release.
-SETTLE_ITERATIONS_MAX = 10  # Choices of the modes of contacts and projections; two are usual.
+MODE_ITERATIONS_MAX = 10  # Choices of the modes of contacts and projections; two are usual.
 VANISHED_BOUNCE_RTOL = 1e-12  # Of the size: the height of a lower bounce is round-off.
 DEPENDENT_FRICTION_RTOL = 1e-4  # Of a contact's free mobility: if less, others carry its load.
 ZERO_RATE_RTOL = 1e-9  # Of the velocity scale: a slower rate is round-off.
@@ -98,8 +98,8 @@ DAMPING_BISECTIONS = 60  # Bisections of the factor of the damping.
 PHASE_RTOL = 1e-9  # Of the elastic force: excess of the damping at which a contact switches.
 REFERENCE_SPEED_RTOL = 1e-6  # Of the reference speed: excess of the rate at which it rises.
 FIRST_RISE_MAX = 1e-3  # Of the reference speed: rise after first touch that is not integrated.
-SETTLED_FORCE_RTOL = 1e-2  # Of the elastic force: difference at which a settled stop is released.
-SETTLING_FACTOR = 0.5  # Of SETTLED_FORCE_RTOL: largest difference of a contact that settles.
+FROZEN_FORCE_RTOL = 1e-2  # Of the elastic force: difference at which a frozen stop is released.
+FREEZING_FACTOR = 0.5  # Of FROZEN_FORCE_RTOL: largest difference of a contact that freezes.
 TOUCH_STEP_FACTOR = 0.4  # Of the depth of a free hit over its speed: first step of a contact.
 TOUCH_STEP_CURVED_FACTOR = 0.05  # The same if the exponent is above 1: F is not smooth at d = 0.
 CONTACT_ERROR_FACTOR = 100.0  # Of the allowed error of a step: that of indentation and its rate.

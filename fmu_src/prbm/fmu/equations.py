@@ -56,7 +56,7 @@ STOP_LAWS = {
     f"<code>exponent</code>, {inline('epsilon')} the <code>restitution</code> of a point mass, and "
     f"{inline('v_0')} the largest closing speed of the contact so far, at least "
     "<code>rest_speed</code>. With friction at the stop, F is the normal force. A contact that "
-    "has settled holds like a rigid stop.</p>\n",
+    "has frozen holds like a rigid stop.</p>\n",
 }
 
 

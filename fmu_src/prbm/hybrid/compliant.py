@@ -1,8 +1,8 @@
-"""Contacts at compliant stops: first touch, phases, settling, separation, and their outputs.
+"""Contacts at compliant stops: first touch, phases, freezing, separation, and their outputs.
 
 The force is that of :mod:`prbm.mechanics.compliance`.  Its reference speed is the largest closing
 speed of the contact so far.  A contact ends when its gap opens, not when its force vanishes.  A
-contact that has become calm settles: its indentation is then constant, until the force of the
+contact that has become calm freezes: its indentation is then constant, until the force of the
 constraint differs from the elastic force.
 """
 
@@ -15,15 +15,15 @@ import numpy as np
 
 from ..base.tolerances import (
     FIRST_RISE_MAX,
+    FREEZING_FACTOR,
+    FROZEN_FORCE_RTOL,
     IMPACT_COUNT_MAX,
-    SETTLED_FORCE_RTOL,
-    SETTLING_FACTOR,
     TOUCH_STEP_CURVED_FACTOR,
     TOUCH_STEP_FACTOR,
 )
 from ..mechanics.arrays import Real
 from ..mechanics.compliant_stops import CompliantState
-from ..mechanics.contact_state import Phase, Touching
+from ..mechanics.contact_state import ContactPhase, Phase
 from ..mechanics.inputs import Wall
 from ..mechanics.kinetics import kinetic_energy
 from ..mechanics.modal import fundamental_at, modal_ratio
@@ -31,7 +31,7 @@ from . import contact_modes
 from .arc import Arc
 from .configuration import Configuration
 from .contact_peaks import check_depth, latched_until
-from .front import Front, Latched, Touch
+from .front import ContactStart, Front, Latched
 from .guards import StepView, fall_time, indentation
 from .records import Impact
 from .stepping import StepSizeController, rounded_step
@@ -39,7 +39,7 @@ from .stepping import StepSizeController, rounded_step
 # --- resets -----------------------------------------------------------------------------------
 
 
-def touch(configuration: Configuration, front: Front, stop: int) -> Front:
+def begin_contact(configuration: Configuration, front: Front, stop: int) -> Front:
     """Return the front after the first touch of a compliant stop."""
     _, rates = front.gaps_and_rates()
     speed = float(-rates[stop])
@@ -53,7 +53,7 @@ def touch(configuration: Configuration, front: Front, stop: int) -> Front:
             approach_speed=speed,
         )
         front = front.with_latched(stop, latched)
-    return contact_modes.settle(configuration, rephased(_raised(front, stop)))
+    return contact_modes.choose_modes(configuration, rephased(_raised(front, stop)))
 
 
 def _raised(front: Front, stop: int) -> Front:
@@ -75,7 +75,7 @@ def _raised(front: Front, stop: int) -> Front:
     rise = acceleration * depth * law.exponent / ((law.exponent + 1.0) * speed * speed)
     if rise > FIRST_RISE_MAX:
         return front
-    raised = Touching(Phase.PRESSED, speed * math.sqrt(1.0 + 2.0 * rise))
+    raised = ContactPhase(Phase.PRESSED, speed * math.sqrt(1.0 + 2.0 * rise))
     return front.with_contacts(front.contacts.with_touching(stop, raised))
 
 
@@ -97,16 +97,16 @@ def _touching(
 ) -> Front:
     """Return the front at the begin of a contact with a closing speed [m/s]."""
     least = max(configuration.stop_value(stop, "rest_speed"), configuration.scales.zero_speed)
-    begun = Touching(Phase.PRESSED, max(speed, least))
+    begun = ContactPhase(Phase.PRESSED, max(speed, least))
     momentum: tuple[float, ...] = ()
     if counted:
         phi, M = fundamental_at(configuration.system, front.q)
         momentum = tuple((M @ phi).tolist())
     own, extras = front.equations.compliant, front.extras
     front = front.with_contacts(front.contacts.with_touching(stop, begun))
-    return front.with_touch(
+    return front.with_start(
         stop,
-        Touch(
+        ContactStart(
             front.time,
             counted,
             float(extras[own.index(stop, CompliantState.IMPULSE)]),
@@ -135,15 +135,15 @@ def switch(configuration: Configuration, front: Front, stop: int) -> Front:
         phase = Phase.FREE if touching.phase is Phase.PRESSED else Phase.PRESSED
         rises = touching.phase is Phase.RISING
         speed = max(touching.reference_speed, rate) if rises else touching.reference_speed
-        front = front.with_contacts(front.contacts.with_touching(stop, Touching(phase, speed)))
-    return contact_modes.settle(configuration, front)
+        front = front.with_contacts(front.contacts.with_touching(stop, ContactPhase(phase, speed)))
+    return contact_modes.choose_modes(configuration, front)
 
 
 def separate(configuration: Configuration, front: Front, stop: int) -> tuple[Front, list[Impact]]:
     """Return the front after the end of the contact at a compliant stop, and its record."""
     front, impacts = _finished(configuration, front, stop)
-    front = front.with_contacts(front.contacts.with_touching(stop, None)).with_touch(stop, None)
-    return contact_modes.settle(configuration, front), impacts
+    front = front.with_contacts(front.contacts.with_touching(stop, None)).with_start(stop, None)
+    return contact_modes.choose_modes(configuration, front), impacts
 
 
 def rephased(front: Front) -> Front:
@@ -157,13 +157,13 @@ def rephased(front: Front) -> Front:
         touching, rate = front.contacts.touching[i], float(-rates[i])
         assert touching is not None
         speed, phase = max(touching.reference_speed, rate), Phase.PRESSED
-        begun = Touching(phase, speed)
+        begun = ContactPhase(phase, speed)
         if rate >= touching.reference_speed:
-            rising = front.contacts.with_touching(i, Touching(Phase.RISING, speed))
+            rising = front.contacts.with_touching(i, ContactPhase(Phase.RISING, speed))
             if _acceleration(front.with_contacts(rising), i) > 0.0:
-                begun = Touching(Phase.RISING, speed)
+                begun = ContactPhase(Phase.RISING, speed)
         elif front.equations.compliant.laws[i].damping_ratio(begun, rate) < 0.0:
-            begun = Touching(Phase.FREE, speed)
+            begun = ContactPhase(Phase.FREE, speed)
         front = front.with_contacts(front.contacts.with_touching(i, begun))
     return front
 
@@ -175,15 +175,15 @@ def _acceleration(front: Front, stop: int) -> float:
     return -float(accelerations[stop])
 
 
-def unsettled(front: Front) -> Front:
-    """Return the front in which settled stops are pressed, before impulses act."""
+def unfrozen(front: Front) -> Front:
+    """Return the front in which frozen stops are pressed, before impulses act."""
     contacts = front.contacts
     for i in contacts.held:
         contacts = contacts.released(i) if contacts.touching[i] else contacts
     return front.with_contacts(contacts)
 
 
-# --- settling ---------------------------------------------------------------------------------
+# --- freezing ---------------------------------------------------------------------------------
 
 
 class Rest(NamedTuple):
@@ -208,15 +208,15 @@ class Rest(NamedTuple):
 
     @property
     def balanced(self) -> bool:
-        """Whether the contact can settle: the constraint is released at twice this difference."""
-        limit = SETTLING_FACTOR * SETTLED_FORCE_RTOL * self.elastic
+        """Whether the contact can freeze: the constraint is released at twice this difference."""
+        limit = FREEZING_FACTOR * FROZEN_FORCE_RTOL * self.elastic
         return abs(self.force - self.elastic) <= limit
 
 
-def settled(
+def frozen(
     configuration: Configuration, front: Front, arc: Arc | None
 ) -> tuple[Front, list[Impact], dict[int, float]]:
-    """Return the front in which contacts that have been calm for a contact time are settled.
+    """Return the front in which contacts that have been calm for a contact time are frozen.
 
     Its outputs have the maxima up to the end of the step that leads to it.  The mapping has the
     indentations [m] at which the other calm contacts would be in balance: a step ends there.
@@ -229,7 +229,7 @@ def settled(
         assert touch is not None
         since = (front.time if touch.calm_since is None else touch.calm_since) if rest else None
         if since != touch.calm_since:
-            front = front.with_touch(i, replace(touch, calm_since=since))
+            front = front.with_start(i, replace(touch, calm_since=since))
         if rest is None or since is None or front.time - since < rest.time:
             continue
         if rest.balanced:
@@ -253,7 +253,7 @@ def _calm(configuration: Configuration, front: Front, stop: int) -> Rest | None:
     least = configuration.stop_value(stop, "rest_speed")
     if touching.phase is Phase.FREE or depth <= 0.0 or abs(rate) >= least or _stuck(front, stop):
         return None
-    held = replace(touching, phase=Phase.SETTLED, depth=depth)
+    held = replace(touching, phase=Phase.FROZEN, depth=depth)
     # The displacement of the wall by the contact becomes part of its motion.
     folded, walls = fold_gives(front, (stop,))
     rest = folded.with_walls(walls).with_contacts(front.contacts.with_touching(stop, held))
@@ -285,7 +285,7 @@ def _stuck(front: Front, stop: int) -> bool:
 def _settled(
     configuration: Configuration, front: Front, stop: int, rest: Rest
 ) -> tuple[Front, list[Impact]]:
-    """Return the front in which a contact is settled; its kinetic energy is a loss."""
+    """Return the front in which a contact is frozen; its kinetic energy is a loss."""
     slow = rest.front.projected()
     loss = kinetic_energy(front.at.M, rest.front.v) - kinetic_energy(front.at.M, slow.v)
     y = slow.y.copy()
@@ -295,8 +295,8 @@ def _settled(
     slow, impacts = _finished(configuration, replace(slow, y=y), stop)
     touch = slow.touches[stop]
     assert touch is not None
-    slow = slow.with_touch(stop, replace(touch, calm_since=None))
-    return contact_modes.settle(configuration, slow), impacts
+    slow = slow.with_start(stop, replace(touch, calm_since=None))
+    return contact_modes.choose_modes(configuration, slow), impacts
 
 
 def balance_time(view: StepView, balances: Mapping[int, float]) -> float | None:
@@ -364,13 +364,13 @@ def _finished(configuration: Configuration, front: Front, stop: int) -> tuple[Fr
         contact_duration=front.time - touch.time,
         modal_restitution=_modal_restitution(front, touch),
     )
-    front = front.with_latched(stop, latched).with_touch(stop, replace(touch, counted=False))
+    front = front.with_latched(stop, latched).with_start(stop, replace(touch, counted=False))
     name, q, before = configuration.mechanism.stops[stop].name, touch.q, touch.v
     record = Impact(name, touch.time, np.array(q), np.array(before), v, latched.impulse, latched)
     return front, [record]
 
 
-def _modal_restitution(front: Front, touch: Touch) -> float:
+def _modal_restitution(front: Front, touch: ContactStart) -> float:
     """Return minus the ratio of the velocities of the fundamental mode after and before [-].
 
     The mode and the mass matrix are those of the shape at first touch.  At separation, flexures
@@ -399,10 +399,10 @@ def shortened(
     work = 0.5 * power * speed**2 / (law.stiffness * point_mobility(front, stop))
     factor = TOUCH_STEP_FACTOR if law.exponent == 1.0 else TOUCH_STEP_CURVED_FACTOR
     h = rounded_step(factor * math.pow(work, 1.0 / power) / speed)
-    front = front.with_touch(stop, replace(touch, step=controller.h))
+    front = front.with_start(stop, replace(touch, step=controller.h))
     return replace(controller, h=min(h, controller.h)), front
 
 
-def lengthened(controller: StepSizeController, touch: Touch | None) -> StepSizeController:
+def lengthened(controller: StepSizeController, touch: ContactStart | None) -> StepSizeController:
     """Return the controller of the first step after a contact: the contact does not shorten it."""
     return replace(controller, h=max(controller.h, touch.step)) if touch else controller

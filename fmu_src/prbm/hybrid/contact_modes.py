@@ -12,7 +12,7 @@ import numpy as np
 from ..base.errors import SimulationError
 from ..base.tolerances import (
     FRICTION_EXCESS_RTOL,
-    SETTLE_ITERATIONS_MAX,
+    MODE_ITERATIONS_MAX,
 )
 from ..mechanics.contact_state import ContactMode, ContactState
 from ..mechanics.dynamics import Equations
@@ -27,7 +27,7 @@ JAMMED = (
     "friction jams the mechanism; reduce the coefficients of friction",
 )
 """Cause and remedy of a choice of modes without a solution."""
-UNSETTLED = (
+UNDECIDED = (
     "the choice of closed contacts does not converge",
     "the forces of the contacts are round-off; separate the stops, or change the load",
 )
@@ -39,20 +39,20 @@ UNSETTLED = (
 
 def release(configuration: Configuration, front: Front, stop: int) -> Front:
     """Return the front after the force of a held stop has fallen to zero."""
-    return settle(configuration, front.with_contacts(front.contacts.released(stop)))
+    return choose_modes(configuration, front.with_contacts(front.contacts.released(stop)))
 
 
 def slip(configuration: Configuration, front: Front, contact: int) -> Front:
     """Return the front after a sticking contact has reached the limit of friction."""
-    return settle(configuration, front, slipped=contact)
+    return choose_modes(configuration, front, slipped=contact)
 
 
 def reverse(configuration: Configuration, front: Front, contact: int) -> Front:
     """Return the front after the sliding velocity of a contact has fallen to zero."""
-    return settle(configuration, front, reversing=contact)
+    return choose_modes(configuration, front, reversing=contact)
 
 
-def settle(
+def choose_modes(
     configuration: Configuration,
     front: Front,
     *,
@@ -82,7 +82,7 @@ def settle(
     """
     turning = {} if reversing is None else {reversing: _slide_acceleration(front, reversing)}
     candidates, before = _candidates(configuration, front, resting), None
-    for _ in range(SETTLE_ITERATIONS_MAX):
+    for _ in range(MODE_ITERATIONS_MAX):
         # A compliant stop is a candidate only while it is a constraint.
         candidates = [i for i in candidates if i not in front.contacts.pressed]
         front = _chosen(configuration, front, candidates, slipped, turning)
@@ -90,7 +90,7 @@ def settle(
             return front
         # The projection closes gaps of round-off, which changes the forces of stiff flexures.
         front, before = front.projected(), front.contacts
-    raise SimulationError(_failure(configuration, front, candidates, UNSETTLED))
+    raise SimulationError(_failure(configuration, front, candidates, UNDECIDED))
 
 
 def _candidates(configuration: Configuration, front: Front, resting: Sequence[int]) -> list[int]:

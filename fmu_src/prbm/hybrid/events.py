@@ -73,7 +73,7 @@ class Transition:
     reset: Reset
 
 
-def _settling(change: Callable[[Configuration, Front, int], Front]) -> Reset:
+def _choosing_modes(change: Callable[[Configuration, Front, int], Front]) -> Reset:
     """Return a change of the contact modes as a reset without impacts."""
     return lambda configuration, front, contact: (change(configuration, front, contact), [])
 
@@ -81,19 +81,19 @@ def _settling(change: Callable[[Configuration, Front, int], Front]) -> Reset:
 TRANSITIONS = (
     Transition(
         EventKind.RELEASE, guards.stop_force, guards.releasing_stops, guards.release_time,
-        _settling(contact_modes.release),
+        _choosing_modes(contact_modes.release),
     ),
     Transition(
         EventKind.SLIP, guards.friction_margin, guards.sticking_contacts, guards.slip_time,
-        _settling(contact_modes.slip),
+        _choosing_modes(contact_modes.slip),
     ),
     Transition(
         EventKind.REVERSAL, guards.slip_speed, guards.slipping_contacts, guards.reversal_time,
-        _settling(contact_modes.reverse),
+        _choosing_modes(contact_modes.reverse),
     ),
     Transition(
         EventKind.SWITCH, guards.switching, guards.pressed_stops, guards.switching_time,
-        _settling(compliant.switch),
+        _choosing_modes(compliant.switch),
     ),
     Transition(
         EventKind.SEPARATION, guards.indentation, guards.pressed_stops, guards.closing_time,

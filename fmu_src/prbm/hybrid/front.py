@@ -30,7 +30,7 @@ class Latched:
 
 
 @dataclass(frozen=True)
-class Touch:
+class ContactStart:
     """The begin of a contact at a compliant stop, from which its outputs are computed.
 
     Parameters
@@ -46,7 +46,7 @@ class Touch:
     momentum : (n,) tuple of float
         M phi of the fundamental mode phi at first touch.
     calm_since : float or None
-        Time from which the contact has been calm enough to settle [s].
+        Time from which the contact has been calm enough to freeze [s].
     step : float
         Size of the integration steps before the contact, with which the next flight begins [s].
     """
@@ -77,7 +77,7 @@ class Front:
         Equations of the motion from this time on: system, inputs with walls, contact modes.
     latched : (s,) tuple of Latched
         The last impact of each stop.
-    touches : (s,) tuple of Touch or None
+    touches : (s,) tuple of ContactStart or None
         The begin of the contacts at compliant stops that are closed; None for other stops.
     """
 
@@ -85,7 +85,7 @@ class Front:
     y: Real
     equations: Equations
     latched: tuple[Latched, ...]
-    touches: tuple[Touch | None, ...]
+    touches: tuple[ContactStart | None, ...]
     _at: ContactProblem | None = field(default=None, repr=False, compare=False)
 
     @property
@@ -154,7 +154,7 @@ class Front:
         """Return accelerations and forces."""
         return self.equations.at(self.time, self.y)
 
-    def with_touch(self, stop: int, touch: Touch | None) -> "Front":
+    def with_start(self, stop: int, touch: ContactStart | None) -> "Front":
         """Return the front with another begin of the contact at a compliant stop."""
         touches = list(self.touches)
         touches[stop] = touch

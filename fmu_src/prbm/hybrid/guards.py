@@ -16,12 +16,12 @@ from ..base.tolerances import (
     EVENT_CORRECTIONS_MAX,
     EVENT_TIME_RTOL,
     FRICTION_EXCESS_RTOL,
+    FROZEN_FORCE_RTOL,
     GUARD_INTERVALS,
     LOCATION_ITERATIONS_MAX,
     PHASE_RTOL,
     REFERENCE_SPEED_RTOL,
     RELEASE_WATCH_FACTOR,
-    SETTLED_FORCE_RTOL,
 )
 from ..mechanics.arrays import Complex, Real
 from ..mechanics.contact_state import Phase
@@ -98,7 +98,7 @@ def _stop_force(equations: Equations, stop: int, evaluation: Evaluation) -> floa
     if not depth:
         return force
     elastic = equations.compliant.laws[stop].elastic_force(depth)
-    return SETTLED_FORCE_RTOL * elastic - abs(force - elastic)
+    return FROZEN_FORCE_RTOL * elastic - abs(force - elastic)
 
 
 def _friction_margin(
@@ -208,8 +208,8 @@ def sticking_contacts(view: StepView) -> Sequence[int]:
 def releasing_stops(view: StepView) -> Sequence[int]:
     """Return the held stops if a force comes close to zero at a stage of the step, else none."""
     equations = view.equations
-    settled = any(map(equations.contacts.depth, equations.held))
-    if not equations.held or equations.sticking or settled:
+    frozen = any(map(equations.contacts.depth, equations.held))
+    if not equations.held or equations.sticking or frozen:
         return equations.held
     held = view.forces[:, equations.first_hold :]
     near = held.min(axis=0) <= RELEASE_WATCH_FACTOR * held.max(axis=0)

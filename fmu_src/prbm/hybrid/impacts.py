@@ -12,7 +12,7 @@ from ..mechanics.arrays import Real
 from ..mechanics.modal import fundamental_at, simulated_restitution
 from . import compliant
 from .configuration import Configuration, contact_names
-from .contact_modes import equations_holding, find_holding_stops, settle
+from .contact_modes import choose_modes, equations_holding, find_holding_stops
 from .front import Front, Latched
 from .records import Impact
 
@@ -52,7 +52,7 @@ def impact(configuration: Configuration, front: Front, hit: int) -> tuple[Front,
     """
     stops = configuration.mechanism.stops
     if stops[hit].compliant:
-        return compliant.touch(configuration, front, hit), []
+        return compliant.begin_contact(configuration, front, hit), []
     gaps, rates = front.gaps_and_rates()
     near, zero = configuration.scales.touching, configuration.scales.zero_speed
     struck = [
@@ -63,8 +63,8 @@ def impact(configuration: Configuration, front: Front, hit: int) -> tuple[Front,
     ]
     if not struck:
         resting = [hit] if rates[hit] <= zero else []
-        return settle(configuration, front, resting=resting), []
-    front = compliant.unsettled(front)
+        return choose_modes(configuration, front, resting=resting), []
+    front = compliant.unfrozen(front)
     held = list(front.contacts.held)
     soft = [i for i in struck if _captured(configuration, front, i, held, float(-rates[i]))]
     restitution = np.array(
@@ -77,7 +77,7 @@ def impact(configuration: Configuration, front: Front, hit: int) -> tuple[Front,
     _, rates = front.gaps_and_rates()
     resting = [i for i in (*struck, *held) if rates[i] <= zero]
     front = compliant.rephased(front.with_contacts(front.contacts.opened()))
-    return settle(configuration, front, resting=resting), impacts
+    return choose_modes(configuration, front, resting=resting), impacts
 
 
 def _joined(

@@ -10,7 +10,7 @@ from ..mechanics.statics import release_velocity
 from ..mechanism.parts import value
 from .compliant import preloaded, rephased
 from .configuration import Configuration
-from .contact_modes import settle
+from .contact_modes import choose_modes
 from .front import Front, Latched
 from .impacts import impact
 
@@ -85,7 +85,7 @@ def released(configuration: Configuration, inputs: Inputs, time: float) -> Front
             front, _ = impact(configuration, front, i)
             break
     rigid = [i for i in range(stops) if i not in equations.compliant.stops]
-    return settle(configuration, rephased(front), resting=rigid)
+    return choose_modes(configuration, rephased(front), resting=rigid)
 
 
 def check_walls(configuration: Configuration, front: Front) -> None:

@@ -279,7 +279,7 @@ class Simulation:
         front = compliant.rephased(front)
         counted: list[Impact] = []
         if struck is None:
-            front = contact_modes.settle(configuration, front.projected())
+            front = contact_modes.choose_modes(configuration, front.projected())
         else:
             front, counted = impacts.impact(configuration, front, struck)
         self.configuration, self.changed, self.received = configuration, False, given
@@ -318,7 +318,7 @@ class Simulation:
     def _take_step(self) -> None:
         """Take one step from the front, up to the first event within it."""
         self.step_count += 1
-        front, counted, balances = compliant.settled(
+        front, counted, balances = compliant.frozen(
             self.configuration, walls.arrived(self.front), self.arc
         )
         if front.equations is not self.front.equations:

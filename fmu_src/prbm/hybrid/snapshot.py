@@ -12,12 +12,12 @@ import numpy as np
 from ..base.errors import ParameterError
 from ..base.tolerances import EVENTS_MAX, IMPACT_COUNT_MAX, TOLERANCE_MIN, TOLERANCE_USED_MAX
 from ..mechanics.arrays import Real
-from ..mechanics.contact_state import ContactMode, ContactState, Phase, Touching
+from ..mechanics.contact_state import ContactMode, ContactPhase, ContactState, Phase
 from ..mechanics.inputs import Inputs, Wall
 from .arc import Arc, Node
 from .configuration import Configuration
 from .events import Event, EventKind, EventWindow
-from .front import Front, Latched, Touch
+from .front import ContactStart, Front, Latched
 from .peaks import Peak, PeakRecord, Sample
 from .runge_kutta import TSITOURAS_PAPAKOSTAS
 from .stability import FastestMode
@@ -71,7 +71,7 @@ def front_of(plain: Mapping[str, Any], configuration: Configuration) -> Front:
     """Return a front from plain values, the inverse of :func:`plain_front`."""
     modes = tuple(ContactMode(mode) for mode in plain["modes"])
     touching = tuple(
-        _made(Touching, {**one, "phase": Phase(one["phase"])}) if one is not None else None
+        _made(ContactPhase, {**one, "phase": Phase(one["phase"])}) if one is not None else None
         for one in plain["touching"]
     )
     contacts = ContactState(modes, len(configuration.mechanism.stops), touching)
@@ -80,16 +80,16 @@ def front_of(plain: Mapping[str, Any], configuration: Configuration) -> Front:
         np.array(plain["y"]),
         configuration.equations(inputs_of(plain["inputs"]), contacts),
         tuple(_made(Latched, latched) for latched in plain["latched"]),
-        tuple(touch_of(touch) for touch in plain["touches"]),
+        tuple(start_of(touch) for touch in plain["touches"]),
     )
 
 
-def touch_of(plain: Mapping[str, Any] | None) -> Touch | None:
+def start_of(plain: Mapping[str, Any] | None) -> ContactStart | None:
     """Return the begin of a contact from plain values."""
     if plain is None:
         return None
     arrays = {name: tuple(plain[name]) for name in ("q", "v", "momentum")}
-    return _made(Touch, {**plain, **arrays})
+    return _made(ContactStart, {**plain, **arrays})
 
 
 def history_of(plain: Mapping[str, Any]) -> StepHistory:

@@ -53,7 +53,7 @@ static void take_inputs(Simulation *sim) {
 /* Continue from the front with the inputs that have been set. */
 static bool restart(Simulation *sim, Problem *problem) {
     take_inputs(sim);
-    return receive_impulses(sim, problem) && settle_moved(sim, problem) &&
+    return receive_impulses(sim, problem) && choose_moved_modes(sim, problem) &&
            restart_peaks(sim, problem);
 }
 

@@ -54,7 +54,7 @@ enum { PIVOTS_FACTOR = 50 };
 #define REBOUND_RTOL 1e-12
 #define TOUCHING_RTOL 1e-10
 #define RELEASE_PENETRATION_RTOL 1e-08
-enum { SETTLE_ITERATIONS_MAX = 10 };
+enum { MODE_ITERATIONS_MAX = 10 };
 #define VANISHED_BOUNCE_RTOL 1e-12
 #define DEPENDENT_FRICTION_RTOL 0.0001
 #define ZERO_RATE_RTOL 1e-09
@@ -80,8 +80,8 @@ enum { DAMPING_BISECTIONS = 60 };
 #define PHASE_RTOL 1e-09
 #define REFERENCE_SPEED_RTOL 1e-06
 #define FIRST_RISE_MAX 0.001
-#define SETTLED_FORCE_RTOL 0.01
-#define SETTLING_FACTOR 0.5
+#define FROZEN_FORCE_RTOL 0.01
+#define FREEZING_FACTOR 0.5
 #define TOUCH_STEP_FACTOR 0.4
 #define TOUCH_STEP_CURVED_FACTOR 0.05
 #define CONTACT_ERROR_FACTOR 100.0
@@ -174,7 +174,7 @@ typedef enum {
     PHASE_PRESSED = 1,
     PHASE_RISING = 2,
     PHASE_FREE = 3,
-    PHASE_SETTLED = 4,
+    PHASE_FROZEN = 4,
 } Phase;
 
 /* --- prbm.hybrid.events ------------------------------------------------------------------------- */

@@ -88,7 +88,7 @@ PRBM double release_indicator(const Simulation *sim, const Instant *at, int i) {
  * of the order of 1, also at d = 0. */
 static double force_growth(const Equations *eq, const Instant *at, int stop) {
     const ComplianceLaw *law = &eq->laws[stop];
-    const Touching *touching = &eq->contacts.touching[stop];
+    const ContactPhase *touching = &eq->contacts.touching[stop];
     double depth = -gap(eq, stop, at->time, at->e, at->extra);
     double rate = -gap_rate(eq, stop, at->time, at->e, at->v, at->extra);
     double bend = -gap_acceleration(eq, stop, at->time, at->e, at->v, at->found);
@@ -110,7 +110,7 @@ PRBM void watch_turns(Simulation *sim, const Instant *at) {
 }
 
 PRBM Turn turn_indicator(const Simulation *sim, const Instant *at, int i) {
-    const Touching *touching = &sim->state.touching[i];
+    const ContactPhase *touching = &sim->state.touching[i];
     Dent last = latest_dent(sim, i);
     double rate = -gap_rate(&sim->equations, i, at->time, at->e, at->v, at->extra);
     double depth = last.deepens * rate / touching->reference_speed, force = 1.0;

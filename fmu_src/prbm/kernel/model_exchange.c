@@ -273,7 +273,7 @@ PRBM bool exchange_completed_step(Simulation *simulation, bool *event, Problem *
     }
     sim->present.fresh &= ~PLACES; /* The maxima are outputs. */
     return latch_present(sim, now.evaluation, true, problem) &&
-           (*event || settles_here(sim, event, problem));
+           (*event || freezes_here(sim, event, problem));
 }
 
 /* --- events ----------------------------------------------------------------------------------- */
@@ -360,7 +360,7 @@ static bool apply_inputs(Simulation *sim, Problem *problem) {
     }
     bool ok = true;
     if (impulses_changed(sim)) {
-        ok = receive_impulses(sim, problem) && settle_moved(sim, problem);
+        ok = receive_impulses(sim, problem) && choose_moved_modes(sim, problem);
     } else if (sim->equations.walls_move || drift(sim, &now.at) > DRIFT_CORRECTED_RTOL) {
         ok = follow_walls(sim, now.evaluation->lam, sim->state.time - sim->state.point, problem);
     }
@@ -418,12 +418,12 @@ static bool sample_before(Simulation *sim, Problem *problem) {
 }
 
 /* Settle the contacts that have been calm for a contact time. */
-static bool settle_contacts(Simulation *sim, Problem *problem) {
+static bool freeze_contacts(Simulation *sim, Problem *problem) {
     if (sim->equations.pressed_count == 0) {
         return true;
     }
     double balances[STOPS_MAX];
-    bool ok = settle_calm(sim, balances, problem);
+    bool ok = freeze_calm(sim, balances, problem);
     forget_outputs(sim);
     return ok;
 }
@@ -439,7 +439,7 @@ PRBM bool exchange_event(Simulation *simulation, bool *changed, Problem *problem
     keep_backup(sim);
     Moment now;
     bool ok = sample_before(sim, problem) && apply_inputs(sim, problem) &&
-              settle_contacts(sim, problem) && apply_due_events(sim, &now, problem) &&
+              freeze_contacts(sim, problem) && apply_due_events(sim, &now, problem) &&
               (sim->equations.pressed_count == 0 ||
                latch_present(sim, now.evaluation, false, problem));
     if (ok) {

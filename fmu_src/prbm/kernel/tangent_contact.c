@@ -18,13 +18,13 @@ static Indentation indentation_at(const Tangent *t, int stop) {
     return result;
 }
 
-static const Touching *touching_at(const Tangent *t, int stop) {
+static const ContactPhase *touching_at(const Tangent *t, int stop) {
     return &t->eq->contacts.touching[stop];
 }
 
 static double pressure_change(const Tangent *t, int stop) {
     const ComplianceLaw *law = &t->eq->laws[stop];
-    const Touching *touching = touching_at(t, stop);
+    const ContactPhase *touching = touching_at(t, stop);
     Indentation x = indentation_at(t, stop);
     if (touching->phase == PHASE_FREE) {
         return 0.0;
@@ -118,7 +118,7 @@ static double bend_change_of(const Tangent *t, int stop) {
 /* Change of the indicator of an extremum, without its sign. */
 static double turn_change(const Tangent *t, int stop, const Indentation *x, bool of_force) {
     const ComplianceLaw *law = &t->eq->laws[stop];
-    const Touching *touching = touching_at(t, stop);
+    const ContactPhase *touching = touching_at(t, stop);
     const Instant *at = t->at;
     if (!of_force) {
         return x->drate / touching->reference_speed;
@@ -133,7 +133,7 @@ static double turn_change(const Tangent *t, int stop, const Indentation *x, bool
 static double phase_indicator_change(const Tangent *t, int stop) {
     const Scales *scales = &t->sim->configuration.scales;
     const ComplianceLaw *law = &t->eq->laws[stop];
-    const Touching *touching = touching_at(t, stop);
+    const ContactPhase *touching = touching_at(t, stop);
     Indentation x = indentation_at(t, stop);
     double slope = damping_slope(law, touching), ratio = damping_ratio(law, touching, x.rate);
     switch (touching->phase) {

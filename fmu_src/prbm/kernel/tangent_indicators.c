@@ -18,11 +18,11 @@ static double impact_indicator_change(const Tangent *t, int i) {
     return (gap_change(t, i) + ahead) / scales->length;
 }
 
-/* Change of the force of a held stop, or of the margin of a settled one. */
+/* Change of the force of a held stop, or of the margin of a frozen one. */
 static double margin_change(const Tangent *t, int i) {
-    const Touching *touching = &t->eq->contacts.touching[i];
+    const ContactPhase *touching = &t->eq->contacts.touching[i];
     double change = stop_force(t->eq, t->dlam, i);
-    if (touching->phase != PHASE_SETTLED) {
+    if (touching->phase != PHASE_FROZEN) {
         return change;
     }
     double off = stop_force(t->eq, t->lam, i) - elastic_force(&t->eq->laws[i], touching->depth);

@@ -24,7 +24,7 @@ from ..base.tolerances import (
     DAMPING_ELASTIC_MIN,
     DAMPING_PLASTIC_MAX,
 )
-from .contact_state import Phase, Touching
+from .contact_state import ContactPhase, Phase
 
 
 class ComplianceLaw(NamedTuple):
@@ -55,12 +55,12 @@ class ComplianceLaw(NamedTuple):
         size = d if self.exponent == 1.0 else math.copysign(abs(d) ** self.exponent, d)
         return self.stiffness * size
 
-    def force(self, touching: Touching, d: float, rate: float) -> float:
+    def force(self, touching: ContactPhase, d: float, rate: float) -> float:
         """Return the force of a contact with the indentation d [m] and its rate [m/s].
 
         Examples
         --------
-        >>> law, contact = ComplianceLaw(100.0, 1.0, 0.5), Touching(Phase.PRESSED, 2.0)
+        >>> law, contact = ComplianceLaw(100.0, 1.0, 0.5), ContactPhase(Phase.PRESSED, 2.0)
         >>> law.force(contact, 0.25, 1.0)
         31.25
         """
@@ -68,7 +68,7 @@ class ComplianceLaw(NamedTuple):
             return 0.0
         return self.elastic_force(d) * self.damping_ratio(touching, rate)
 
-    def damping_ratio(self, touching: Touching, rate: float) -> float:
+    def damping_ratio(self, touching: ContactPhase, rate: float) -> float:
         """Return the force over the elastic force [-]; a free contact begins where it is zero."""
         if touching.phase is Phase.RISING:
             return 1.0 + self.damping

@@ -105,7 +105,7 @@ class CompliantStops:
     def rates(self, extras: Real, inputs: Inputs, normal: Real) -> Real:
         """Return the rates of the states of all compliant stops for normal forces (s,) [N].
 
-        The walls of settled stops do not give way.  Losses are added by the equations.
+        The walls of frozen stops do not give way.  Losses are added by the equations.
         """
         result = np.zeros(self.size)
         for k, i in enumerate(self.stops):

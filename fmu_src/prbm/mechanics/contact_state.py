@@ -1,7 +1,7 @@
 """The modes of the contacts: the discrete state of a mechanism.
 
 Contacts are numbered in one list, the stops first, then the friction points.  A closed stop is a
-constraint (it is held) or, if it is compliant and not settled, a force (it is pressed).
+constraint (it is held) or, if it is compliant and not frozen, a force (it is pressed).
 """
 
 from dataclasses import dataclass, replace
@@ -53,12 +53,12 @@ class Phase(IntEnum):
     """The reference speed follows the closing speed, which exceeds it and grows."""
     FREE = 3
     """There is no force: the surfaces have separated while the indentation recovers."""
-    SETTLED = 4
+    FROZEN = 4
     """The indentation is constant: the stop is a constraint."""
 
 
 @dataclass(frozen=True)
-class Touching:
+class ContactPhase:
     """A contact at a compliant stop.
 
     Parameters
@@ -68,7 +68,7 @@ class Touching:
     reference_speed : float
         Largest closing speed so far in this contact, at least ``rest_speed`` [m/s].
     depth : float
-        Indentation of a settled stop [m]; 0 in other phases.
+        Indentation of a frozen stop [m]; 0 in other phases.
     """
 
     phase: Phase
@@ -86,7 +86,7 @@ class ContactState:
         Modes of the s stops, then of the f friction points.
     stops : int
         Number of stops s.
-    touching : (s,) tuple of Touching or None
+    touching : (s,) tuple of ContactPhase or None
         The contacts at compliant stops that are closed; None for all other stops.
 
     Examples
@@ -98,7 +98,7 @@ class ContactState:
 
     modes: tuple[ContactMode, ...]
     stops: int
-    touching: tuple[Touching | None, ...] = ()
+    touching: tuple[ContactPhase | None, ...] = ()
 
     def __post_init__(self) -> None:
         if len(self.touching) != self.stops:
@@ -123,7 +123,7 @@ class ContactState:
     def pressed(self) -> tuple[int, ...]:
         """The closed stops that are forces, in rising order."""
         return tuple(
-            i for i, one in enumerate(self.touching) if one and one.phase is not Phase.SETTLED
+            i for i, one in enumerate(self.touching) if one and one.phase is not Phase.FROZEN
         )
 
     @cached_property
@@ -151,7 +151,7 @@ class ContactState:
         modes[contact] = mode
         return replace(self, modes=tuple(modes))
 
-    def with_touching(self, stop: int, touching: Touching | None) -> "ContactState":
+    def with_touching(self, stop: int, touching: ContactPhase | None) -> "ContactState":
         """Return the state in which a compliant stop has another contact; None: it is open."""
         every, mode = list(self.touching), self.modes[stop]
         every[stop] = touching
@@ -165,7 +165,7 @@ class ContactState:
         """Return the state in which a stop that touches is a constraint with a mode."""
         touching, result = self.touching[stop], self
         if touching:
-            result = self.with_touching(stop, replace(touching, phase=Phase.SETTLED))
+            result = self.with_touching(stop, replace(touching, phase=Phase.FROZEN))
         return result.with_mode(stop, mode)
 
     def released(self, stop: int) -> "ContactState":

@@ -28,13 +28,13 @@ PRBM double elastic_force(const ComplianceLaw *law, double d) {
     return law->stiffness * copysign(power(fabs(d), law->exponent), d);
 }
 
-PRBM double damping_ratio(const ComplianceLaw *law, const Touching *touching, double rate) {
+PRBM double damping_ratio(const ComplianceLaw *law, const ContactPhase *touching, double rate) {
     return touching->phase == PHASE_RISING
                ? 1.0 + law->damping
                : 1.0 + law->damping * rate / touching->reference_speed;
 }
 
-PRBM double contact_force(const ComplianceLaw *law, const Touching *touching, double d,
+PRBM double contact_force(const ComplianceLaw *law, const ContactPhase *touching, double d,
                           double rate) {
     return touching->phase == PHASE_FREE
                ? 0.0
@@ -60,6 +60,6 @@ PRBM double contact_stiffness(const ComplianceLaw *law, double d) {
     return d == 0.0 ? 0.0 : contact_tangent(law, d);
 }
 
-PRBM double damping_slope(const ComplianceLaw *law, const Touching *touching) {
+PRBM double damping_slope(const ComplianceLaw *law, const ContactPhase *touching) {
     return touching->phase == PHASE_RISING ? 0.0 : law->damping / touching->reference_speed;
 }

@@ -11,14 +11,14 @@ typedef struct {
 
 PRBM double damping_factor(double restitution);
 PRBM double elastic_force(const ComplianceLaw *law, double d); /* sign(d) k |d|^n */
-PRBM double damping_ratio(const ComplianceLaw *law, const Touching *touching, double rate);
-PRBM double contact_force(const ComplianceLaw *law, const Touching *touching, double d,
+PRBM double damping_ratio(const ComplianceLaw *law, const ContactPhase *touching, double rate);
+PRBM double contact_force(const ComplianceLaw *law, const ContactPhase *touching, double d,
                           double rate);
 PRBM double contact_energy(const ComplianceLaw *law, double d);
 PRBM double contact_depth(const ComplianceLaw *law, double force); /* of an elastic force >= 0 */
 PRBM double contact_tangent(const ComplianceLaw *law, double d); /* d > 0 */
 PRBM double contact_stiffness(const ComplianceLaw *law, double d); /* any d */
 /* Change of the damping ratio per change of the rate of the indentation. */
-PRBM double damping_slope(const ComplianceLaw *law, const Touching *touching);
+PRBM double damping_slope(const ComplianceLaw *law, const ContactPhase *touching);
 
 #endif

@@ -273,16 +273,16 @@ static bool rebound(int k, const double *W, const double *after, const double *f
     for (int i = 0; i < k; i++) {
         least[i] = s * wanted[i];
     }
-    bool settled = impulses(k, k, W, after, friction, least, tolerance, R, scratch);
+    bool solved = impulses(k, k, W, after, friction, least, tolerance, R, scratch);
     double normal = 0.0, all = 0.0;
-    for (int i = 0; settled && i < 2 * k; i++) {
+    for (int i = 0; solved && i < 2 * k; i++) {
         double work = R[i] * (2 * after[i] + dot(2 * k, W + i * 2 * k, R)) / 2;
         normal += i < k ? work : 0.0;
         all += work;
     }
     *allowed = normal <= limits->normal && all <= limits->all;
     scratch->used = used;
-    return settled;
+    return solved;
 }
 
 /* Compute the impulses R of restitution with the largest s in [0, 1] whose work is within the
@@ -355,11 +355,11 @@ PRBM bool several(int k, const double *W, const double *u, const double *frictio
         limits.all -= P[i] * (u[i] + after[i]) / 2;
     }
     limits.all += COMPLEMENTARITY_RTOL * fabs(dot(2 * k, P, u));
-    bool settled = restitution_of_several(k, W, after, friction, wanted, &limits, tolerance, R,
+    bool solved = restitution_of_several(k, W, after, friction, wanted, &limits, tolerance, R,
                                           scratch);
-    for (int i = 0; settled && i < 2 * k; i++) {
+    for (int i = 0; solved && i < 2 * k; i++) {
         P[i] += R[i];
     }
     scratch->used = used;
-    return settled || friction_locks(problem);
+    return solved || friction_locks(problem);
 }

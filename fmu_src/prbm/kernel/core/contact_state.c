@@ -10,7 +10,7 @@ PRBM ContactMode slipping_mode(double sign) {
 }
 
 /* Whether the contact is a force, not a constraint. */
-PRBM bool is_pressed(const Touching *touching) {
+PRBM bool is_pressed(const ContactPhase *touching) {
     return touching->phase == PHASE_PRESSED || touching->phase == PHASE_RISING ||
            touching->phase == PHASE_FREE;
 }

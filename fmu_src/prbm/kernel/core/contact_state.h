@@ -9,18 +9,18 @@
  * independently of other contacts. */
 PRBM int slip_sign(ContactMode mode); /* Sign of the sliding velocity: -1, 0 or +1. */
 
-/* A contact at a compliant stop.  Its phase is PHASE_NONE at other stops.  A settled stop whose
+/* A contact at a compliant stop.  Its phase is PHASE_NONE at other stops.  A frozen stop whose
  * mode is CONTACT_OPEN has no force; this occurs only while modes are tried. */
 typedef struct {
     Phase phase;
     double reference_speed, depth;
-} Touching;
+} ContactPhase;
 
 typedef struct {
     ContactMode *modes; /* (s + f,) */
-    Touching *touching; /* (s,) */
+    ContactPhase *touching; /* (s,) */
 } ContactState;
-PRBM bool is_pressed(const Touching *touching);
+PRBM bool is_pressed(const ContactPhase *touching);
 PRBM bool is_held(const ContactState *contacts, int stop);
 PRBM ContactMode slipping_mode(double sign);
 PRBM bool is_stop(const System *system, int contact);

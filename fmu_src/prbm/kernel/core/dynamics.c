@@ -29,7 +29,7 @@ static double input_power(const Equations *eq, const Evaluation *at, const doubl
 }
 
 /* Compute the rates of the states of compliant stops.  Add the losses and the work of the walls to
- * the rates of the energies.  The walls of settled stops do not give way. */
+ * the rates of the energies.  The walls of frozen stops do not give way. */
 NOINLINE void compliant_rates(const Equations *eq, const Evaluation *at, double *dy) {
     const Mechanism *m = eq->system->mechanism;
     double *energies = dy + 2 * eq->system->n;

@@ -13,7 +13,7 @@ PRBM void equations_place(Equations *equations, const System *system, Memory *me
     Equations q = {0};
     q.system = system;
     q.contacts.modes = place(memory, s + f, sizeof(ContactMode));
-    q.contacts.touching = place(memory, s, sizeof(Touching));
+    q.contacts.touching = place(memory, s, sizeof(ContactPhase));
     q.held = place(memory, s, sizeof(int));
     q.pressed = place(memory, s, sizeof(int));
     q.laws = place(memory, s, sizeof(ComplianceLaw));
@@ -86,9 +86,9 @@ static void set_rows(Equations *eq) {
     eq->first_hold = eq->r;
     eq->held_count = eq->sticking_count = eq->pressed_count = 0;
     for (int i = 0; i < system->s; i++) {
-        const Touching *touching = &eq->contacts.touching[i];
+        const ContactPhase *touching = &eq->contacts.touching[i];
         if (is_held(&eq->contacts, i)) {
-            double depth = touching->phase == PHASE_SETTLED ? touching->depth : 0.0;
+            double depth = touching->phase == PHASE_FROZEN ? touching->depth : 0.0;
             eq->held[eq->held_count++] = i;
             add_row(eq, &gaps, i, system->gaps_c[i] + eq->inputs.walls[i].position + depth);
         } else if (is_pressed(touching)) {
@@ -206,7 +206,7 @@ PRBM void set_equations(Equations *equations, const Inputs *inputs,
     eq->inputs = *inputs;
     eq->omega = omega;
     memmove(eq->contacts.modes, contacts->modes, count * sizeof(ContactMode));
-    memmove(eq->contacts.touching, contacts->touching, (size_t)eq->system->s * sizeof(Touching));
+    memmove(eq->contacts.touching, contacts->touching, (size_t)eq->system->s * sizeof(ContactPhase));
     set_laws(eq);
     set_rows(eq);
     set_row_parts(eq);

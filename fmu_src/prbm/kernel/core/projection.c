@@ -11,8 +11,8 @@
 static double offset(const Equations *eq, int k, double t) {
     if (eq->walls_move && k >= eq->first_hold && k < eq->first_stick) {
         int i = eq->held[k - eq->first_hold];
-        const Touching *touching = &eq->contacts.touching[i];
-        double depth = touching->phase == PHASE_SETTLED ? touching->depth : 0.0;
+        const ContactPhase *touching = &eq->contacts.touching[i];
+        double depth = touching->phase == PHASE_FROZEN ? touching->depth : 0.0;
         return eq->system->gaps_c[i] + wall_motion(&eq->inputs.walls[i], t).x + depth;
     }
     return eq->c[k];

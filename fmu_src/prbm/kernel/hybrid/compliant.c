@@ -1,4 +1,4 @@
-/* Contacts at compliant stops: first touch, switches of the phase, settling and separation: the
+/* Contacts at compliant stops: first touch, switches of the phase, freezing and separation: the
  * twin of hybrid/compliant.py. */
 #include <math.h>
 
@@ -33,8 +33,8 @@ static bool begin_contact(Simulation *sim, int stop, double speed, bool counted,
     const double *front = sim->state.front, *extra = extra_of(sim, sim->state.front, stop);
     double least = greater(rest_speed_of(sim, stop), zero_speed(&sim->configuration));
     double *first = first_state(sim, stop);
-    Touch begun = {sim->state.front_time, counted, extra[EXTRA_IMPULSE], extra[EXTRA_LOSS], false,
-                   0.0, 0.0};
+    ContactStart begun = {
+        sim->state.front_time, counted, extra[EXTRA_IMPULSE], extra[EXTRA_LOSS], false, 0.0, 0.0};
     bool ok = true;
     sim->state.touches[stop] = begun;
     copy(2 * n, front, first);
@@ -111,7 +111,7 @@ PRBM bool touch(Simulation *sim, int stop, Problem *problem) {
     }
     if (!point_mobility(sim, stop, &inverse_mass, problem) ||
         !raise_reference(sim, stop, speed, inverse_mass, problem) || !rephase(sim, problem) ||
-        !settle(sim, NULL, 0, NULL, problem)) {
+        !choose_modes(sim, NULL, 0, NULL, problem)) {
         return false;
     }
     shorten_step(sim, stop, inverse_mass);
@@ -120,13 +120,13 @@ PRBM bool touch(Simulation *sim, int stop, Problem *problem) {
 
 PRBM bool switch_phase(Simulation *sim, int stop, Problem *problem) {
     double gaps[STOPS_MAX], rates[STOPS_MAX];
-    Touching touching = sim->state.touching[stop];
+    ContactPhase touching = sim->state.touching[stop];
     gaps_and_rates(sim, gaps, rates);
     if (touching.phase == PHASE_PRESSED && -rates[stop] > 0.0) {
         if (!rephase(sim, problem)) {
             return false;
         }
-        const Touching *now = &sim->state.touching[stop];
+        const ContactPhase *now = &sim->state.touching[stop];
         if (now->phase == PHASE_PRESSED && now->reference_speed == touching.reference_speed) {
             /* The rate is below the reference speed only up to the error of the event's time. */
             set_phase(sim, stop, PHASE_RISING, touching.reference_speed, 0.0);
@@ -138,7 +138,7 @@ PRBM bool switch_phase(Simulation *sim, int stop, Problem *problem) {
         set_phase(sim, stop, touching.phase == PHASE_PRESSED ? PHASE_FREE : PHASE_PRESSED,
                   rises ? greater(speed, -rates[stop]) : speed, 0.0);
     }
-    return settle(sim, NULL, 0, NULL, problem);
+    return choose_modes(sim, NULL, 0, NULL, problem);
 }
 
 /* Return -(m^T v+) / (m^T v-) with m = M phi at first touch; 0 if m^T v- is round-off. */
@@ -157,7 +157,7 @@ static double modal_ratio(Simulation *sim, int stop) {
 static void end_impact(Simulation *sim, int stop) {
     double gaps[STOPS_MAX], rates[STOPS_MAX];
     int n = system_of(sim)->n;
-    Touch *begun = &sim->state.touches[stop];
+    ContactStart *begun = &sim->state.touches[stop];
     Latched *latched = &sim->state.latched[stop];
     const double *extra = extra_of(sim, sim->state.front, stop);
     const double *first = first_state(sim, stop);
@@ -183,10 +183,10 @@ PRBM bool separate(Simulation *sim, int stop, Problem *problem) {
     end_impact(sim, stop);
     resume_step(sim, stop);
     set_phase(sim, stop, PHASE_NONE, 0.0, 0.0);
-    return settle(sim, NULL, 0, NULL, problem);
+    return choose_modes(sim, NULL, 0, NULL, problem);
 }
 
-/* --- settling --------------------------------------------------------------------------------- */
+/* --- freezing --------------------------------------------------------------------------------- */
 
 /* Compute the inverse effective mass of a hit point at the front, with that of its wall. */
 static bool point_mobility(Simulation *sim, int stop, double *result, Problem *problem) {
@@ -211,7 +211,7 @@ PRBM bool damping_rate(Simulation *sim, int stop, double depth, double *rate, Pr
 }
 
 static void shorten_step(Simulation *sim, int stop, double inverse_mass) {
-    const Touching *touching = &sim->state.touching[stop];
+    const ContactPhase *touching = &sim->state.touching[stop];
     const ComplianceLaw *law = &sim->equations.laws[stop];
     double speed = touching->reference_speed, rise = law->exponent + 1.0;
     if (!is_pressed(touching)) {
@@ -236,7 +236,7 @@ PRBM double kinetic_energy(Simulation *sim, const double *v) {
     return sum;
 }
 
-/* Project the front onto the constraint of a stop that settles, and book the loss. */
+/* Project the front onto the constraint of a stop that freezes, and book the loss. */
 static bool stop_motion(Simulation *sim, int stop, Problem *problem) {
     size_t mark = sim->scratch.used;
     int n = system_of(sim)->n;
@@ -286,28 +286,28 @@ PRBM void fold_gives(Simulation *sim) {
     }
 }
 
-/* A contact, its wall and its states before an attempt to settle it. */
+/* A contact, its wall and its states before an attempt to freeze it. */
 typedef struct {
-    Touching touching;
+    ContactPhase touching;
     ContactMode mode;
     Wall wall;
     double give, give_rate;
     bool has_k1;
-} Unsettled;
+} Unfrozen;
 
 /* Make a pressed stop a constraint. */
-static Unsettled hold_contact(Simulation *sim, int stop, double depth) {
+static Unfrozen hold_contact(Simulation *sim, int stop, double depth) {
     State *state = &sim->state;
     double *extra = extra_of(sim, state->front, stop);
-    Unsettled before = {state->touching[stop], state->modes[stop],     state->walls[stop],
+    Unfrozen before = {state->touching[stop], state->modes[stop],     state->walls[stop],
                         extra[EXTRA_GIVE],     extra[EXTRA_GIVE_RATE], state->has_k1};
     fold_give(&state->walls[stop], state->front_time, extra);
-    set_phase(sim, stop, PHASE_SETTLED, before.touching.reference_speed, depth);
+    set_phase(sim, stop, PHASE_FROZEN, before.touching.reference_speed, depth);
     return before;
 }
 
 /* Undo hold_contact. */
-static void press_again(Simulation *sim, int stop, const Unsettled *before) {
+static void press_again(Simulation *sim, int stop, const Unfrozen *before) {
     State *state = &sim->state;
     double *extra = extra_of(sim, state->front, stop);
     state->walls[stop] = before->wall;
@@ -329,7 +329,7 @@ typedef struct {
 static bool holding_force(Simulation *sim, int stop, double depth, double *force,
                           Problem *problem) {
     const double *q = sim->state.front, *v = q + system_of(sim)->n;
-    Unsettled before = hold_contact(sim, stop, depth);
+    Unfrozen before = hold_contact(sim, stop, depth);
     bool ok = evaluate_equations(&sim->equations, sim->state.front_time, q, v,
                                  extra_states(sim, q), NULL, &sim->at_front, problem);
     *force = ok ? stop_force(&sim->equations, sim->at_front.lam, stop) : 0.0;
@@ -366,16 +366,16 @@ static bool rest_of_contact(Simulation *sim, int stop, double depth, double rate
     return true;
 }
 
-/* Whether a contact can settle: the constraint is released at twice this difference. */
+/* Whether a contact can freeze: the constraint is released at twice this difference. */
 static bool is_balanced(const Rest *rest) {
-    double limit = SETTLING_FACTOR * SETTLED_FORCE_RTOL * rest->elastic;
+    double limit = FREEZING_FACTOR * FROZEN_FORCE_RTOL * rest->elastic;
     return fabs(rest->force - rest->elastic) <= limit;
 }
 
 /* Record since when a contact is calm; *due: whether it has been calm for a contact time. */
 static bool watch_contact(Simulation *sim, int stop, double gap_now, double rate, Rest *rest,
                           bool *due, Problem *problem) {
-    Touch *begun = &sim->state.touches[stop];
+    ContactStart *begun = &sim->state.touches[stop];
     *due = false;
     if (!is_pressed(&sim->state.touching[stop])) {
         return true;
@@ -390,7 +390,7 @@ static bool watch_contact(Simulation *sim, int stop, double gap_now, double rate
 }
 
 /* Settle a contact; its kinetic energy is a loss. */
-static bool settle_contact(Simulation *sim, int stop, double depth, Problem *problem) {
+static bool freeze_contact(Simulation *sim, int stop, double depth, Problem *problem) {
     (void)hold_contact(sim, stop, depth);
     sim->state.arc.valid = false;
     if (!stop_motion(sim, stop, problem)) {
@@ -399,14 +399,14 @@ static bool settle_contact(Simulation *sim, int stop, double depth, Problem *pro
     end_impact(sim, stop);
     sim->state.touches[stop].calm = false;
     sim->state.touches[stop].calm_since = 0.0;
-    if (!settle(sim, NULL, 0, NULL, problem)) {
+    if (!choose_modes(sim, NULL, 0, NULL, problem)) {
         return false;
     }
     resume_step(sim, stop);
     return true;
 }
 
-PRBM bool settle_calm(Simulation *sim, double *balances, Problem *problem) {
+PRBM bool freeze_calm(Simulation *sim, double *balances, Problem *problem) {
     double gaps[STOPS_MAX], rates[STOPS_MAX];
     if (!latch_peaks(sim, sim->state.front_time, problem)) {
         return false;
@@ -420,7 +420,7 @@ PRBM bool settle_calm(Simulation *sim, double *balances, Problem *problem) {
             return false;
         }
         if (due && is_balanced(&rest)) {
-            if (!settle_contact(sim, i, -gaps[i], problem)) {
+            if (!freeze_contact(sim, i, -gaps[i], problem)) {
                 return false;
             }
         } else if (due) {
@@ -430,7 +430,7 @@ PRBM bool settle_calm(Simulation *sim, double *balances, Problem *problem) {
     return true;
 }
 
-PRBM bool settles_here(Simulation *sim, bool *result, Problem *problem) {
+PRBM bool freezes_here(Simulation *sim, bool *result, Problem *problem) {
     double gaps[STOPS_MAX], rates[STOPS_MAX];
     gaps_and_rates(sim, gaps, rates);
     *result = false;

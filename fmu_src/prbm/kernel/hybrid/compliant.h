@@ -11,9 +11,9 @@ PRBM bool separate(Simulation *sim, int stop, Problem *problem); /* at the end o
 PRBM bool preload(Simulation *sim, Problem *problem);
 /* Settle the contacts at the front that have been calm for a contact time.  balances (s,): the
  * indentations at which the other calm contacts would be in balance, 0 for all other stops. */
-PRBM bool settle_calm(Simulation *sim, double *balances, Problem *problem);
-/* Whether settle_calm would settle a contact in model exchange, where the front is the present. */
-PRBM bool settles_here(Simulation *sim, bool *result, Problem *problem);
+PRBM bool freeze_calm(Simulation *sim, double *balances, Problem *problem);
+/* Whether freeze_calm would freeze a contact in model exchange, where the front is the present. */
+PRBM bool freezes_here(Simulation *sim, bool *result, Problem *problem);
 /* Let the displacement of a wall by the force of its stop become its motion at time t; extra: the
  * states of the stop. */
 PRBM void fold_give(Wall *wall, double t, double *extra);

@@ -15,7 +15,7 @@ static const ContactFailure JAMMED = {
     "friction jams the mechanism; reduce the coefficients of friction",
 };
 /* The modes change with each projection. */
-static const ContactFailure UNSETTLED = {
+static const ContactFailure UNDECIDED = {
     "the choice of closed contacts does not converge",
     "the forces of the contacts are round-off; separate the stops, or change the load",
 };
@@ -128,8 +128,8 @@ static double least_pressing(Simulation *sim, int stop, const double *q) {
                           extra_states(sim, sim->state.front));
     const Configuration *configuration = &sim->configuration;
     sim->scratch.used = mark;
-    const Touching *touching = &sim->state.touching[stop];
-    distance += touching->phase == PHASE_SETTLED ? touching->depth : 0.0;
+    const ContactPhase *touching = &sim->state.touching[stop];
+    distance += touching->phase == PHASE_FROZEN ? touching->depth : 0.0;
     return distance > -closing_depth(configuration) / 2.0 ? zero_acceleration(configuration) : 0.0;
 }
 
@@ -413,7 +413,7 @@ static bool modes_by_forces(Simulation *sim, const HoldingSet *stops, const Hold
  * rest are frictionless; if that fails, with all stops that touch.  A contact at its limit sticks if
  * it can; the forces of contacts that can hardly move against each other may then exceed their
  * limits, which they do not if it slips. */
-static bool settle_friction(Simulation *sim, const HoldingSet *holding, const HoldingSet *touching,
+static bool choose_slips(Simulation *sim, const HoldingSet *holding, const HoldingSet *touching,
                             const FrictionEvent *event, ContactMode *modes, Problem *problem) {
     ContactMode first[CONTACTS_MAX];
     size_t bytes = (size_t)contact_count(sim) * sizeof *modes;
@@ -498,8 +498,8 @@ static int resting_candidates(Simulation *sim, const int *touching, int touching
 }
 
 /* Choose the modes of all contacts by their forces at the front. */
-static bool choose_modes(Simulation *sim, const HoldingSet *touching, const FrictionEvent *event,
-                         ContactMode *modes, Problem *problem) {
+static bool choose_all_modes(Simulation *sim, const HoldingSet *touching, const FrictionEvent *event,
+                             ContactMode *modes, Problem *problem) {
     const System *system = system_of(sim);
     const double *q = sim->state.front, *v = q + system->n;
     HoldingSet holding;
@@ -511,7 +511,7 @@ static bool choose_modes(Simulation *sim, const HoldingSet *touching, const Fric
                     !has_contact(holding.count, holding.stops, contact);
         modes[contact] = open ? CONTACT_OPEN : CONTACT_FRICTIONLESS;
     }
-    return settle_friction(sim, &holding, touching, event, modes, problem);
+    return choose_slips(sim, &holding, touching, event, modes, problem);
 }
 
 /* Remove the compliant stops that are pressed: they are no constraints. */
@@ -531,7 +531,7 @@ static void remove_pressed(const Simulation *sim, HoldingSet *stops) {
  *
  * touching: open stops that touch and neither close nor open
  * event: a slip or reversal that has just occurred, or NULL */
-PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const Event *event,
+PRBM bool choose_modes(Simulation *sim, const int *touching, int touching_count, const Event *event,
                  Problem *problem) {
     FrictionEvent friction;
     int candidates[2 * STOPS_MAX];
@@ -542,8 +542,8 @@ PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const
     }
     int count = resting_candidates(sim, touching, touching_count, candidates);
     HoldingSet all = in_order(sim, count, candidates, true);
-    for (int k = 0; k < SETTLE_ITERATIONS_MAX; k++) {
-        if (!choose_modes(sim, &all, &friction, modes, problem)) {
+    for (int k = 0; k < MODE_ITERATIONS_MAX; k++) {
+        if (!choose_all_modes(sim, &all, &friction, modes, problem)) {
             return false;
         }
         bool same = k > 0 && memcmp(modes, sim->state.modes, bytes) == 0;
@@ -559,5 +559,5 @@ PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const
             return false;
         }
     }
-    return contacts_fail(sim, &UNSETTLED, count, candidates, problem);
+    return contacts_fail(sim, &UNDECIDED, count, candidates, problem);
 }

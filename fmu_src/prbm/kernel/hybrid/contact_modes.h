@@ -15,7 +15,7 @@ PRBM bool find_holding_stops(Simulation *sim, int count, const int *candidates, 
 /* The trial equations in which a set of stops is closed and all contacts with a velocity slip. */
 PRBM const Equations *equations_holding(Simulation *sim, const HoldingSet *holding,
                                         const double *q, const double *v);
-PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const Event *event,
+PRBM bool choose_modes(Simulation *sim, const int *touching, int touching_count, const Event *event,
                  Problem *problem);
 
 #endif

@@ -125,7 +125,7 @@ static Dent dent_now(Simulation *sim, int stop, double gap_now, double rate,
     size_t mark = sim->scratch.used;
     const Equations *eq = &sim->equations;
     const ComplianceLaw *law = &eq->laws[stop];
-    const Touching *touching = &eq->contacts.touching[stop];
+    const ContactPhase *touching = &eq->contacts.touching[stop];
     const double *front = sim->state.front;
     double t = sim->state.front_time;
     Dent last = latest_dent(sim, stop);

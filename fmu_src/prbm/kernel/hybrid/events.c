@@ -18,7 +18,7 @@ static bool apply_impact(Simulation *sim, const Event *event, Problem *problem) 
 static bool apply_release(Simulation *sim, const Event *event, Problem *problem) {
     set_mode(sim, event->contact, CONTACT_OPEN);
     (void)press_released(sim);
-    return settle(sim, NULL, 0, NULL, problem);
+    return choose_modes(sim, NULL, 0, NULL, problem);
 }
 
 static bool apply_switch(Simulation *sim, const Event *event, Problem *problem) {
@@ -31,7 +31,7 @@ static bool apply_separation(Simulation *sim, const Event *event, Problem *probl
 
 /* A slip or a reversal. */
 static bool apply_friction(Simulation *sim, const Event *event, Problem *problem) {
-    return settle(sim, NULL, 0, event, problem);
+    return choose_modes(sim, NULL, 0, event, problem);
 }
 
 /* --- the table -------------------------------------------------------------------------------- */

@@ -31,7 +31,7 @@ static double sign_of_gap(const Guard *guard) {
 /* The margin of the phase of a contact.  It begins to rise when its rate exceeds the reference
  * speed; it becomes free when its damping exceeds the elastic force. */
 PRBM double switching_guard(const Equations *equations, const Instant *at, int contact) {
-    const Touching *touching = &equations->contacts.touching[contact];
+    const ContactPhase *touching = &equations->contacts.touching[contact];
     double rate = -gap_rate_guard(equations, at, contact);
     double ratio = damping_ratio(&equations->laws[contact], touching, rate);
     if (touching->phase == PHASE_FREE) {
@@ -47,13 +47,13 @@ PRBM double rising_guard(const Equations *equations, const Instant *at, int cont
 }
 
 PRBM double release_guard(const Equations *equations, const Instant *at, int contact) {
-    const Touching *touching = &equations->contacts.touching[contact];
+    const ContactPhase *touching = &equations->contacts.touching[contact];
     double force = stop_force(equations, at->found->lam, contact);
-    if (touching->phase != PHASE_SETTLED) {
+    if (touching->phase != PHASE_FROZEN) {
         return force;
     }
     double elastic = elastic_force(&equations->laws[contact], touching->depth);
-    return SETTLED_FORCE_RTOL * elastic - fabs(force - elastic);
+    return FROZEN_FORCE_RTOL * elastic - fabs(force - elastic);
 }
 
 PRBM double slip_guard(const Equations *equations, const Instant *at, int contact) {
@@ -99,7 +99,7 @@ PRBM bool release_near(Simulation *sim) {
         return true;
     }
     for (int k = 0; k < eq->held_count; k++) {
-        if (eq->contacts.touching[eq->held[k]].phase == PHASE_SETTLED ||
+        if (eq->contacts.touching[eq->held[k]].phase == PHASE_FROZEN ||
             forces->least[k] <= RELEASE_WATCH_FACTOR * forces->largest[k]) {
             return true;
         }

@@ -553,12 +553,13 @@ PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
     }
     bool ok = find_partners(sim, hit, q, v, &hits, rates, problem);
     if (ok && hits.struck_count > 0) {
-        unsettle(sim);
+        unfreeze(sim);
         ok = find_partners(sim, hit, q, v, &hits, rates, problem);
     }
     if (ok && hits.struck_count == 0) {
         sim->scratch.used = mark;
-        return settle(sim, &hit, rates[hit] <= zero_speed(&sim->configuration), NULL, problem);
+        return choose_modes(sim, &hit, rates[hit] <= zero_speed(&sim->configuration), NULL,
+                            problem);
     }
     ok = ok && choose_restitutions(sim, q, v, rates, &hits, counted, problem) &&
          join_touching(sim, q, rates, &hits, problem) &&
@@ -571,7 +572,8 @@ PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
         touching_count = open_all(sim, &hits, touching);
     }
     sim->scratch.used = mark;
-    return ok && rephase(sim, problem) && settle(sim, touching, touching_count, NULL, problem);
+    return ok && rephase(sim, problem) &&
+           choose_modes(sim, touching, touching_count, NULL, problem);
 }
 
 /* --- impulses of the inputs ------------------------------------------------------------------- */
@@ -618,8 +620,8 @@ static bool apply_impulses(Simulation *sim, int i, const double *P, Problem *pro
 }
 
 /* Apply the changes of the impulses since they were last received.  The loops transmit them;
- * impacts at stops follow later, in settle_moved.  Friction is finite and has no impulse: sticking
- * contacts become free to slip or stick again. */
+ * impacts at stops follow later, in choose_moved_modes.  Friction is finite and has no impulse:
+ * sticking contacts become free to slip or stick again. */
 PRBM bool receive_impulses(Simulation *sim, Problem *problem) {
     int forces = sim->configuration.mechanism->force_count;
     const double *given = given_impulses(sim);

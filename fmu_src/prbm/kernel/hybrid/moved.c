@@ -31,7 +31,7 @@ static int release_moving(Simulation *sim) {
 }
 
 /* Choose the contact state after changes of the walls' velocities or impulses. */
-PRBM bool settle_moved(Simulation *sim, Problem *problem) {
+PRBM bool choose_moved_modes(Simulation *sim, Problem *problem) {
     int struck = release_moving(sim);
     if (!rephase(sim, problem)) {
         return false;
@@ -40,7 +40,7 @@ PRBM bool settle_moved(Simulation *sim, Problem *problem) {
         return impact(sim, struck, problem);
     }
     return project(&sim->equations, sim->state.time, sim->state.front, &sim->scratch, problem) &&
-           settle(sim, NULL, 0, NULL, problem);
+           choose_modes(sim, NULL, 0, NULL, problem);
 }
 
 /* Keep held stops on walls whose velocities have jumped by less than rest_speed; otherwise the
@@ -65,5 +65,5 @@ PRBM bool follow_walls(Simulation *sim, const double *lam, double time, Problem 
     }
     copy(follows ? ny : 0, after, y);
     sim->scratch.used = mark;
-    return ok && (follows || settle_moved(sim, problem));
+    return ok && (follows || choose_moved_modes(sim, problem));
 }

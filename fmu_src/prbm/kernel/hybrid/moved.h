@@ -4,7 +4,7 @@
 
 #include "hybrid/state.h"
 
-PRBM bool settle_moved(Simulation *sim, Problem *problem); /* after velocities have jumped */
+PRBM bool choose_moved_modes(Simulation *sim, Problem *problem); /* after velocities have jumped */
 PRBM bool follow_walls(Simulation *sim, const double *lam, double time, Problem *problem);
 
 #endif

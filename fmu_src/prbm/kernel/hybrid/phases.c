@@ -4,7 +4,7 @@
 #include "hybrid/phases.h"
 
 PRBM void set_phase(Simulation *sim, int stop, Phase phase, double speed, double depth) {
-    Touching touching = {phase, speed, depth}, *now = &sim->state.touching[stop];
+    ContactPhase touching = {phase, speed, depth}, *now = &sim->state.touching[stop];
     ContactMode *mode = &sim->state.modes[stop];
     if (*mode != CONTACT_OPEN && now->phase == phase && now->reference_speed == speed &&
         now->depth == depth) {
@@ -35,7 +35,7 @@ PRBM bool indentation_acceleration(Simulation *sim, int stop, double *result,
 }
 
 static bool rephase_one(Simulation *sim, int stop, double rate, Problem *problem) {
-    Touching touching = sim->state.touching[stop];
+    ContactPhase touching = sim->state.touching[stop];
     double speed = greater(touching.reference_speed, rate), acceleration = 0.0;
     set_phase(sim, stop, PHASE_PRESSED, speed, 0.0);
     if (rate >= touching.reference_speed) {
@@ -67,10 +67,10 @@ PRBM bool rephase(Simulation *sim, Problem *problem) {
     return ok;
 }
 
-PRBM void unsettle(Simulation *sim) {
+PRBM void unfreeze(Simulation *sim) {
     for (int i = 0; i < system_of(sim)->s; i++) {
-        const Touching *touching = &sim->state.touching[i];
-        if (touching->phase == PHASE_SETTLED) {
+        const ContactPhase *touching = &sim->state.touching[i];
+        if (touching->phase == PHASE_FROZEN) {
             set_phase(sim, i, PHASE_PRESSED, touching->reference_speed, 0.0);
         }
     }
@@ -79,8 +79,8 @@ PRBM void unsettle(Simulation *sim) {
 PRBM bool press_released(Simulation *sim) {
     bool any = false;
     for (int i = 0; i < system_of(sim)->s; i++) {
-        Touching *touching = &sim->state.touching[i];
-        if (touching->phase == PHASE_SETTLED && sim->state.modes[i] == CONTACT_OPEN) {
+        ContactPhase *touching = &sim->state.touching[i];
+        if (touching->phase == PHASE_FROZEN && sim->state.modes[i] == CONTACT_OPEN) {
             set_phase(sim, i, PHASE_PRESSED, touching->reference_speed, 0.0);
             any = true;
         }

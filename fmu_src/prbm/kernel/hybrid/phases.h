@@ -6,9 +6,9 @@
 
 /* Set the phases of all contacts for the present rates. */
 PRBM bool rephase(Simulation *sim, Problem *problem);
-/* Make settled stops forces, before impulses act. */
-PRBM void unsettle(Simulation *sim);
-/* Make the settled stops that are open forces; return whether there are any. */
+/* Make frozen stops forces, before impulses act. */
+PRBM void unfreeze(Simulation *sim);
+/* Make the frozen stops that are open forces; return whether there are any. */
 PRBM bool press_released(Simulation *sim);
 /* Compute the second derivative of the indentation of a stop at the front. */
 PRBM bool indentation_acceleration(Simulation *sim, int stop, double *result, Problem *problem);

@@ -121,7 +121,7 @@ static bool release_mechanism(Simulation *sim, Problem *problem) {
     return start_state(sim, problem) &&
            project(&sim->equations, state->time, state->front, &sim->scratch, problem) &&
            check_walls(sim, problem) &&
-           rephase(sim, problem) && settle(sim, rigid, count, NULL, problem) &&
+           rephase(sim, problem) && choose_modes(sim, rigid, count, NULL, problem) &&
            find_fastest(sim, problem);
 }
 

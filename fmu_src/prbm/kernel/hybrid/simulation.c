@@ -48,8 +48,8 @@ static void place_state(State *state, const Mechanism *m, Memory *memory) {
     place_numbers(state, m, memory);
     state->modes = place(memory, s + (size_t)m->friction_count, sizeof *state->modes);
     state->driven = place(memory, s, sizeof(bool));
-    state->touching = place(memory, s, sizeof(Touching));
-    state->touches = place(memory, s, sizeof(Touch));
+    state->touching = place(memory, s, sizeof(ContactPhase));
+    state->touches = place(memory, s, sizeof(ContactStart));
     state->latched = place(memory, s, sizeof(Latched));
     state->walls = place(memory, s, sizeof(Wall));
 }
@@ -127,7 +127,7 @@ static void place_all(Simulation *sim, Memory *memory) {
     sim->trial.contacts.modes = place(memory, (size_t)contact_count(sim),
                                      sizeof(ContactMode));
     sim->trial.contacts.touching = place(memory, (size_t)system->mechanism->stop_count,
-                                        sizeof(Touching));
+                                        sizeof(ContactPhase));
     evaluation_place(&sim->trial.evaluation, system, memory);
     place_stepping(&sim->stepping, system, memory);
     place_present(sim, system, memory);

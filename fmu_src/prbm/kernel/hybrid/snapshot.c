@@ -35,8 +35,8 @@ static double *put_stop(const State *state, int i, double *to) {
 
 static double *put_contact(const State *state, int i, double *to) {
     const Latched *last = &state->latched[i];
-    const Touching *touching = &state->touching[i];
-    const Touch *begun = &state->touches[i];
+    const ContactPhase *touching = &state->touching[i];
+    const ContactStart *begun = &state->touches[i];
     const double contact[PER_CONTACT_STATE] = {
         last->peak_force, last->indentation,         last->contact_duration,
         touching->phase,  touching->reference_speed, touching->depth,
@@ -128,12 +128,12 @@ static void get_scalars(State *state, StateReader *reader) {
 
 static void get_contact(State *state, int i, StateReader *reader) {
     Latched *last = &state->latched[i];
-    Touching *touching = &state->touching[i];
-    Touch *begun = &state->touches[i];
+    ContactPhase *touching = &state->touching[i];
+    ContactStart *begun = &state->touches[i];
     last->peak_force = get_number(reader);
     last->indentation = get_number(reader);
     last->contact_duration = get_number(reader);
-    touching->phase = (Phase)get_integer(reader, PHASE_NONE, PHASE_SETTLED);
+    touching->phase = (Phase)get_integer(reader, PHASE_NONE, PHASE_FROZEN);
     touching->reference_speed = get_number(reader);
     touching->depth = get_number(reader);
     begun->time = get_number(reader);

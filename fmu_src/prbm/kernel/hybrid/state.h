@@ -46,10 +46,10 @@ typedef struct {
     double time;
     bool counted;         /* whether it is an impact whose outputs are not yet latched */
     double impulse, loss; /* states of the stop before the contact */
-    bool calm;            /* whether the contact is calm enough to settle */
+    bool calm;            /* whether the contact is calm enough to freeze */
     double calm_since;
     double step;          /* size of the steps before the contact */
-} Touch;
+} ContactStart;
 
 /* A state of the motion through which an interpolation passes. */
 typedef struct {
@@ -108,8 +108,8 @@ typedef struct {
     double longest;       /* recent longest communication step, at most a tenth of the period */
     ContactMode *modes;   /* (s + f,) of the contacts */
     bool *driven;         /* (s,): whether stop.velocity has ever been non-zero */
-    Touching *touching;   /* (s,) contacts at compliant stops */
-    Touch *touches;       /* (s,) */
+    ContactPhase *touching;   /* (s,) contacts at compliant stops */
+    ContactStart *touches;       /* (s,) */
     Latched *latched;     /* (s,) */
     Wall *walls;          /* (s,) */
     double *numbers;      /* the arrays below, one after another */

@@ -236,7 +236,7 @@ PRBM bool take_step(Simulation *sim, Problem *problem) {
     double h = 0.0, longest = sim->equations.walls_move ? follow_cubics(sim) : HUGE_VAL;
     double balances[STOPS_MAX];
     bool pressed = sim->equations.pressed_count > 0, ended = false;
-    if (pressed && !settle_calm(sim, balances, problem)) {
+    if (pressed && !freeze_calm(sim, balances, problem)) {
         return false;
     }
     if (!state->has_k1) {

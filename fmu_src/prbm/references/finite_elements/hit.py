@@ -8,7 +8,7 @@ import numpy as np
 from ...base.errors import SimulationError
 from ...mechanics.arrays import Real
 from ...mechanics.compliance import ComplianceLaw, damping_factor
-from ...mechanics.contact_state import Phase, Touching
+from ...mechanics.contact_state import ContactPhase, Phase
 from ...mechanics.modal import simulated_restitution
 from ...mechanics.system import unit
 from ...mechanism.parts import GROUND, value
@@ -83,7 +83,7 @@ class _Contact:
         """Return the contact force at an indentation [m] and its rate [m/s]."""
         if d <= 0.0:
             return 0.0
-        return max(0.0, self.law.force(Touching(Phase.PRESSED, self.reference), d, rate))
+        return max(0.0, self.law.force(ContactPhase(Phase.PRESSED, self.reference), d, rate))
 
     def _vector(self, mbs: Any, t: float, item: int, moved: Any, rate: Any, *_: Any) -> list[float]:
         d, u = (x[0] * self.u.real + x[1] * self.u.imag for x in (moved, rate))
