@@ -6,6 +6,7 @@ import io
 import pickle
 import re
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 import prbm
+from compliant_pivot import two_compliant_stops
 from prbm.runs import run
 from prbm.runs.result import Result as BareResult
 from prbm.runs.result import ResultError
@@ -106,6 +108,38 @@ def test_a_data_set_has_the_columns_and_their_units(result):
     assert float(data["shuttle.x"].sel(time=0.0)) == result["shuttle.x"][0]
 
 
+def test_the_table_of_impacts_has_the_values_of_the_impacts(result):
+    """One row for each impact, with the outputs that the stop has after it."""
+    frame = result.impacts_to_pandas()
+    assert frame.index.name == "number"
+    assert [*frame.index] == [impact.latched.impact_count for impact in result.impacts]
+    assert frame.attrs["units"]["impulse"] == "N.s"
+    assert [*frame.attrs["units"]] == ["number", *frame]
+    for name in frame.columns.drop(["stop", "time"]):
+        assert [*frame[name]] == [getattr(impact.latched, name) for impact in result.impacts]
+    assert [*frame["time"]] == [impact.time for impact in result.impacts]
+    assert {*frame["stop"]} == {"stop"}
+
+
+def test_the_table_of_no_impacts_has_the_columns(result):
+    none = replace(result, impacts=()).impacts_to_pandas()
+    assert len(none) == 0
+    assert [*none.dtypes] == [*result.impacts_to_pandas().dtypes]
+
+
+def test_cells_of_contacts_are_empty_for_rigid_stops():
+    pivot = two_compliant_stops()
+    upper, lower = pivot.stops
+    rigid = replace(lower, law="rigid", stiffness=None, exponent=None)
+    found = prbm.simulate(pivot, stop_time=0.05)
+    hits = (found.impacts[0], replace(found.impacts[0], stop=lower.name))
+    mixed = replace(pivot, stops=(upper, rigid))
+    frame = replace(found, mechanism=mixed, impacts=hits).impacts_to_pandas()
+    assert [*frame["stop"]] == ["upper", "lower"]
+    for name in ("peak_force", "indentation", "contact_duration"):
+        assert [*frame[name].isna()] == [False, True]
+
+
 def test_a_missing_xarray_is_reported_with_a_remedy(result, monkeypatch):
     monkeypatch.setitem(sys.modules, "xarray", None)
     with pytest.raises(ResultError, match=r"install it with: .*prbm-impact\[notebook\]"):
@@ -116,6 +150,8 @@ def test_a_missing_pandas_is_reported_with_a_remedy(result, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(ResultError, match=r"install it with: .*prbm-impact\[notebook\]"):
         result.to_pandas()
+    with pytest.raises(ResultError, match=r"install it with: .*prbm-impact\[notebook\]"):
+        result.impacts_to_pandas()
 
 
 def test_quantities_of_a_result(result):

@@ -2,7 +2,7 @@
 
 import argparse
 import time
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +18,7 @@ from ..mechanics.assembly import assemble
 from ..mechanism.description import Mechanism
 from ..runs.headline import headline
 from ..runs.hits import hits
+from ..runs.impact_table import heads, impact_table
 from ..runs.result import Result, names
 from ..runs.run import communication_points, simulate
 from .duration import given_inputs, span
@@ -28,11 +29,6 @@ from .systems import ZERO_RTOL
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-IMPACT_HEAD = (
-    "number", "stop", "time [s]", "approach speed [m/s]", "rebound speed [m/s]", "impulse [N.s]",
-    "energy lost [J]", "modal restitution [-]",
-)  # fmt: skip
-CONTACT_HEAD = ("peak force [N]", "indentation [m]", "contact duration [s]")
 SLOW = 5.0  # Computing time from which on a note says what sets the step [s].
 PEAKS_MAX = 6  # Printed peaks per signal.
 SPECTRUM_END = 1.5  # Upper end of a drawn spectrum, in multiples of its highest marked mode.
@@ -65,9 +61,8 @@ def run_simulation(options: argparse.Namespace) -> None:
         print(line)
     columns = names(result.columns)
     output.table(f"{mechanism.name}.csv", columns, (list(row) for row in result.columns.tolist()))
-    compliant = {stop.name for stop in mechanism.stops if stop.compliant}
-    head = (*IMPACT_HEAD, *(CONTACT_HEAD if compliant else ()))
-    output.table(f"{mechanism.name}-impacts.csv", head, _impacts(result, compliant))
+    units, rows = impact_table(mechanism, result.impacts)
+    output.table(f"{mechanism.name}-impacts.csv", heads(units), rows)
     output.figure(f"{mechanism.name}.png", lambda: _figure(result))
     output.write()
     for sentence in _notes(result.mechanism, values):
@@ -105,24 +100,6 @@ def _notes(mechanism: Mechanism, values: Mapping[str, float]) -> list[str]:
     parameters = {p.name for p in mechanism.parameters}
     shapes: list[Shape] = [Vibration(), *map(Impact, range(len(mechanism.stops)))]
     return notes(mechanism, {n: x for n, x in values.items() if n in parameters}, shapes)
-
-
-def _impacts(result: Result, compliant: Collection[str]) -> Iterator[list[object]]:
-    """Yield a row of the table of impacts for each impact.
-
-    If the mechanism has compliant stops, the last three cells of impacts at rigid stops are empty.
-    """
-    for number, impact in enumerate(result.impacts, start=1):
-        latched = impact.latched
-        row: list[object] = [
-            number, impact.stop, impact.time, latched.approach_speed, latched.rebound_speed,
-            latched.impulse, latched.energy_lost, latched.modal_restitution,
-        ]  # fmt: skip
-        if impact.stop in compliant:
-            row += [latched.peak_force, latched.indentation, latched.contact_duration]
-        elif compliant:
-            row += [""] * len(CONTACT_HEAD)
-        yield row
 
 
 def _figure(result: Result) -> "Figure":

@@ -4,6 +4,7 @@ import csv
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ from ..hybrid.records import Impact
 from ..interface.variables import variables
 from ..mechanics.arrays import Real
 from ..mechanism.description import Mechanism
+from .impact_table import impact_table
 from .quantities import FREQUENCY, QUANTITIES
 
 if TYPE_CHECKING:
@@ -127,15 +129,29 @@ class Result(Mapping[str, Columns]):
         ResultError
             If pandas is not installed.
         """
-        try:
-            import pandas  # imported here: an extra, and it takes half a second
-        except ModuleNotFoundError:
-            raise ResultError(
-                "pandas is not installed; install it with: python -m pip install "
-                '"prbm-impact[notebook]"'
-            ) from None
-        frame = pandas.DataFrame.from_records(self.columns, index="time")
+        pandas = _extra("pandas")
+        frame: pd.DataFrame = pandas.DataFrame.from_records(self.columns, index="time")
         frame.attrs = {"mechanism": self.mechanism.name, "units": self.units()}
+        return frame
+
+    def impacts_to_pandas(self) -> "pd.DataFrame":
+        """Return the impacts as a pandas DataFrame, a row for each, over their numbers from 1.
+
+        The columns are those of the table ``NAME-impacts.csv`` of ``prbm simulate --out``: stop,
+        time, speeds, impulse, lost energy and modal restitution, and those of compliant stops, NaN
+        for an impact at a rigid one.  ``attrs`` is that of :meth:`to_pandas`.
+
+        Raises
+        ------
+        ResultError
+            If pandas is not installed.
+        """
+        pandas = _extra("pandas")
+        units, rows = impact_table(self.mechanism, self.impacts)
+        kinds = {name: "int64" if name == "number" else "float64" for name in units}
+        table = pandas.DataFrame(rows, columns=[*units]).astype(kinds | {"stop": object})
+        frame: pd.DataFrame = table.set_index("number")
+        frame.attrs = {"mechanism": self.mechanism.name, "units": units}
         return frame
 
     def to_xarray(self) -> "xarray.Dataset":
@@ -149,15 +165,10 @@ class Result(Mapping[str, Columns]):
         ResultError
             If xarray is not installed.
         """
-        try:
-            import xarray  # imported here: an extra, and it takes half a second
-        except ModuleNotFoundError:
-            raise ResultError(
-                "xarray is not installed; install it with: python -m pip install "
-                '"prbm-impact[notebook]"'
-            ) from None
+        package = _extra("xarray")
         found = {name: ("time", self[name], {"units": unit}) for name, unit in self.units().items()}
-        return xarray.Dataset(found, attrs={"mechanism": self.mechanism.name})
+        data: xarray.Dataset = package.Dataset(found, attrs={"mechanism": self.mechanism.name})
+        return data
 
     def units(self) -> dict[str, str]:
         """Return the SI units by column, empty for integers and Booleans.
@@ -171,6 +182,23 @@ class Result(Mapping[str, Columns]):
         first = {FREQUENCY: 0.0} | first
         known = {v.name: v.unit for v in variables(self.mechanism, first)}
         return {name: "s" if name == "time" else known[name] for name in self}
+
+
+def _extra(name: str) -> Any:
+    """Import a package of the extra ``notebook``, which takes half a second.
+
+    Raises
+    ------
+    ResultError
+        If it is not installed.
+    """
+    try:
+        return import_module(name)
+    except ModuleNotFoundError:
+        raise ResultError(
+            f"{name} is not installed; install it with: python -m pip install "
+            '"prbm-impact[notebook]"'
+        ) from None
 
 
 def column(columns: Columns, name: str) -> Columns:
