@@ -77,7 +77,7 @@ def test_the_readme_prints_the_result_of_its_first_command(tmp_path, monkeypatch
     (block,) = re.findall(r"```text\n(.*?)```", README, re.DOTALL)
     for line in block.splitlines():
         assert line in printed
-    files = ("PRBDM2R.csv", "PRBDM2R-impacts.csv", "PRBDM2R.png")
+    files = ("PRBDM2R.csv", "PRBDM2R-impacts.csv", "PRBDM2R.png", "PRBDM2R-run.json")
     assert {path.name for path in (tmp_path / "results").iterdir()} == set(files)
 
 

@@ -3,6 +3,7 @@
 import base64
 import inspect
 import io
+import json
 import pickle
 import re
 import sys
@@ -83,6 +84,26 @@ def test_columns_are_those_of_the_data_frame(result):
     for name in frame:
         np.testing.assert_array_equal(frame[name], result[name])
     np.testing.assert_array_equal(frame.index, result["time"])
+
+
+def test_tables_say_how_the_result_was_made(result):
+    """The changed values are those that repeat the simulation."""
+    made = result.to_pandas().attrs
+    assert made["mechanism"] == "PRBDM"
+    assert made["version"] == prbm.__version__
+    assert made["engine"] == result.engine
+    assert made["changes"] == {"stop.position": -1e-3}
+    again = prbm.simulate(result.mechanism, made["changes"], stop_time="0.06 s")
+    np.testing.assert_array_equal(again.columns, result.columns)
+    texts = result.to_xarray().attrs
+    assert json.loads(texts.pop("changes")) == made["changes"]
+    assert texts == {name: made[name] for name in texts}
+    assert all(isinstance(x, str) for x in texts.values())
+
+
+def test_inputs_at_the_start_are_among_the_changes(result):
+    driven = prbm.simulate(result.mechanism, {"force.x": "1 mN"}, stop_time="1 ms")
+    assert driven.to_pandas().attrs["changes"] == {"force.x": 1e-3}
 
 
 def test_units_of_the_columns_are_those_of_the_interface(result):

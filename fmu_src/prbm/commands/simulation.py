@@ -19,11 +19,13 @@ from ..mechanism.description import Mechanism
 from ..runs.headline import headline
 from ..runs.hits import hits
 from ..runs.impact_table import heads, impact_table
+from ..runs.inputs import files_of
 from ..runs.result import Result, names
 from ..runs.run import communication_points, simulate
 from .duration import given_inputs, span
 from .output import Output
 from .parameters import given_values
+from .record import Record
 from .systems import ZERO_RTOL
 
 if TYPE_CHECKING:
@@ -42,6 +44,7 @@ def run_simulation(options: argparse.Namespace) -> None:
     stop_time, step = span(mechanism, values, options.stop_time, options.step, options.engine)
     duration = quantity(options.spectrum_time, "s", "--spectrum-time")
     communication_points(stop_time, step)
+    record = Record(options.out, f"{mechanism.name}-run.json", options.mechanism)
     if options.input and options.spectrum == "first":
         raise UserMistake(
             "--spectrum first: the motion after the first impact is simulated without inputs over "
@@ -64,13 +67,29 @@ def run_simulation(options: argparse.Namespace) -> None:
     units, rows = impact_table(mechanism, result.impacts)
     output.table(f"{mechanism.name}-impacts.csv", heads(units), rows)
     output.figure(f"{mechanism.name}.png", lambda: _figure(result))
+    arguments = _arguments(result, values, inputs, step, tolerance)
+    output.text(record.name, record.text(mechanism, arguments, files_of(inputs)))
     output.write()
-    for sentence in _notes(result.mechanism, values):
+    for sentence in [*record.notes(), *_notes(result.mechanism, values)]:
         print(sentence)
     if spent > SLOW:
         print(_slow(result.mechanism, values))
     if options.spectrum is not None:
         _spectrum(options, result, values, duration)
+
+
+def _arguments(
+    result: Result,
+    values: Mapping[str, float],
+    inputs: Mapping[str, str],
+    step: float,
+    tolerance: float | None,
+) -> dict[str, object]:
+    """Return the arguments of :func:`prbm.simulate` that repeat a simulation."""
+    return {
+        "changes": values, "inputs": inputs, "stop_time": float(result["time"][-1]), "step": step,
+        "tolerance": tolerance or result.start_values["solver.tolerance"], "engine": result.engine,
+    }  # fmt: skip
 
 
 def _slow(mechanism: Mechanism, values: Mapping[str, float]) -> str:

@@ -26,12 +26,14 @@ from ..fmu.parameter_sets import parameter_set
 from ..fmu.start import interface
 from ..mechanics.arrays import Real
 from ..mechanism.description import Mechanism
-from ..runs.inputs import placeholders
+from ..runs.engine import KERNEL
+from ..runs.inputs import files_of, placeholders
 from ..sweeps.design import SENSITIVITY, Yield
 from ..sweeps.optimum import FLAT_RTOL, Optimum
 from ..sweeps.study import Study, study
 from .duration import given_inputs
 from .output import Output, aligned
+from .record import Record
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -42,6 +44,7 @@ FILES = (
     "study.png",
     "best.ssv",
     "sensitivity.csv",
+    "study-run.json",
 )  # Ends of the names of the written files.
 NUMBER = re.compile(r"[+-]?[\d.]+([eE][+-]?\d+)?")
 ROWS_PRINTED_MAX = 45  # Longer tables are only written.
@@ -57,30 +60,17 @@ def run_study(options: argparse.Namespace) -> None:
     values = settings(mechanism, options.set)
     output = Output(options.out)
     inputs = given_inputs(options)
-    names = {**units_of(mechanism), **dict.fromkeys(placeholders(inputs), "")}
-    table, figure, best, shares = (f"{mechanism.name}-{end}" for end in FILES)
-    output.check(table, figure, best, shares)
+    table, figure, best, shares, run = (f"{mechanism.name}-{end}" for end in FILES)
+    output.check(table, figure, best, shares, run)
+    record = Record(options.out, run, options.mechanism)
+    arguments = _arguments(options, mechanism, values, inputs)
     found = study(
-        mechanism, _vary(options, names, mechanism), options.of or [], runs=options.runs,
-        method=options.method, seed=options.seed,
-        minimise=options.minimise, maximise=options.maximise, subject_to=options.subject_to,
-        tolerances=pairs(options.tolerance_of, "--tolerance-of", "stop.position=0.1mm"),
-        values=values, inputs=inputs,
-        stop_time=optional_quantity(options.stop_time, "s", "--stop-time"),
-        step=optional_quantity(options.step, "s", "--step"),
-        tolerance=optional_quantity(options.tolerance, "", "--tolerance"),
-        workers=options.workers, executor=options.scheduler,
-        timeout=optional_quantity(options.timeout, "s", "--timeout"), engine=options.engine,
+        mechanism, **arguments, workers=options.workers, executor=options.scheduler,
+        timeout=optional_quantity(options.timeout, "s", "--timeout"),
         table=None if options.out is None else options.out / table,
         overwrite=options.overwrite, progress=reporter(),
     )  # fmt: skip
-    _print_table({**found.parameters, **found.outputs}, found.units, found.satisfied)
-    if options.runs is not None:
-        _print_spread({**found.parameters, **found.outputs}, found.units)
-    failed = [message for message in found.messages if message]
-    print(f"{len(found.points)} simulations, {len(failed)} failed")
-    for message in dict.fromkeys(failed[:3]):
-        print(f"failed: {message}")
+    _print_simulations(options, found)
     if options.method == SENSITIVITY:
         _print_sensitivities(found)
         output.table(shares, SHARES_HEAD, _shares(found))
@@ -101,7 +91,59 @@ def run_study(options: argparse.Namespace) -> None:
     output.figure(figure, lambda: _figure(mechanism, found))
     if options.out is not None:
         print(options.out / table)
+    output.text(run, record.text(mechanism, arguments | _times(found), _files(arguments)))
     output.write()
+    for sentence in record.notes():
+        print(sentence)
+
+
+def _arguments(
+    options: argparse.Namespace,
+    mechanism: Mechanism,
+    values: Mapping[str, float],
+    inputs: Mapping[str, str],
+) -> dict[str, Any]:
+    """Return the arguments of the study that its results depend on."""
+    names = {**units_of(mechanism), **dict.fromkeys(placeholders(inputs), "")}
+    return {
+        "vary": _vary(options, names, mechanism), "outputs": options.of or [],
+        "runs": options.runs, "method": options.method, "seed": options.seed,
+        "minimise": options.minimise, "maximise": options.maximise,
+        "subject_to": options.subject_to,
+        "tolerances": pairs(options.tolerance_of, "--tolerance-of", "stop.position=0.1mm"),
+        "values": values, "inputs": inputs,
+        "stop_time": optional_quantity(options.stop_time, "s", "--stop-time"),
+        "step": optional_quantity(options.step, "s", "--step"),
+        "tolerance": optional_quantity(options.tolerance, "", "--tolerance"),
+        "engine": options.engine,
+    }  # fmt: skip
+
+
+def _times(found: Study) -> dict[str, Any]:
+    """Return times, tolerance and engine of the simulations, defaults replaced by their values."""
+    known = found.settings
+    return {
+        "stop_time": known["stop time [s]"], "step": known["step [s]"],
+        "tolerance": known["tolerance"], "engine": known["engine"] or KERNEL,
+    }  # fmt: skip
+
+
+def _files(arguments: Mapping[str, Any]) -> list[str]:
+    """Return the paths of the files that a study has read, except for the mechanism file."""
+    vary = arguments["vary"]
+    return [*files_of(arguments["inputs"]), *([str(vary)] if isinstance(vary, Path) else [])]
+
+
+def _print_simulations(options: argparse.Namespace, found: Study) -> None:
+    """Print the simulations, their spread if they are drawn, and the errors of failed ones."""
+    columns = {**found.parameters, **found.outputs}
+    _print_table(columns, found.units, found.satisfied)
+    if options.runs is not None:
+        _print_spread(columns, found.units)
+    failed = [message for message in found.messages if message]
+    print(f"{len(found.points)} simulations, {len(failed)} failed")
+    for message in dict.fromkeys(failed[:3]):
+        print(f"failed: {message}")
 
 
 def _vary(

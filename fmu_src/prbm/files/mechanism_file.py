@@ -138,16 +138,37 @@ def load(name: str | Path) -> Mechanism:
     >>> load("Bistable").name
     'Bistable'
     """
+    return read_mechanism(file_of(name))
+
+
+def file_of(name: str | Path) -> Path:
+    """Return the path of the file of a mechanism.
+
+    Parameters
+    ----------
+    name : str or Path
+        Name of a shipped mechanism, or path of a mechanism file.
+
+    Raises
+    ------
+    ParameterError
+        As :func:`load`.
+
+    Examples
+    --------
+    >>> file_of("Bistable").name, str(file_of("my/guide.toml"))
+    ('Bistable.toml', 'my/guide.toml')
+    """
     name, files = str(name), shipped()
     if name in files:
-        return read_mechanism(files[name])
+        return files[name]
     if os.path.isdir(name):
         raise ParameterError(f"{name!r} is a folder; give a mechanism file in it")
     if not Path(name).suffix and not os.path.isfile(name):
         raise ParameterError(
             f"unknown mechanism {name!r} (mechanism files end in .toml); {proposal(name, files)}"
         )
-    return read_mechanism(name)
+    return Path(name)
 
 
 # --- error messages ---------------------------------------------------------------------------

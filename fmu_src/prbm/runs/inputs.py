@@ -180,6 +180,22 @@ def filled(inputs: Mapping[str, Source], numbers: Mapping[str, float]) -> dict[s
     return {name: text(x) if isinstance(x, str) else x for name, x in inputs.items()}
 
 
+def files_of(inputs: Mapping[str, Source]) -> list[str]:
+    """Return the paths of the files in the texts of signals.
+
+    Examples
+    --------
+    >>> files_of({"force.x": "csv(shock.csv, x)", "force.y": "step(1 N)", "force.moment": 1.0})
+    ['shock.csv']
+    """
+    texts = (source.partition("(") for source in inputs.values() if isinstance(source, str))
+    return [
+        rest.rstrip().removesuffix(")").split(",")[0].strip()
+        for shape, _, rest in texts
+        if shape.strip() == FILE
+    ]
+
+
 def _signal(name: str, source: Source, unit: str) -> Signal:
     """Return a signal from one of its forms."""
     if isinstance(source, str):

@@ -1,6 +1,7 @@
 """Results of simulations, computed or read from files: columns by name, and impacts."""
 
 import csv
+import json
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from ..base import reading
 from ..base.errors import PrbmError
 from ..base.names import proposal
+from ..base.version import __version__
 from ..hybrid.records import Impact
 from ..interface.variables import variables
 from ..mechanics.arrays import Real
@@ -121,8 +123,10 @@ class Result(Mapping[str, Columns]):
     def to_pandas(self) -> "pd.DataFrame":
         """Return the columns as a pandas DataFrame over the time.
 
-        ``attrs["units"]`` has the SI units by column, empty for integers and Booleans, and
-        ``attrs["mechanism"]`` the name of the mechanism.
+        ``attrs["units"]`` has the SI units by column, empty for integers and Booleans.  The others
+        say how the result was made: ``mechanism``, its name; ``version`` of the package;
+        ``engine``; ``changes``, the parameters and inputs at the start that differ from their
+        defaults.
 
         Raises
         ------
@@ -131,7 +135,7 @@ class Result(Mapping[str, Columns]):
         """
         pandas = _extra("pandas")
         frame: pd.DataFrame = pandas.DataFrame.from_records(self.columns, index="time")
-        frame.attrs = {"mechanism": self.mechanism.name, "units": self.units()}
+        frame.attrs.update(self._made(), units=self.units())
         return frame
 
     def impacts_to_pandas(self) -> "pd.DataFrame":
@@ -151,14 +155,15 @@ class Result(Mapping[str, Columns]):
         kinds = {name: "int64" if name == "number" else "float64" for name in units}
         table = pandas.DataFrame(rows, columns=[*units]).astype(kinds | {"stop": object})
         frame: pd.DataFrame = table.set_index("number")
-        frame.attrs = {"mechanism": self.mechanism.name, "units": units}
+        frame.attrs.update(self._made(), units=units)
         return frame
 
     def to_xarray(self) -> "xarray.Dataset":
         """Return the columns as an xarray Dataset over the dimension ``time``.
 
-        ``attrs["units"]`` of each column has its SI unit, empty for integers and Booleans, and
-        ``attrs["mechanism"]`` of the data set the name of the mechanism.
+        ``attrs["units"]`` of each column has its SI unit, empty for integers and Booleans.  Those
+        of the data set are the others of :meth:`to_pandas`; ``changes`` is a text in JSON, because
+        files of data sets have numbers and texts as attributes.
 
         Raises
         ------
@@ -167,8 +172,21 @@ class Result(Mapping[str, Columns]):
         """
         package = _extra("xarray")
         found = {name: ("time", self[name], {"units": unit}) for name, unit in self.units().items()}
-        data: xarray.Dataset = package.Dataset(found, attrs={"mechanism": self.mechanism.name})
+        made = self._made()
+        data: xarray.Dataset = package.Dataset(
+            found, attrs=made | {"changes": json.dumps(made["changes"])}
+        )
         return data
+
+    def _made(self) -> dict[str, Any]:
+        """Return how the result was made: mechanism, version, engine, changed values."""
+        defaults = self.mechanism.values()
+        return {
+            "mechanism": self.mechanism.name,
+            "version": __version__,
+            "engine": self.engine,
+            "changes": {n: x for n, x in self.start_values.items() if x != defaults.get(n, 0.0)},
+        }
 
     def units(self) -> dict[str, str]:
         """Return the SI units by column, empty for integers and Booleans.

@@ -94,6 +94,8 @@ class Study:
         The parameters with a tolerance around the optimum.
     sensitivities : mapping
         Sobol's indices of each output, if they were requested and exist.
+    settings : mapping
+        All that the outputs depend on, except for the varied parameters.
     """
 
     varied: Mapping[str, Real]
@@ -107,6 +109,7 @@ class Study:
     share: Yield | None = None
     toleranced: tuple[str, ...] = ()
     sensitivities: Mapping[str, Sensitivity] = field(default_factory=dict)
+    settings: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def parameters(self) -> dict[str, Real]:
@@ -607,7 +610,7 @@ def _run(plan: Plan, runner: Runner, progress: Progress) -> Study:
     found: dict[str, Any] = {
         "varied": dict(plan.varied) if whole else columns, "points": points,
         "outputs": dict(zip(plan.texts, table.T, strict=True)), "units": plan.units,
-        "messages": messages, "whole_grid": whole,
+        "messages": messages, "whole_grid": whole, "settings": plan.settings,
         "good": _good(plan, table) & np.array([not message for message in messages]),
     }  # fmt: skip
     if method == SENSITIVITY and not whole:
