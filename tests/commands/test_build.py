@@ -349,7 +349,9 @@ def test_mistakes_are_one_sentence_and_status_2(command, tmp_path, monkeypatch, 
 
 def test_start_values_may_have_units():
     options = parser().parse_args(["build", "--model", "PRBDM", "--set", "stop.position=-2 mm"])
-    assert cli.start_values(cli.mechanisms(options), options.changes) == {"stop.position": -0.002}
+    assert cli.start_values([*cli.mechanisms(options).values()], options.changes) == {
+        "stop.position": -0.002
+    }
 
 
 def test_list_prints_the_shipped_mechanisms(capsys):
@@ -453,7 +455,7 @@ def test_names_files_and_options_select_mechanisms_once(tmp_path):
     path.write_text(text.replace('name = "PRBDM"', 'name = "Mine"'), encoding="utf-8")
 
     def names(*words: str) -> list[str]:
-        return [m.name for m in cli.mechanisms(parser().parse_args(["build", *words]))]
+        return [m.name for m in cli.mechanisms(parser().parse_args(["build", *words])).values()]
 
     assert names("PRBDM2R", str(path), "PRBDM2R", "--model", "PRBDM") == [
         "PRBDM2R",

@@ -93,16 +93,41 @@ def test_results_of_another_file_with_the_same_name_are_replaced_with_a_note(cap
         own_file("one.toml", "0.11 mm")
 
 
+def test_an_fmu_of_another_file_with_the_same_name_is_replaced_with_a_note(capsys):
+    own_file("one.toml")
+    own_file("two.toml", "0.12 mm")
+    built = []
+    for file in ("one", "two"):
+        assert run(f"build {file}.toml --flavour python --set stop.restitution=0.5") == cli.OK
+        built.append(Path("dist/python/PRBDM.fmu").read_bytes())
+        found = record("dist/python/PRBDM-build.json")
+        assert found["mechanism"]["file"] == f"{file}.toml"
+        assert found["arguments"]["values"] == {"stop.restitution": 0.5}
+    assert built[0] != built[1]
+    assert capsys.readouterr().out.count("note: dist had results of one.toml, a mechanism") == 1
+
+
 @pytest.mark.parametrize(
     "content", [b"", b"{}", b"[1]", b'{"mechanism": {"file": 1}}', b"\xff", b"[" * 100_000]
 )
 @pytest.mark.parametrize(
     "line",
-    ["simulate PRBDM --stop-time 1ms", "study PRBDM --vary stop.position=0:1mm:2 --of impacts"],
+    [
+        "simulate PRBDM --stop-time 1ms",
+        "study PRBDM --vary stop.position=0:1mm:2 --of impacts",
+        "build PRBDM --flavour python",
+    ],
 )
 def test_a_file_that_is_no_record_is_kept(line, content, capsys):
-    name = "PRBDM-study-run.json" if "study" in line else "PRBDM-run.json"
-    Path(name).write_bytes(content)
+    names = {
+        "simulate": "PRBDM-run.json",
+        "study": "PRBDM-study-run.json",
+        "build": "python/PRBDM-build.json",
+    }
+    path = Path(names[line.split()[0]])
+    path.parent.mkdir(exist_ok=True)
+    path.write_bytes(content)
     assert run(f"{line} --out .") == cli.MISTAKE
-    assert f"{name} exists and is not the record of a run: rename it" in capsys.readouterr().err
-    assert {path.name: path.read_bytes() for path in Path().iterdir()} == {name: content}
+    assert f"{path} exists and is not the record of a run: rename" in capsys.readouterr().err
+    written = (one for one in Path().rglob("*") if one.is_file())
+    assert {one: one.read_bytes() for one in written} == {path: content}

@@ -154,7 +154,9 @@ def test_fmus_contain_the_set_of_their_start_values(tmp_path):
     guide = read_mechanism(shipped()["PRBDM"])
     path = written(tmp_path, parameter_set(guide, interface(guide, CHANGES)))
     options = parser().parse_args(["build", "PRBDM", "--parameters", str(path)])
-    changes = building.start_values(building.mechanisms(options), [], options.parameters)
+    changes = building.start_values(
+        [*building.mechanisms(options).values()], [], options.parameters
+    )
     assert {name: changes[name] for name in CHANGES} == CHANGES
     plain, changed = tmp_path / "plain.fmu", tmp_path / "changed.fmu"
     plain.write_bytes(python_fmu.build(guide))

@@ -8,15 +8,15 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import reduce
 from operator import or_
 from pathlib import Path
 
-from ..base.atomic import check_no_folder, check_writable, write
+from ..base.atomic import check_no_folder, check_writable, write_all
 from ..base.errors import PrbmError
 from ..base.processes import executor, process_count
-from ..files.mechanism_file import load, read_mechanism, schema, shipped
+from ..files.mechanism_file import file_of, read_mechanism, schema, shipped
 from ..files.settings import UserMistake, assigned, units_of
 from ..fmu import native_fmu, python_fmu
 from ..fmu.export import Export
@@ -28,6 +28,7 @@ from ..runs.engine import PYTHON as PYTHON_ENGINE
 from ..runs.experiment import experiment
 from .missing import missing_package
 from .program import FAILED, INTERRUPTED, MISTAKE, OK
+from .record import Record
 
 TERMINATION_TIMEOUT = 2.0  # Time for the process of a simulation to end after Ctrl-C [s].
 REPORT_SCRIPT = f"""
@@ -62,7 +63,10 @@ def run_build(options: argparse.Namespace) -> int:
         print(json.dumps(schema(), indent=2))
         return OK
     plan = _plan(options)
-    built, missing = _build(plan)
+    records = _records(plan)
+    built, missing = _build(plan, records)
+    for note in dict.fromkeys(x for record in records.values() for x in record.notes(plan.out)):
+        print(note)
     status = _simulate(built, options.prog) if options.simulate else OK
     if missing:
         print(f"{options.prog}: {missing}", file=sys.stderr)
@@ -142,8 +146,8 @@ class BuildPlan:
 
     Parameters
     ----------
-    mechanisms : tuple of Mechanism
-        The mechanisms.
+    files : mapping of Path to Mechanism
+        The mechanisms by their files.
     changes : mapping
         Start values that differ from the defaults.
     flavours : tuple of Flavour
@@ -156,12 +160,17 @@ class BuildPlan:
         Output folder.
     """
 
-    mechanisms: tuple[Mechanism, ...]
+    files: Mapping[Path, Mechanism]
     changes: Mapping[str, float]
     flavours: tuple[Flavour, ...]
     platforms: tuple[str, ...]
     native_required: bool
     out: Path
+
+    @property
+    def mechanisms(self) -> tuple[Mechanism, ...]:
+        """The mechanisms."""
+        return tuple(self.files.values())
 
     def path(self, flavour: Flavour, name: str) -> Path:
         """Return the file of an FMU."""
@@ -172,8 +181,8 @@ def _plan(options: argparse.Namespace) -> BuildPlan:
     """Return the plan of a command line, after all checks that take no time."""
     chosen = mechanisms(options)
     plan = BuildPlan(
-        tuple(chosen),
-        start_values(chosen, options.changes, options.parameters),
+        chosen,
+        start_values([*chosen.values()], options.changes, options.parameters),
         selected_flavours(options),
         selected_platforms(options),
         bool(options.flavour or options.fmi or options.platform or options.clock),
@@ -189,8 +198,8 @@ def _plan(options: argparse.Namespace) -> BuildPlan:
     return plan
 
 
-def mechanisms(options: argparse.Namespace) -> list[Mechanism]:
-    """Return the selected mechanisms, all shipped ones if none is selected.
+def mechanisms(options: argparse.Namespace) -> dict[Path, Mechanism]:
+    """Return the selected mechanisms by their files, all shipped ones if none is selected.
 
     Raises
     ------
@@ -207,18 +216,21 @@ def mechanisms(options: argparse.Namespace) -> list[Mechanism]:
                 "give your own as FILE.toml"
             )
     words = dict.fromkeys([*options.mechanisms, *(options.model or ())])
-    chosen = [load(word) for word in words]
+    paths = [file_of(word) for word in words]
     if options.mechanism is not None:
-        chosen.append(read_mechanism(options.mechanism))
-    found: dict[str, Mechanism] = {}
-    for mechanism in chosen or [read_mechanism(path) for path in files.values()]:
-        if mechanism.name in found:
+        paths.append(Path(options.mechanism))
+    found: dict[Path, Mechanism] = {}
+    names: set[str] = set()
+    for path in paths or files.values():
+        mechanism = read_mechanism(path)
+        if mechanism.name in names:
             raise UserMistake(
                 f"two mechanisms have the name {mechanism.name}, which is that of their FMU; build "
                 "them into different folders with --out"
             )
-        found[mechanism.name] = mechanism
-    return [*found.values()]
+        names.add(mechanism.name)
+        found[path] = mechanism
+    return found
 
 
 def start_values(
@@ -257,7 +269,25 @@ def start_values(
     return changes
 
 
-def _build(plan: BuildPlan) -> tuple[list[Path], str]:
+def _records(plan: BuildPlan) -> dict[Path, Record]:
+    """Return the records of the FMUs by the paths of the FMUs.
+
+    Raises
+    ------
+    UserMistake
+        If a file has the name of a record and is not one.
+    """
+    paths = {
+        plan.path(flavour, mechanism.name): file
+        for flavour in plan.flavours
+        for file, mechanism in plan.files.items()
+    }
+    return {
+        path: Record(path.parent, f"{path.stem}-build.json", file) for path, file in paths.items()
+    }
+
+
+def _build(plan: BuildPlan, records: Mapping[Path, Record]) -> tuple[list[Path], str]:
     """Build all FMUs, then write them; return the files, and a sentence about missing FMUs.
 
     Without a compiler, the native FMUs are missing.  That is an error if an option selects native
@@ -278,7 +308,10 @@ def _build(plan: BuildPlan) -> tuple[list[Path], str]:
             fmus, _ = done[mechanism.name]
             if flavour in fmus:
                 path = plan.path(flavour, mechanism.name)
-                _write(path, fmus[flavour])
+                record, platforms = records[path], [*plan.platforms] if flavour.native else []
+                arguments = {**asdict(flavour), "platforms": platforms, "values": plan.changes}
+                text = record.text(mechanism, arguments)
+                _write(path, {path: fmus[flavour], path.with_name(record.name): text.encode()})
                 written.append(path)
     return written, next((missing for _, missing in done.values() if missing), "")
 
@@ -292,15 +325,16 @@ def _effort(plan: BuildPlan, mechanism: Mechanism) -> float:
         return 0.0  # The build reports it.
 
 
-def _write(path: Path, content: bytes) -> None:
-    """Write an FMU and print its size."""
+def _write(path: Path, files: Mapping[Path, bytes]) -> None:
+    """Write an FMU together with its record, and print its size."""
     try:
-        write(path, content)
+        write_all(files)
     except OSError as error:
         raise UserMistake(
-            f"cannot write {path}: {error.strerror}; choose another folder with --out"
+            f"cannot write {error.filename or path}: {error.strerror}; choose another folder with "
+            "--out"
         ) from None
-    print(f"{path.stem}: {path} ({len(content) / 1000:.0f} kB)", flush=True)
+    print(f"{path.stem}: {path} ({len(files[path]) / 1000:.0f} kB)", flush=True)
 
 
 def _fmus(plan: BuildPlan, mechanism: Mechanism) -> tuple[dict[Flavour, bytes], str]:

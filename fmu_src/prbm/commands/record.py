@@ -17,7 +17,6 @@ from typing import Any
 
 from ..base import reading
 from ..base.version import __version__
-from ..files.mechanism_file import file_of
 from ..files.settings import UserMistake
 from ..mechanism.description import Mechanism
 
@@ -33,8 +32,8 @@ class Record:
         Output folder; None: nothing is written.
     name : str
         Name of the file of the record.
-    word : str
-        Name of the shipped mechanism or path of the mechanism file, as in the command line.
+    file : Path
+        The mechanism file.
 
     Raises
     ------
@@ -42,20 +41,25 @@ class Record:
         If the folder has a file of this name that is not a record.
     """
 
-    def __init__(self, folder: Path | None, name: str, word: str) -> None:
-        self.name, self.file = name, file_of(word)
+    def __init__(self, folder: Path | None, name: str, file: Path) -> None:
+        self.folder, self.name, self.file = folder, name, file
         path = None if folder is None else folder / name
-        self.before = _earlier(path) if path is not None and path.is_file() else self.file.name
-        self.folder = folder
+        self.before = _earlier(path) if path is not None and path.is_file() else file.name
 
-    def notes(self) -> list[str]:
-        """Return a note if the results of another mechanism file are replaced."""
+    def notes(self, folder: Path | None = None) -> list[str]:
+        """Return a note if the results of another mechanism file are replaced.
+
+        Parameters
+        ----------
+        folder : Path or None
+            Output folder as the user knows it; None: that of the record.
+        """
         if self.before == self.file.name:
             return []
         return [
-            f"note: {self.folder} had results of {self.before}, a mechanism of the same name; "
-            f"those of {self.file.name} replace them. To keep both, choose another folder with "
-            "--out, or another name in one of the files"
+            f"note: {folder or self.folder} had results of {self.before}, a mechanism of the same "
+            f"name; those of {self.file.name} replace them. To keep both, choose another folder "
+            "with --out, or another name in one of the files"
         ]
 
     def text(

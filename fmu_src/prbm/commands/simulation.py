@@ -11,7 +11,7 @@ from ..analysis.adequacy import Impact, Shape, Vibration, notes
 from ..analysis.fastest import fastest
 from ..base.progress import reporter
 from ..base.unit_text import frequency_text
-from ..files.mechanism_file import load
+from ..files.mechanism_file import file_of, load
 from ..files.settings import UserMistake, quantity
 from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble
@@ -44,7 +44,7 @@ def run_simulation(options: argparse.Namespace) -> None:
     stop_time, step = span(mechanism, values, options.stop_time, options.step, options.engine)
     duration = quantity(options.spectrum_time, "s", "--spectrum-time")
     communication_points(stop_time, step)
-    record = Record(options.out, f"{mechanism.name}-run.json", options.mechanism)
+    record = Record(options.out, f"{mechanism.name}-run.json", file_of(options.mechanism))
     if options.input and options.spectrum == "first":
         raise UserMistake(
             "--spectrum first: the motion after the first impact is simulated without inputs over "

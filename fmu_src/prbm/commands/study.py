@@ -11,7 +11,7 @@ import numpy as np
 from ..base.names import unknown
 from ..base.progress import reporter
 from ..base.unit_text import prefixed_unit
-from ..files.mechanism_file import load
+from ..files.mechanism_file import file_of, load
 from ..files.settings import (
     UserMistake,
     has_unit,
@@ -62,7 +62,7 @@ def run_study(options: argparse.Namespace) -> None:
     inputs = given_inputs(options)
     table, figure, best, shares, run = (f"{mechanism.name}-{end}" for end in FILES)
     output.check(table, figure, best, shares, run)
-    record = Record(options.out, run, options.mechanism)
+    record = Record(options.out, run, file_of(options.mechanism))
     arguments = _arguments(options, mechanism, values, inputs)
     found = study(
         mechanism, **arguments, workers=options.workers, executor=options.scheduler,
