@@ -11,6 +11,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
+from ..base.text import comma_advice
+
 WIDTH = 79  # Columns of a description.
 MECHANISM = "name of a shipped mechanism (see prbm list), or mechanism file FILE.toml"
 QUANTITIES = 'quantities are in SI or have a unit: 0.01, 10mm, "-10 mm"; in lists also -10 0 10 mm'
@@ -52,6 +54,8 @@ class ProposingParser(ArgumentParser):
         if invalid:
             choices = re.findall(r"[\w.-]+", invalid["choices"])
             return f"{message}{_proposal(invalid['word'], choices)}"
+        if "invalid float value" in message and (advice := comma_advice(message)):
+            return f"{message}; {advice.partition(':')[0]}"
         prefix, _, words = message.partition("unrecognized arguments: ")
         if not prefix and words.startswith("--"):
             options = [x for x in self._option_string_actions if x.startswith("--")]

@@ -19,7 +19,7 @@ from pydantic_core.core_schema import DictSchema, NullableSchema, TupleSchema, W
 from ..base import reading
 from ..base.errors import MechanismError, ParameterError, PrbmError
 from ..base.names import proposal
-from ..base.text import printable
+from ..base.text import comma_advice, printable
 from ..mechanism.description import Mechanism
 from .schema import MechanismTable, mechanism
 from .tables import RepeatTable, Table
@@ -33,6 +33,7 @@ KEY_LENGTH_MAX = 100  # Parts of a dotted key; tomllib needs more than linear ti
 LINE_LENGTH_MAX = 80  # Characters of a line of a file in a message.
 UNQUOTED = 'write texts, and numbers with a unit, in quotes, for instance "5 mm"'
 UNQUOTED_VALUE = re.compile(r"=[\s\[]*+(?!(?:True|False)\b)[^\"'#]*[^\W\d_]")
+COMMA_VALUE = re.compile(r"=\s*([+-]?\d+,\d[^,#\"'\]]*)(?=#|$)")  # An unquoted decimal comma.
 DIALECT = "http://json-schema.org/draft-07/schema#"  # The latest that TOML editors support.
 REMEDIES = {  # Remedy for each of pydantic's error types.
     "int_type": "write a whole number",
@@ -40,7 +41,7 @@ REMEDIES = {  # Remedy for each of pydantic's error types.
     "string_type": "write a text in quotes",
     "string_too_long": f"write a shorter name, of at most {NAME_LENGTH_MAX} characters",
     "bool_type": "write true or false",
-    "too_long": "remove the surplus values",
+    "too_long": "remove the surplus values; numbers have a decimal point, and commas between them",
 }
 _CORNERS = "write a list of corners, [[..., ...], [..., ...], [..., ...]]"
 FORMS = {  # Remedy for a value of another form than those that these keys have.
@@ -180,6 +181,8 @@ def _syntax(reason: str, text: str) -> str:
     line = text.split("\n")[int(number[1]) - 1] if number else ""
     shown = printable(line).strip()[:LINE_LENGTH_MAX]
     remedy = f"; {UNQUOTED}" if UNQUOTED_VALUE.search(shown) else ""
+    if value := COMMA_VALUE.search(shown):
+        remedy = f"; {comma_advice(value[1].strip())}{remedy}"
     return f"{reason}){shown and f': {shown}'}{remedy}"
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from ..base.errors import MechanismError, ParameterError, PrbmError
 from ..base.names import unknown
+from ..base.text import comma_advice
 from ..mechanics.inputs import input_units
 from ..mechanism import parameters
 from ..mechanism.description import Mechanism
@@ -50,6 +51,8 @@ def quantity(text: str, unit: str, option: str) -> float:
     try:
         value = float(text)
     except ValueError:
+        if advice := comma_advice(text):
+            raise UserMistake(f"{option} {text}: {advice}") from None
         percent = PERCENT.fullmatch(text) if not unit else None
         try:
             value = 0.01 * float(percent[1]) if percent else number(text, unit)

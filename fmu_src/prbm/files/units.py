@@ -15,6 +15,7 @@ from itertools import chain
 from typing import Any
 
 from ..base.errors import MechanismError
+from ..base.text import comma_advice
 from ..base.unit_text import GRAVITY
 from ..mechanism.expressions import Quantity, affine
 
@@ -88,8 +89,8 @@ def quantity(written: object, unit: str) -> Quantity:
     Raises
     ------
     MechanismError
-        If ``written`` cannot be read as a quantity, its unit has another dimension, or a number in
-        quotes has no unit although the quantity has a dimension.
+        If ``written`` cannot be read as a quantity, its unit has another dimension, it has a
+        decimal comma, or a number in quotes has no unit although the quantity has a dimension.
 
     Examples
     --------
@@ -102,7 +103,7 @@ def quantity(written: object, unit: str) -> Quantity:
         if isinstance(written, bool) or not isinstance(written, int | float):
             raise MechanismError("write a number, or an expression in parameters in quotes")
         return _finite(written)
-    text = _short(written)
+    text = _pointed(written)
     plain = _PLAIN.fullmatch(text)
     return converted(plain[1], plain[2], unit) if plain else _expression(text, unit)
 
@@ -120,7 +121,7 @@ def number(written: object, unit: str) -> float:
     >>> number("90 deg", "deg"), number(9.81, "m/s2")
     (90.0, 9.81)
     """
-    plain = _PLAIN.fullmatch(_short(written)) if isinstance(written, str) else None
+    plain = _PLAIN.fullmatch(_pointed(written)) if isinstance(written, str) else None
     if plain:
         return converted(plain[1], plain[2], unit)
     if isinstance(written, bool) or not isinstance(written, int | float):
@@ -186,14 +187,14 @@ def si_unit(written: str) -> str:
     Raises
     ------
     MechanismError
-        If the unit is unknown.
+        If the unit is unknown, or the number has a decimal comma.
 
     Examples
     --------
     >>> si_unit("40 mm"), si_unit("3 mNm"), si_unit("0.6")
     ('m', 'N.m', '')
     """
-    plain = _PLAIN.fullmatch(_short(written))
+    plain = _PLAIN.fullmatch(_pointed(written))
     if plain is None:
         return ""
     common = (unit for unit, known in COMMON.items() if plain[2] in known)
@@ -215,7 +216,7 @@ def contact_stiffness(written: str, exponent: float | str) -> float | str:
     >>> contact_stiffness("2 kN/m^1.5", 1.5), contact_stiffness("1 N/mm^2", 2.0)
     (2000.0, 1000000.0)
     """
-    text = _short(written)
+    text = _pointed(written)
     plain = _STIFFNESS.fullmatch(text)
     power = float(plain[4] or 1.0) if plain else None
     measured = plain is not None or _PLAIN.fullmatch(text) is not None
@@ -300,6 +301,13 @@ def _short(text: str) -> str:
     if len(text) > EXPRESSION_LENGTH_MAX:
         raise MechanismError(f"write an expression of at most {EXPRESSION_LENGTH_MAX} characters")
     return text.strip().translate(_SUPERSCRIPTS)
+
+
+def _pointed(text: str) -> str:
+    """Return a text as :func:`_short` does; reject a decimal comma."""
+    if advice := comma_advice(text[:EXPRESSION_LENGTH_MAX]):
+        raise MechanismError(advice)
+    return _short(text)
 
 
 def _finite(value: float | Decimal) -> float:

@@ -10,6 +10,7 @@ from typing import Any, cast
 from ..base import reading
 from ..base.errors import ParameterError
 from ..base.names import proposal, unknown
+from ..base.text import comma_advice
 from ..files.settings import quantity
 from ..mechanics.inputs import input_units
 from ..mechanism.description import Mechanism
@@ -51,6 +52,7 @@ SHAPES: dict[str, Arguments] = {  # Arguments with their units and default value
 FILE = "csv"
 FILE_SIZE_MAX = 1 << 28  # bytes of the file of a signal; ten million rows have 250 MB.
 DURATION_MIN = 1e-15  # s: a shorter signal is a mistake in a unit.
+DECIMAL_COMMA = re.compile(r"(?<![\w.,])[+-]?\d+,\d+(?:[eE][+-]?\d+)?\s*[A-Za-zµμ°%][^,)]*")
 PLACEHOLDER = re.compile(r"\{([\w.]+)\}")
 
 
@@ -267,6 +269,11 @@ def read_signal(name: str, text: str, unit: str) -> Signal:
     where = f"{name} = {text.strip()}"
     if shape == FILE:
         return _from_file(where, words, unit)
+    if comma := DECIMAL_COMMA.search(rest):
+        raise ParameterError(
+            f"{where}: {comma_advice(comma[0])}; or write a blank after the comma if it separates "
+            "two arguments"
+        )
     if shape not in SHAPES:
         hint = proposal(shape, dict.fromkeys([*SHAPES, FILE]))
         raise ParameterError(f"{where}: unknown shape {shape!r}; {hint}")
@@ -383,6 +390,12 @@ def _rows(where: str, path: Path) -> tuple[list[str], dict[int, list[str]]]:
     except (UnicodeDecodeError, csv.Error) as error:
         raise ParameterError(f"{where}: {path} is not a CSV file ({error})") from None
     head = rows.pop(min(rows, default=0), [])
+    for line, row in rows.items():
+        if len(row) > len(head):
+            raise ParameterError(
+                f"{where}: line {line} of {path} has {len(row)} cells for {len(head)} columns; "
+                "write numbers with a decimal point, and commas between them"
+            )
     if len(rows) < 2 or len(head) < 2 or _numeric(head, (0,)):
         raise ParameterError(
             f'{where}: {path} must have a head, as in "t [s],a [m/s2]", and at least two rows; '

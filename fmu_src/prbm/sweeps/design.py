@@ -77,7 +77,8 @@ def read_rows(path: Path) -> dict[str, tuple[Real, str]]:
                 raise ValueError
         except ValueError:
             raise ParameterError(
-                f"{path}: row {k} must have {len(heads)} finite numbers, separated by commas"
+                f"{path}: row {k} must have {len(heads)} finite numbers with a decimal "
+                "point, separated by commas"
             ) from None
     units = [(head[2] or "").strip() if head else "" for head in heads]
     return dict(zip(names, zip(np.array(table).T, units, strict=True), strict=True))

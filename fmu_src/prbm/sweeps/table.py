@@ -64,7 +64,12 @@ def _read_file(path: Path) -> pd.DataFrame:
                 raise ValueError("a pipe or a device")
             return pd.read_parquet(path)
         text = reading.text(path, FILE_SIZE_MAX, ParameterError)
-        return pd.read_csv(text, dtype=str, keep_default_na=False, skipinitialspace=True)
+        table = pd.read_csv(text, dtype=str, keep_default_na=False, skipinitialspace=True)
+        labelled = not isinstance(table.index, pd.RangeIndex)  # Pandas takes surplus cells so.
+        if labelled and not {*SEPARATORS} & {*"".join(map(str, table.columns))}:
+            raise ValueError("its rows have more cells than its head has names; write numbers with "
+                             "a decimal point, and commas between them")  # fmt: skip
+        return table
     except pd.errors.EmptyDataError:
         return pd.DataFrame()
     except ParameterError:
