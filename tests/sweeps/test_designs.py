@@ -63,8 +63,28 @@ def test_indices_of_a_power_law_are_its_exponents(mechanisms):
     np.testing.assert_allclose(indices.total, [0.9, 0.1], atol=0.05)
 
 
+def test_a_parameter_without_effect_has_shares_of_zero_without_width():
+    points = drawn({"a": (0.0, 1.0), "b": (0.0, 1.0)}, 64, 0, SENSITIVITY)
+    found = sensitivity(["a", "b"], points[:, 0])
+    assert found.first[1] == found.total[1] == 0.0
+    assert found.first_interval[1].tolist() == found.total_interval[1].tolist() == [0.0, 0.0]
+    assert np.isfinite(found.first_interval).all()
+
+
+def test_a_parameter_without_effect_and_a_constant_output_are_sentences(tmp_path, capsys):
+    line = "study PRBDM --vary stop.offset=0:1mm --vary gravity.x=0:1 --runs 4"
+    words = f"{line} --method sensitivity --of rest(shuttle.x) impacts".split()
+    assert main([*words, "--stop-time", "1ms", "--out", str(tmp_path)]) == 0
+    printed = capsys.readouterr().out
+    assert "without effect on rest(shuttle.x): stop.offset" in printed
+    assert "no shares of the variance of impacts: no parameter changes it" in printed
+    assert "nan" not in printed
+    assert "nan" not in (tmp_path / "PRBDM-sensitivity.csv").read_text(encoding="utf-8")
+
+
 def test_a_constant_or_failed_output_has_no_indices():
     assert sensitivity(["a"], np.ones(12)) is None
+    assert sensitivity(["a"], 1.0 + 1e-15 * np.arange(12.0)) is None
     assert sensitivity(["a"], np.r_[math.nan, np.arange(11.0)]) is None
 
 
@@ -305,7 +325,9 @@ def test_an_output_without_indices_is_named_with_its_missing_values(tmp_path, ca
     words += ["--method", "sensitivity", "--stop-time", "0.3", "--of", "settling", "impacts"]
     assert main([*words, "--out", str(tmp_path)]) == 0
     printed = capsys.readouterr().out
-    assert re.search(r"no shares of settling: \d+ of 32 simulations have no value", printed)
+    assert re.search(r"^settling: no value in \d+ of 32 complete simulations; sim", printed, re.M)
+    assert "no shares of the variance of settling: they need a value of each sim" in printed
+    assert "nan" not in printed
     assert "shares of the variance of impacts" in printed
     rows = (tmp_path / "PRBDM2R-sensitivity.csv").read_text(encoding="utf-8").splitlines()
     assert rows[0].startswith("output,parameter,alone")

@@ -50,6 +50,7 @@ NUMBER = re.compile(r"[+-]?[\d.]+([eE][+-]?\d+)?")
 ROWS_PRINTED_MAX = 45  # Longer tables are only written.
 SPREAD = (0.0, 0.025, 0.5, 0.975, 1.0)  # Printed quantiles of drawn values.
 DIGITS = 5  # Significant digits of printed numbers.
+NOTHING = "-"  # In place of a value that a simulation does not have.
 SHARES_HEAD = ["output", "parameter", "alone", "alone, low", "alone, high",
                "in total", "in total, low", "in total, high"]  # fmt: skip
 
@@ -144,6 +145,13 @@ def _print_simulations(options: argparse.Namespace, found: Study) -> None:
     print(f"{len(found.points)} simulations, {len(failed)} failed")
     for message in dict.fromkeys(failed[:3]):
         print(f"failed: {message}")
+    for output, values in found.outputs.items():
+        missing = int(np.isnan(values).sum()) - len(failed)
+        if missing:
+            print(
+                f"{output}: no value in {missing} of {len(values) - len(failed)} complete "
+                "simulations; simulate longer, or choose another output"
+            )
 
 
 def _vary(
@@ -219,7 +227,7 @@ def _print_table(
         largest = float(known.max()) if len(known) else 0.0
         factor, shown = prefixed_unit(largest, units[name])
         head.append(f"{name} [{shown or '-'}]")
-        cells.append([f"{factor * value:.{DIGITS}g}" for value in x])
+        cells.append([NOTHING if np.isnan(v) else f"{factor * v:.{DIGITS}g}" for v in x])
     if not np.all(satisfied):
         head.append("violated")
         cells.append(["" if held else "x" for held in satisfied])
@@ -284,21 +292,23 @@ def _print_best(optimum: Optimum, units: Mapping[str, str]) -> None:
 def _print_sensitivities(found: Study) -> None:
     """Print first-order and total indices of each output with their confidence intervals."""
     for output, indices in found.sensitivities.items():
-        rows = []
+        rows, without = [], []
         for k, name in enumerate(indices.names):
+            if not (indices.total[k] or np.ptp(indices.total_interval[k])):
+                without.append(name)
+                continue
             (a, b), (c, d) = indices.first_interval[k], indices.total_interval[k]
             rows.append([name, f"{indices.first[k]:.3f}", f"{a:.3f} to {b:.3f}",
                          f"{indices.total[k]:.3f}", f"{c:.3f} to {d:.3f}"])  # fmt: skip
         print(f"shares of the variance of {output}:")
         print(aligned(["parameter", "alone", "95 %", "in total", "95 %"], rows))
-    for output in found.outputs.keys() - found.sensitivities.keys():
-        missing = int(np.isnan(found.outputs[output]).sum())
-        print(
-            f"no shares of {output}: {missing} of {len(found.points)} simulations have no value; "
-            "simulate longer, or choose another output"
-            if missing
-            else f"no shares of {output}: it is constant"
-        )
+        if without:
+            print(f"without effect on {output}: {', '.join(without)}")
+    for output, values in found.outputs.items():
+        if output not in found.sensitivities:
+            known = np.isfinite(values).all()
+            reason = "no parameter changes it" if known else "they need a value of each simulation"
+            print(f"no shares of the variance of {output}: {reason}")
 
 
 def _shares(found: Study) -> list[list[object]]:

@@ -31,6 +31,7 @@ PROBABILITY_MIN = (
 )  # Smallest distance of probabilities from 0 and 1, where quantiles may be infinite.
 SIGMAS = 3.0  # Standard deviations in the half-width of a tolerance.
 CONFIDENCE = 0.95
+CONSTANT_RTOL = 1e-12  # Values that differ by less than this share of the largest are equal.
 RESAMPLES = 999  # Of the bootstrap that gives the confidence intervals of indices.
 FILE_SIZE_MAX = 1 << 28  # bytes of a list of parameters.
 HEAD = re.compile(r"([^\[\]]*)(?:\[([^\[\]]*)\])?")  # A name and a unit in brackets.
@@ -240,7 +241,7 @@ class Sensitivity:
     first, total : (p,)
         Share of the variance by the parameter alone, and with all its interactions.
     first_interval, total_interval : (p, 2)
-        95 % confidence intervals, by bootstrap.
+        95 % confidence intervals, by bootstrap; without width for a parameter without effect.
     """
 
     names: tuple[str, ...]
@@ -267,11 +268,11 @@ def sensitivity(names: Sequence[str], values: Real, seed: int = 0) -> Sensitivit
     Returns
     -------
     Sensitivity or None
-        None if a simulation has failed or the output is constant.
+        None if a simulation has failed or the output is constant but for round-off.
     """
     p = len(names)
     n = len(values) // (p + 2)
-    if not np.isfinite(values).all() or np.ptp(values) == 0.0:
+    if not np.isfinite(values).all() or constant(values):
         return None
     a, b, mixed = values[:n], values[n : 2 * n], values[2 * n :].reshape(p, n)
     found: Any = sobol_indices(
@@ -282,11 +283,25 @@ def sensitivity(names: Sequence[str], values: Real, seed: int = 0) -> Sensitivit
         warnings.simplefilter("ignore", RuntimeWarning)
         spread: Any = found.bootstrap(confidence_level=CONFIDENCE, n_resamples=RESAMPLES)
 
-    def interval(x: Any) -> Real:
-        low, high = np.ravel(x.confidence_interval.low), np.ravel(x.confidence_interval.high)
-        return np.column_stack([low, high])
+    first, total = np.ravel(found.first_order), np.ravel(found.total_order)
+
+    def interval(index: Real, x: Any) -> Real:
+        ends = np.column_stack([np.ravel(x.confidence_interval.low),
+                                np.ravel(x.confidence_interval.high)])  # fmt: skip
+        return np.where(np.isfinite(ends), ends, index[:, None])
 
     return Sensitivity(
-        tuple(names), np.ravel(found.first_order), np.ravel(found.total_order),
-        interval(spread.first_order), interval(spread.total_order),
+        tuple(names), first, total,
+        interval(first, spread.first_order), interval(total, spread.total_order),
     )  # fmt: skip
+
+
+def constant(values: Real) -> bool:
+    """Return whether values differ by round-off only.
+
+    Examples
+    --------
+    >>> constant(np.array([3.0, 3.0 + 1e-15])), constant(np.array([0.0, 1e-15]))
+    (True, False)
+    """
+    return bool(np.ptp(values) <= CONSTANT_RTOL * np.abs(values).max())
