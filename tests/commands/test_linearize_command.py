@@ -35,6 +35,22 @@ def test_the_files_have_the_model_and_its_responses(tmp_path, capsys):
     assert (tmp_path / "PRBDM2R-response.png").stat().st_size > 10_000
 
 
+@pytest.mark.parametrize("outputs", ["shuttle.x shuttle.y shuttle.angle", "shuttle.angle"])
+def test_round_off_of_a_symmetric_guide_is_printed_as_0(outputs, capsys):
+    """The straight guide moves along x only; the scale does not depend on the chosen outputs."""
+    line = f"linearize PRBDM --set gravity.x=0 --inputs force.x force.y --outputs {outputs}"
+    assert cli.main(line.split()) == cli.OK
+    printed = capsys.readouterr().out
+    rows = {row[: row.index("force.") + 7]: row.split()[3:] for row in printed.splitlines()
+            if " by force." in row}  # fmt: skip
+    moving = {name for name, cells in rows.items() if cells != ["0", "0", "-", "-"]}
+    assert {name.split()[0] for name in moving} <= {"shuttle.x"}
+    assert ("shuttle.x by force.x" in " ".join(moving)) == ("shuttle.x" in outputs)
+    assert "0: less than 1e-09 of the largest response of its kind" in printed
+    assert "nan" not in printed
+    assert "e-1" not in printed.replace("1e-09", "")
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [

@@ -160,7 +160,7 @@ class LinearModel:
         frequencies, response : (f,), (f, p, m) complex
             The response at ascending frequencies [Hz].
         """
-        static = self._static()
+        static = self.static()
         return {
             (output, given): self._measured(
                 frequencies, np.abs(response[:, i, j]), (i, j), float(static[i, j])
@@ -169,7 +169,7 @@ class LinearModel:
             for j, given in enumerate(self.inputs)
         }
 
-    def _static(self) -> Real:
+    def static(self) -> Real:
         """Return the outputs by constant inputs, (p, m); infinite if a motion has no stiffness."""
         found = self.space.modes
         if np.any(np.abs(found.frequency) <= found.rounding):
