@@ -505,6 +505,81 @@ def test_a_model_with_another_shape_than_its_data_is_rejected(returned, message)
         fit(mechanism("PRBDM"), [K], Own(returned))
 
 
+@dataclasses.dataclass(frozen=True)
+class Wells:
+    """Residuals (sin(pi x), 0.3 (x - 2), y - 1) with minima near x = 1 and, exact, at x = 2.
+
+    x and y are multiples of the length of the flexures and of the mass of the shuttle.
+    """
+
+    size: float
+    mass: float
+    label: str = "wells"
+    unit: str = "m"
+    uncertainty: float | None = 1e-3
+
+    @property
+    def data(self):
+        return np.array([0.0, 0.0, 1.0])
+
+    def model(self, mechanism, values):
+        x, y = values["flexure.length"] / self.size, values["shuttle.mass"] / self.mass
+        return np.array([math.sin(math.pi * x), 0.3 * (x - 2.0), y])
+
+
+def test_a_single_search_ends_in_the_wrong_minimum_and_several_find_the_best():
+    """The given start, x = 1, lies in the upper well."""
+    size, mass = (mechanism("PRBDM").values()[x] for x in ("flexure.length", "shuttle.mass"))
+    free = [Free("flexure.length", 0.5 * size, 2.5 * size), "shuttle.mass"]
+    one, several = (fit(mechanism("PRBDM"), free, Wells(size, mass), searches=n) for n in (1, None))
+    assert one["flexure.length"].value == pytest.approx(size, rel=0.05)
+    assert "searches" not in str(one)
+    assert several["flexure.length"].value == pytest.approx(2.0 * size, rel=1e-8)
+    best, other = several.minima
+    assert best.misfit < 1e-3 * other.misfit
+    assert other.p[0] == pytest.approx(size, rel=0.05)
+    assert best.searches + other.searches == 4
+    assert "distinct minima: 2" in str(several)
+    assert f"another minimum: flexure.length = {other.p[0]:.6g}, shuttle.mass" in str(several)
+    again = fit(mechanism("PRBDM"), free, Wells(size, mass))
+    np.testing.assert_array_equal(again.p, several.p)
+
+
+def test_a_wrong_number_of_searches_is_rejected():
+    for count in (0, 100_000):
+        with pytest.raises(EvaluationError, match=f"searches = {count} must lie between"):
+            fit(mechanism("PRBDM"), [K], F5, searches=count)
+
+
+def test_the_text_of_a_fit_has_the_interval():
+    found = fit(mechanism("PRBDM"), [K], F5)
+    low, high = found[K].interval()
+    text = str(found)
+    assert "±: one standard uncertainty" in text
+    shown = [float(x) for x in re.search(r"\(95 %: (\S+) to (\S+)\)", text).groups()]
+    assert shown == pytest.approx([low, high], rel=1e-3)
+    assert "correlation" not in text
+
+
+def test_the_strongest_correlation_of_a_fit_is_named():
+    """The correlation is that of the inverse of the normal matrix of two similar equations."""
+
+    @dataclasses.dataclass(frozen=True)
+    class Sum(Wells):
+        def model(self, mechanism, values):
+            x, y = values["flexure.length"] / self.size, values["shuttle.mass"] / self.mass
+            return np.array([x + y - 2.0, x + 1.1 * y - 2.1, 1.0])
+
+    size, mass = (mechanism("PRBDM").values()[x] for x in ("flexure.length", "shuttle.mass"))
+    found = fit(mechanism("PRBDM"), ["flexure.length", "shuttle.mass"], Sum(size, mass))
+    r = -2.1 / math.sqrt(2.0 * (1.0 + 1.1**2))  # Of the inverse of ((2, 2.1), (2.1, 2.21)).
+    *names, correlation = found.strongest
+    assert names == ["flexure.length", "shuttle.mass"]
+    assert correlation == pytest.approx(r, rel=1e-6)
+    line = f"largest correlation: {r:.3f} between flexure.length and shuttle.mass"
+    assert line in str(found)
+
+
 def test_errors_on_unknown_names_propose_the_nearest():
     with pytest.raises(ParameterError, match=r"did you mean .*flexure\.K_theta"):
         fit(mechanism("PRBDM"), ["flexure.K_thet"], F5)

@@ -369,6 +369,10 @@ def _fit(commands: Commands) -> None:
         "--force-uncertainty", metavar="U",
         help="standard uncertainty of a force [N] (default: estimated from the residuals)",
     )  # fmt: skip
+    add(
+        "--searches", type=int, metavar="N",
+        help="number of searches from different starts (default: 4, or 1 for one parameter)",
+    )  # fmt: skip
     response_arguments(parser)
     signal_arguments(parser)
     record_arguments(parser)

@@ -19,7 +19,10 @@ def run_fit(options: argparse.Namespace) -> None:
     values = settings(mechanism, options.set)
     parameters = [free(mechanism, text) for text in options.free]
     output = Output(options.out)
-    found = fit(mechanism, parameters, _targets(options, mechanism), values, progress=reporter())
+    found = fit(
+        mechanism, parameters, _targets(options, mechanism), values, searches=options.searches,
+        progress=reporter(),
+    )  # fmt: skip
     report(found, output, mechanism.name)
     output.write()
 

@@ -12,6 +12,7 @@ standard uncertainty 1/s_k.  If this is too large, the fit reports the direction
 """
 
 from .problem import Free, Problem
+from .searches import Minimum
 from .solution import Direction, Fit, fit, fitted_restitution
 from .targets import DISPLACEMENT, RECORD_UNITS, ForceDeflection, Frequency, Response, Target
 from .valleys import Valley, valley
@@ -24,6 +25,7 @@ __all__ = [
     "ForceDeflection",
     "Free",
     "Frequency",
+    "Minimum",
     "Problem",
     "Response",
     "Target",

@@ -20,6 +20,7 @@ DIFFERENCE_STEP = 1e-4  # Step of central differences, as a share of a parameter
 BOUND_RTOL = 1e-6  # A parameter nearer to a bound than this share of the range is at the bound.
 DEFAULT_RATIO = 10.0  # Default bounds are a tenth and ten times the start.
 RANGE_SHARE = 0.1  # Size of a parameter near zero, as a share of the range of its bounds.
+MODEL_RTOL = 1e-9  # Computation error of a model, relative to the data.
 STEPS_MAX = 50  # Steps of the minimiser.
 MISFIT_RTOL = 1e-9  # Change of S(p) that ends the minimiser, as a share of S(p).
 PARAMETER_RTOL, GRADIENT_TOL = 1e-10, 1e-12  # Other conditions that end the minimiser.
@@ -75,6 +76,11 @@ class Problem:
     def known(self) -> bool:
         """Whether the uncertainty of the data is given."""
         return self.targets[0].uncertainty is not None
+
+    @property
+    def round_off(self) -> float:
+        """Error of a value of the model by its computation, over its uncertainty."""
+        return MODEL_RTOL * float(np.abs(self.data / self.uncertainty).max())
 
     def values(self, p: Real) -> dict[str, float]:
         """Return all values that differ from those of the mechanism."""
@@ -137,7 +143,12 @@ class Problem:
         return np.column_stack(columns)
 
     def minimised(
-        self, start: Real, moved: Whole, progress: Progress | None = None
+        self,
+        start: Real,
+        moved: Whole,
+        progress: Progress | None = None,
+        *,
+        steps: int | None = None,
     ) -> tuple[Real, int, bool]:
         """Return the best parameters, the number of model evaluations, and whether it converged.
 
@@ -149,6 +160,8 @@ class Problem:
             Indices of the fitted parameters; the others are constant.
         progress : callable or None
             Called with a fraction that approaches 1: the number of steps is unknown.
+        steps : int or None
+            Largest number of steps; None: that of a fit.
         """
         scale, evaluations = self.size(start), 0
 
@@ -161,8 +174,8 @@ class Problem:
             nonlocal evaluations
             evaluations += 1
             if progress is not None:
-                steps = evaluations / (2 * len(moved) + 1)
-                progress(1.0 - 0.5 ** (steps / PROGRESS_STEPS))
+                done = evaluations / (2 * len(moved) + 1)
+                progress(1.0 - 0.5 ** (done / PROGRESS_STEPS))
             return self.residuals(all_of(z))
 
         def derivatives(z: Real) -> Real:
@@ -173,7 +186,7 @@ class Problem:
         bounds = (self.lower[moved] / scale[moved], self.upper[moved] / scale[moved])
         found = least_squares(
             residuals, start[moved] / scale[moved], derivatives, bounds,
-            xtol=PARAMETER_RTOL, ftol=MISFIT_RTOL, gtol=GRADIENT_TOL, max_nfev=STEPS_MAX,
+            xtol=PARAMETER_RTOL, ftol=MISFIT_RTOL, gtol=GRADIENT_TOL, max_nfev=steps or STEPS_MAX,
         )  # fmt: skip
         return all_of(found.x), evaluations, found.status > 0
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -15,15 +15,16 @@ from ...data.vibration import impacts
 from ...mechanics.arrays import Real
 from ...mechanism.description import Mechanism
 from .problem import STEPS_MAX, Free, Problem, stated_problem
+from .searches import SEARCHES, Minimum, distinct, searched
 from .targets import RECORD_UNITS, Response, Target, of_mechanism
 
 UNCERTAINTY_MAX = 0.5  # Largest relative uncertainty of a direction that counts as determined.
-MODEL_RTOL = 1e-9  # Computation error of a model, relative to the data.
 SINGULAR_RTOL = 1e-6  # Singular values below this fraction of the largest are round-off.
 SHARE_MIN = 0.1  # Least share of a direction at which a parameter takes part in it.
 REDUCED_MAX = 3.0  # Largest ratio of residuals to stated uncertainties without a note.
 STARTS = {1: 9, 2: 5}  # Starts along each of k parameters of a response with several valleys.
 STARTS_MAX = 400
+CORRELATION_MIN = 0.9  # Smallest correlation of two parameters that is printed.
 START_PROGRESS = 0.5  # Share of the starts in the reported progress.
 
 
@@ -82,6 +83,8 @@ class Fit:
         Number of evaluations of the model.
     converged : bool
         Whether the minimiser converged.
+    minima : tuple of Minimum
+        The different minima in which the searches from several starts ended, the best one first.
     """
 
     problem: Problem
@@ -93,6 +96,7 @@ class Fit:
     model: Real
     evaluations: int
     converged: bool
+    minima: tuple[Minimum, ...] = ()
 
     @property
     def estimates(self) -> dict[str, Estimate]:
@@ -156,6 +160,14 @@ class Fit:
         return result
 
     @property
+    def strongest(self) -> tuple[str, str, float] | None:
+        """Names of the two parameters with the largest correlation, and it; None for one."""
+        r = np.abs(np.triu(np.nan_to_num(self.correlation), 1))
+        i, j = np.unravel_index(int(r.argmax()), r.shape)
+        names = self.problem.names
+        return (names[i], names[j], float(self.correlation[i, j])) if r[i, j] else None
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """Warnings about the numbers: valleys, bounds, convergence, errors of the model."""
         notes = [str(valley) for valley in self.valleys]
@@ -180,7 +192,9 @@ class Fit:
         return tuple(notes)
 
     def __str__(self) -> str:
-        rows = [f"{name} = {estimate}" for name, estimate in self.estimates.items()]
+        rows = [f"{name} = {_with_interval(x)}" for name, x in self.estimates.items()]
+        if any(math.isfinite(x.uncertainty) for x in self.estimates.values()):
+            rows.append("  ±: one standard uncertainty")
         units = [target.unit for target in self.problem.targets]
         rows += [
             f"  rms of {label}: {rms:.4g} {unit_}"
@@ -189,7 +203,48 @@ class Fit:
         if len(self.p) > 1:
             known = ", ".join(f"{s:.3g}" for s in self.singular)
             rows.append(f"  singular values {known} (1/relative uncertainty)")
+        if (pair := self.strongest) and abs(pair[2]) > CORRELATION_MIN:
+            rows.append(
+                f"  largest correlation: {pair[2]:.3f} between {pair[0]} and {pair[1]}; the data "
+                "determine a combination of them better than each"
+            )
+        rows += self._searches()
         return "\n".join([*rows, *(f"  note: {note}" for note in self.notes)])
+
+    def _searches(self) -> list[str]:
+        """Return the lines about the minima in which several searches ended."""
+        count = sum(one.searches for one in self.minima)
+        if count < 2:
+            return []
+        best, *others = self.minima
+        if not others:
+            end = "have this misfit" if self.valleys else "ended in this minimum"
+            return [f"  searches: all {count} that converged, from different starts, {end}"]
+        lines = [f"  searches: {best.searches} of {count} that converged, from different starts, "
+                 f"ended in this minimum; distinct minima: {len(self.minima)}"]  # fmt: skip
+        for one in others:
+            where = ", ".join(
+                f"{name} = {x:.6g}" for name, x in zip(self.problem.names, one.p, strict=True)
+            )
+            size = math.sqrt(one.misfit / best.misfit) if best.misfit > 0.0 else math.inf
+            lines.append(f"  another minimum: {where}; residuals {size:.3g} times as large")
+        return lines
+
+
+def _with_interval(x: Estimate) -> str:
+    """Return an estimate with its 95 % confidence interval.
+
+    Examples
+    --------
+    >>> print(_with_interval(Estimate(2.4753, 0.076)))
+    2.475 ± 0.076 (95 %: 2.326 to 2.624)
+    """
+    if not 0.0 < x.uncertainty < math.inf:
+        return str(x)
+    low, high = x.interval()
+    size = max(abs(low), abs(high))
+    digits = max(2, 2 + math.floor(math.log10(size)) - math.floor(math.log10(x.uncertainty)))
+    return f"{x} (95 %: {low:.{digits}g} to {high:.{digits}g})"
 
 
 def fit(
@@ -199,9 +254,13 @@ def fit(
     values: Mapping[str, float] | None = None,
     *,
     starts: int | None = None,
+    searches: int | None = None,
     progress: Progress | None = None,
 ) -> Fit:
     """Fit named parameters of a mechanism to data.
+
+    The sum of squares of several parameters may have several minima.  Further searches begin at
+    the best points of a Latin hypercube within the bounds, which is the same for each fit.
 
     Parameters
     ----------
@@ -216,6 +275,8 @@ def fit(
     starts : int or None
         Number of starts along each parameter; None: several if there is a response, whose misfit
         has several valleys, else one.
+    searches : int or None
+        Number of searches from different starts; None: 1 for one parameter, 4 for several.
     progress : callable or None
         Called with the completed fraction, from 0 to 1: of the starts, then of the minimisation.
 
@@ -241,12 +302,12 @@ def fit(
     report = progress or _no_report
     best = _best_start(problem, several, starts, lambda done: report(START_PROGRESS * done))
     rest = 1.0 - START_PROGRESS
-    p, evaluations, converged = problem.minimised(
-        best, np.arange(len(best)), lambda done: report(START_PROGRESS + rest * done)
-    )
-    found = _assessed(problem, p, evaluations, converged)
+    count = searches if searches is not None else SEARCHES if len(best) > 1 else 1
+    ends = searched(problem, best, count, lambda done: report(START_PROGRESS + rest * done))
+    found = _assessed(problem, ends.p, ends.evaluations, ends.converged)
+    minima = distinct(problem, ends.minima, bool(found.valleys))
     report(1.0)
-    return found
+    return replace(found, minima=minima)
 
 
 def _no_report(done: float) -> None:
@@ -270,7 +331,7 @@ def _assessed(problem: Problem, p: Real, evaluations: int, converged: bool) -> F
             f"{m} data cannot determine {k} parameters and their own scatter: give an uncertainty"
         )
     noise *= widening(serial_correlation(rest), m) if m > k else 1.0
-    least = MODEL_RTOL * float(np.abs(problem.data / problem.uncertainty).max())
+    least = problem.round_off
     s = s / max(noise, least, 1e-300)
     s[s <= SINGULAR_RTOL * s.max(initial=0.0)] = 0.0
     valleys = []
