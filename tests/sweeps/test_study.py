@@ -2,6 +2,7 @@
 
 import math
 import os
+import re
 import subprocess
 import sys
 
@@ -11,6 +12,7 @@ import pytest
 from point_mass import point_mass
 from prbm.base import processes as base_processes
 from prbm.base.errors import ParameterError
+from prbm.commands import study as command
 from prbm.files.settings import UserMistake
 from prbm.mechanics.stress import stressed, with_stress
 from prbm.plots.study import behaviour_map, curves, maps
@@ -48,6 +50,32 @@ def test_the_optimum_of_a_parabola_and_its_flat_range_are_exact():
     assert best.value == pytest.approx(2.0, abs=1e-6)
     assert best.flat["a"] == pytest.approx((c - width, c + width), abs=0.02 * 0.2)
     assert best.bounded["a"] == (True, True)
+
+
+@pytest.mark.parametrize(
+    ("function", "sign", "line"),
+    [
+        (lambda a: 2.0 + (a - 0.2) ** 2, 1.0,
+         "f is 5 % worse with 0.316 less or 0.316 more; build 0.2 +- 0.32"),
+        (lambda a: 2.0 + 100.0 * (a - 0.2) ** 2, 1.0,
+         "f is 5 % worse with 0.0316 less or 0.0316 more; build 0.2 +- 0.032, which is "
+         "narrower than the distance of the samples"),
+        (lambda a: 2.0 + a, -1.0,
+         "f is 5 % worse with 0.15 less; the best value is the end of the samples: better ones "
+         "may lie beyond"),
+        (lambda a: 2.0 + 1e-3 * (a - 0.2) ** 2, 1.0, "f changes by less than 5 % over all samples"),
+    ],
+)  # fmt: skip
+def test_the_line_for_the_design_says_how_much_worse_the_output_becomes(function, sign, line):
+    """Distances and limits of 2 + k (a - 0.2)^2 are sqrt(0.1/k)."""
+    best = searched(function, np.linspace(-1.0, 1.0, 11), sign=sign)
+    (printed,) = command._design_lines(best, {"a": "", "f": ""})
+    number = r"\d+(?:\.\d+)?"
+    assert re.sub(number, "", printed) == re.sub(number, "", f"design a: {line}")
+    shown, expected = ([float(x) for x in re.findall(number, text)] for text in (printed, line))
+    assert shown == pytest.approx(
+        expected, rel=0.07
+    )  # The ends are bisected to 2 % of the distance of samples.
 
 
 def test_a_maximum_is_the_minimum_of_the_negative():

@@ -1,6 +1,7 @@
 """``prbm study``: simulations over parameters, their optimum, yield and sensitivities."""
 
 import argparse
+import math
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -29,7 +30,7 @@ from ..mechanism.description import Mechanism
 from ..runs.engine import KERNEL
 from ..runs.inputs import files_of, placeholders
 from ..sweeps.design import SENSITIVITY, Yield
-from ..sweeps.optimum import FLAT_RTOL, Optimum
+from ..sweeps.optimum import EDGE_RTOL, FLAT_RTOL, Optimum
 from ..sweeps.study import Study, study
 from .duration import given_inputs
 from .output import Output, aligned
@@ -209,10 +210,10 @@ def _ends(low: str, high: str, unit: str, option: str) -> tuple[float, float]:
     return quantity(low, unit, option), upper
 
 
-def _text(x: float, unit: str) -> str:
+def _text(x: float, unit: str, digits: int = DIGITS) -> str:
     """Return a number with its display unit."""
     factor, shown = prefixed_unit(abs(x), unit)
-    return f"{factor * x:.{DIGITS}g} {shown}".rstrip()
+    return f"{factor * x:.{digits}g} {shown}".rstrip()
 
 
 def _print_table(
@@ -271,6 +272,7 @@ def _optimum_lines(optimum: Optimum, units: Mapping[str, str], verb: str) -> lis
             f"within {100 * FLAT_RTOL:g} % of it: {name} from {_text(low, units[name])} to "
             f"{_text(high, units[name])}{ends}"
         )
+    lines += _design_lines(optimum, units)
     if optimum.robust is not None:
         ((name, _),) = optimum.point.items()
         low, high, worst = optimum.robust
@@ -279,6 +281,34 @@ def _optimum_lines(optimum: Optimum, units: Mapping[str, str], verb: str) -> lis
             f"best five neighbouring samples: at {bound} {_text(worst, units[optimum.output])} "
             f"with {name} from {_text(low, units[name])} to {_text(high, units[name])}"
         )
+    return lines
+
+
+def _design_lines(optimum: Optimum, units: Mapping[str, str]) -> list[str]:
+    """Return for each parameter how exactly it must be built, and whether it is at an end."""
+    share = f"{100 * FLAT_RTOL:g} %"
+    lines = []
+    for name, (low, high) in optimum.flat.items():
+        least = EDGE_RTOL * optimum.spacing[name]  # The ends of the range are known so exactly.
+        sides = [
+            f"{_text(distance, units[name], 3) if distance > least else 'any'} {side}"
+            for distance, side in zip(optimum.slack[name], ("less", "more"), strict=True)
+            if math.isfinite(distance)
+        ]
+        what = f"{optimum.output} is {share} worse" + " or a condition fails" * bool(
+            optimum.constraints
+        )
+        what = f"{what} with {' or '.join(sides)}" if sides else (
+            f"{optimum.output} changes by less than {share} over all samples"
+        )  # fmt: skip
+        if name in optimum.at_ends:
+            what += "; the best value is the end of the samples: better ones may lie beyond"
+        elif all(optimum.bounded[name]):
+            middle, half = 0.5 * (low + high), 0.5 * (high - low)
+            what += f"; build {_text(middle, units[name], 4)} +- {_text(half, units[name], 2)}"
+            if name in optimum.narrow:
+                what += ", which is narrower than the distance of the samples"
+        lines.append(f"design {name}: {what}")
     return lines
 
 

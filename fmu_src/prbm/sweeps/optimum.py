@@ -109,6 +109,10 @@ class Optimum:
         The output there.
     others : mapping
         Values of all outputs at the optimum.
+    spacing : mapping
+        Distance of the samples along each parameter.
+    ends : mapping
+        First and last sample of each parameter, or the ends of its range.
     """
 
     output: str
@@ -123,6 +127,39 @@ class Optimum:
     best: Real = field(default_factory=lambda: np.empty((0, 0)))
     best_values: Real = field(default_factory=lambda: np.empty(0))
     others: Mapping[str, float] = field(default_factory=dict)
+    spacing: Mapping[str, float] = field(default_factory=dict)
+    ends: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    @property
+    def slack(self) -> dict[str, tuple[float, float]]:
+        """For each parameter how much less and more of it makes the output 5 % worse.
+
+        The distances are infinite where the flat range reaches the end of the samples.
+        """
+        found = {}
+        for name, (low, high) in self.flat.items():
+            x, (below, above) = self.point[name], self.bounded[name]
+            found[name] = (x - low if below else math.inf, high - x if above else math.inf)
+        return found
+
+    @property
+    def narrow(self) -> tuple[str, ...]:
+        """Parameters whose flat range is narrower than the distance of the samples."""
+        return tuple(
+            name
+            for name, (low, high) in self.flat.items()
+            if all(self.bounded[name]) and high - low < self.spacing.get(name, 0.0)
+        )
+
+    @property
+    def at_ends(self) -> tuple[str, ...]:
+        """Parameters that are best at the first or last sample, beyond which may be better ones."""
+        return tuple(
+            name
+            for name, ends in self.ends.items()
+            if min(abs(self.point[name] - end) for end in ends)
+            <= EDGE_RTOL * self.spacing.get(name, 0.0)
+        )
 
     @property
     def active(self) -> tuple[str, ...]:
@@ -263,7 +300,10 @@ class Search:
             points[best],
             self.sign * np.array(self.costs)[best],
             dict(zip(self.samples.outputs, map(float, found), strict=True)),
-        )
+            dict(zip(names, self.samples.sizes.tolist(), strict=True)),
+            {n: (low, high) for n, (low, high) in zip(names, self.samples.bounds.tolist(),
+                                                      strict=True)},
+        )  # fmt: skip
 
     def _distinct(self, order: Sequence[int] | Any) -> list[int]:
         """Return the best points that differ by more than :data:`DISTINCT` from better ones."""
