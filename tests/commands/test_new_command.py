@@ -2,6 +2,7 @@
 
 import re
 import shlex
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,7 @@ import pytest
 from prbm.commands.command_line import KINDS, main
 from prbm.commands.new import template
 from prbm.commands.program import MISTAKE, OK
-from prbm.files.mechanism_file import load
+from prbm.files.mechanism_file import load, shipped
 from prbm.runs.run import simulate
 
 
@@ -44,6 +45,30 @@ def test_every_table_of_a_new_file_has_a_comment_or_a_description(kind):
     for word in ("[[stops]]", "[[forces]]", "[release]", "[[flexure_types]]", "[[geometry]]"):
         piece = text.partition(word)[2].partition("\n\n")[0]
         assert "#" in piece or "description" in piece
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_a_copy_of_a_shipped_mechanism_differs_in_name_and_title_only(name, capsys):
+    assert main(["new", "Mine", "--from", name]) == OK
+    before, mine = load(name), load("Mine.toml")
+    assert mine.title == f"Mine, from {name}: {before.title}"
+    assert mine.title in capsys.readouterr().out
+    assert replace(mine, name=name, title=before.title) == before
+    old, new = (
+        path.read_text(encoding="utf-8").splitlines()
+        for path in (shipped()[name], Path("Mine.toml"))
+    )
+    assert [k for k, (a, b) in enumerate(zip(old, new, strict=True)) if a != b] == [
+        k for k, line in enumerate(old) if line == f'name = "{name}"' or line.startswith("title = ")
+    ]
+
+
+def test_an_unknown_shipped_mechanism_is_rejected_with_a_proposal(capsys):
+    assert main(["new", "Mine", "--from", "GuidBeam"]) == MISTAKE
+    assert "did you mean GuideBeam" in capsys.readouterr().err
+    assert main(["new", "Mine", "--from", "GuideBeam", "--kind", "pivot"]) == MISTAKE
+    assert "not allowed with" in capsys.readouterr().err
+    assert [*Path().iterdir()] == []
 
 
 def test_an_existing_file_is_kept(capsys):

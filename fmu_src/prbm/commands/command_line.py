@@ -132,13 +132,19 @@ def _new(commands: Commands) -> None:
     parser = add_command(
         commands, "new", "new:write_template",
         "write a commented mechanism file to start from",
-        examples("prbm new MyGuide", "prbm new MyPivot --kind pivot"),
+        examples(
+            "prbm new MyGuide", "prbm new MyPivot --kind pivot", "prbm new MyGuide --from GuideBeam"
+        ),
     )  # fmt: skip
     parser.add_argument(
         "name", metavar="NAME", help="name of the mechanism; the file is NAME.toml, a new one"
     )
-    parser.add_argument(
+    start = parser.add_mutually_exclusive_group()
+    start.add_argument(
         "--kind", default=KINDS[0], choices=KINDS, help="kind of mechanism (default: %(default)s)"
+    )
+    start.add_argument(
+        "--from", dest="shipped", metavar="SHIPPED", help="copy a shipped mechanism (see prbm list)"
     )
 
 
