@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from prbm import load
+from prbm.base.progress import Progress, reporter
 from prbm.plots.figures import save
 from prbm.plots.study import behaviour_map
 from prbm.references.impact_oscillator import period_doubling
@@ -30,7 +31,12 @@ STROBE = "shuttle.x"
 APART = 0.05  # Least distance of the positions of a doubled motion, as a share of the largest one.
 
 
-def simulate(ratios: np.ndarray, transient: int = 60, periods: int = 24) -> Behaviour:
+def simulate(
+    ratios: np.ndarray,
+    transient: int = 60,
+    periods: int = 24,
+    progress: Progress | None = None,
+) -> Behaviour:
     """Return the map over frequency ratios, with continued state."""
     guide = load("PRBDM")
     scalar = ScalarGuide.of({**guide.values(), **VALUES})
@@ -39,7 +45,7 @@ def simulate(ratios: np.ndarray, transient: int = 60, periods: int = 24) -> Beha
     return behaviour(
         guide, "frequency", frequencies, [STROBE],
         {"force.x": f"sine({force} N, {{frequency}} Hz, {{start}} s)"}, 1.0 / frequencies,
-        values=VALUES, transient=transient, periods=periods,
+        values=VALUES, transient=transient, periods=periods, progress=progress,
     )  # fmt: skip
 
 
@@ -59,7 +65,11 @@ def doubling(found: Behaviour) -> float:
 
 def main(arguments: Sequence[str]) -> int:
     """Print the frequency at which the period doubles, and draw the map."""
-    ways = {"upwards": simulate(RATIOS), "downwards": simulate(RATIOS[::-1])}
+    report = reporter()  # Writes the progress of both ways and the remaining time.
+    ways = {
+        "upwards": simulate(RATIOS, progress=lambda done: report(0.5 * done)),
+        "downwards": simulate(RATIOS[::-1], progress=lambda done: report(0.5 + 0.5 * done)),
+    }
     frequency = ways["upwards"].values[0] / RATIOS[0]
     doubled = doubling(ways["upwards"])
     closed = frequency * period_doubling(ZETA, RESTITUTION, 2.5, 3.0)

@@ -92,10 +92,12 @@ def test_the_period_of_the_impact_oscillator_doubles_where_the_closed_form_does(
     main = example("impact_oscillator.py").main
     monkeypatch.setitem(main.__globals__, "RATIOS", np.arange(2.66, 2.705, 0.01))
     main([])
-    words = capsys.readouterr().out.split()
+    printed = capsys.readouterr()
+    words = printed.out.split()
     found, closed = float(words[4]), float(words[8])
     assert found == pytest.approx(closed, rel=1e-3)
     assert is_picture("impact_oscillator.png")
+    assert "% done, " in printed.err
 
 
 def test_quickstart_names_the_file_that_it_cannot_write() -> None:
