@@ -3,11 +3,14 @@
 import re
 import shlex
 import shutil
+import tomllib
 
 import pytest
 
+import prbm
 from prbm.base.version import __version__
 from prbm.commands.command_line import main
+from prbm.runs.engine import KERNEL, PYTHON, kernel_available
 from support import ROOT
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -91,4 +94,22 @@ def test_two_commands_set_up_the_development():
 
 
 def test_the_named_wheel_has_the_present_version():
-    assert re.findall(r"prbm_impact-([\d.]+)-py3-none-any\.whl", README) == [__version__]
+    assert {*re.findall(r"prbm_impact-([\d.]+)-py3-none-any\.whl", README)} == {__version__}
+
+
+def test_the_extras_of_the_readme_are_those_of_the_project():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    named = {x for text in re.findall(r"(?:whl|\.)\[([\w,]+)\]", README) for x in text.split(",")}
+    assert {"notebook", "sweep"} <= named <= {*project["optional-dependencies"]}
+
+
+def test_the_readme_names_the_option_that_prints_the_version(capsys):
+    assert "`prbm --version`" in README
+    assert main(["--version"]) == 0
+    assert __version__ in capsys.readouterr().out
+
+
+def test_the_kernel_is_the_default_engine_as_the_readme_says():
+    result = prbm.simulate(prbm.load("PRBDM"), stop_time=1e-3)
+    assert result.engine == (KERNEL if kernel_available() else PYTHON)
+    assert prbm.simulate(prbm.load("PRBDM"), stop_time=1e-3, engine=PYTHON).engine == PYTHON
