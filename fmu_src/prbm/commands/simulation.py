@@ -20,6 +20,7 @@ from ..runs.headline import headline
 from ..runs.hits import hits
 from ..runs.impact_table import heads, impact_table
 from ..runs.inputs import files_of
+from ..runs.modal_note import modal_notes
 from ..runs.result import Result, names
 from ..runs.run import communication_points, simulate
 from .duration import given_inputs, span
@@ -61,6 +62,8 @@ def run_simulation(options: argparse.Namespace) -> None:
     for line in headline(result, mechanism, result.start_values):
         print(line)
     for line in hits(result) if len(result.impacts) > 1 else ():
+        print(line)
+    for line in modal_notes(result):
         print(line)
     columns = names(result.columns)
     output.table(f"{mechanism.name}.csv", columns, (list(row) for row in result.columns.tolist()))
