@@ -57,7 +57,7 @@ def test_the_commands_select_tests(line):
 
 
 def test_the_flexure_model_of_the_page_has_the_stiffness_of_a_beam_under_an_end_moment():
-    (block,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    block = re.findall(r"^```python\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE)[0]
     found = dict(vars(flexure))
     exec(compile(block, "CONTRIBUTING.md", "exec"), found)
     model = found["model"]

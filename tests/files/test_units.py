@@ -1,5 +1,6 @@
 """Conversions by powers of ten equal those of pint, and need no import of pint; decimal commas."""
 
+import os
 import re
 import subprocess
 import sys
@@ -112,6 +113,7 @@ def test_a_decimal_comma_in_a_file_is_reported_with_its_line(line, tmp_path):
 def test_shipped_mechanisms_are_read_without_pint():
     script = "import prbm, sys; [*map(prbm.load, sys.argv[1:])]; print('pint' in sys.modules)"
     done = subprocess.run(
-        [sys.executable, "-c", script, *shipped()], capture_output=True, text=True
+        [sys.executable, "-c", script, *shipped()], capture_output=True, text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
     )  # fmt: skip
     assert done.stdout == "False\n", done.stderr
