@@ -34,6 +34,8 @@ COMMON = {unit: {unit: 0} for unit in COHERENT} | {
     "Pa": {"Pa": 0, "kPa": 3, "MPa": 6, "GPa": 9},
     "m/s": {"m/s": 0, "mm/s": -3},
     "N": {"N": 0, "mN": -3},
+    "N/m": {"N/m": 0, "N/mm": 3, "kN/m": 3},
+    "N.m": {"N.m": 0, "Nm": 0, "N.mm": -3, "mN.m": -3},
     "s": {"s": 0, "ms": -3, "us": -6, "µs": -6, "μs": -6},
 }
 """Powers of ten by SI unit and written unit.  Without other units, pint is not imported."""
