@@ -26,7 +26,9 @@ COHERENT = (
     "m", "kg", "s", "rad", "N", "Pa", "kg/m3", "kg.m2", "N/m", "N.m", "m/s", "m/s2", "Hz", "rad/s",
     "1/m", "N.m/rad", "N/m3", "N.s/m",
 )  # fmt: skip
-COMMON = {unit: {unit: 0} for unit in COHERENT} | {
+DEGREE = Decimal("0.017453292519943295769236907685")  # rad
+Factors = dict[str, int | Decimal]
+_WRITTEN: dict[str, Factors] = {
     "m": {"m": 0, "cm": -2, "mm": -3, "um": -6, "µm": -6, "μm": -6, "nm": -9},
     "kg": {"kg": 0, "g": -3, "mg": -6},
     "kg/m3": {"kg/m3": 0, "g/cm3": 3},
@@ -34,11 +36,13 @@ COMMON = {unit: {unit: 0} for unit in COHERENT} | {
     "Pa": {"Pa": 0, "kPa": 3, "MPa": 6, "GPa": 9},
     "m/s": {"m/s": 0, "mm/s": -3},
     "N": {"N": 0, "mN": -3},
+    "rad": {"rad": 0, "deg": DEGREE},
     "N/m": {"N/m": 0, "N/mm": 3, "kN/m": 3},
     "N.m": {"N.m": 0, "Nm": 0, "N.mm": -3, "mN.m": -3},
     "s": {"s": 0, "ms": -3, "us": -6, "µs": -6, "μs": -6},
 }
-"""Powers of ten by SI unit and written unit.  Without other units, pint is not imported."""
+COMMON: dict[str, Factors] = {unit: {unit: 0, **_WRITTEN.get(unit, {})} for unit in COHERENT}
+"""Powers of ten, or factors, by SI unit and written unit, which need no import of pint."""
 PREFIXES = """
 femto- = 1e-15 = f-
 pico- = 1e-12 = p-
@@ -55,7 +59,7 @@ MECHANICAL = f"""{PREFIXES}metre = [length] = m = meter
 gram = [mass] = g
 second = [time] = s
 radian = [angle] = rad
-degree = 0.017453292519943295769236907685 * radian = deg = °
+degree = {DEGREE} * radian = deg = °
 newton = kilogram * metre / second ** 2 = N
 newton_metre = newton * metre = Nm
 pascal = newton / metre ** 2 = Pa
@@ -164,10 +168,11 @@ def converted(value: str, unit: str, wanted: str) -> float:
     return _finite(result)
 
 
-def _scaled(value: str, power: int) -> float:
-    """Return a decimal number times a power of ten, correctly rounded."""
+def _scaled(value: str, factor: int | Decimal) -> float:
+    """Return a decimal number times a power of ten, or times a factor, correctly rounded."""
     try:
-        return _finite(Decimal(value).scaleb(power))
+        number = Decimal(value)
+        return _finite(number.scaleb(factor) if isinstance(factor, int) else number * factor)
     except ArithmeticError:
         return _finite(math.inf)
 
