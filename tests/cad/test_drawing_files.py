@@ -184,6 +184,86 @@ def test_the_nearest_face_of_a_drawn_stop_is_the_wall(tmp_path, draw, direction,
     assert 1e3 * found.point == pytest.approx(place, abs=0.02)
 
 
+def closed(*corners):
+    """Return a function that draws a closed wall."""
+    return lambda s, at: s.add_lwpolyline(corners, close=True, dxfattribs=at)
+
+
+def line(*points):
+    """Return a function that draws an open wall."""
+    return lambda s, at: s.add_lwpolyline(points, dxfattribs=at)
+
+
+@pytest.mark.parametrize(
+    ("draw", "direction", "gap", "place"),
+    [
+        (closed((70.1, 38), (80, 38), (80, 42), (70.1, 42)), 0.0, 0.1, 70 + 40j),
+        (lambda s, at: s.add_circle((73, 40), 2.9, dxfattribs=at), 0.0, 0.1, 70 + 40j),
+        (closed((70, 38), (80, 38), (80, 42), (70, 42)), 0.0, 0.0, 70 + 40j),
+        (lambda s, at: s.add_circle((85, 40), 15, dxfattribs=at), 0.0, 0.0, 70 + 40j),
+        (closed((70, 40), (75, 38), (75, 42)), 0.0, 0.0, 70 + 40j),
+        (line((70.5, 35), (72, 45)), 0.0, 0.5, 70 + 35j),
+        (line((71, 40), (75, 40)), 0.0, 1.0, 70 + 40j),
+        (line((71, 60), (71, 70)), 0.0, 1.0, 70 + 50j),
+        (line((71, 31), (71, 37), (71, 41)), 0.0, 1.0, 70 + 36j),
+        (closed((71, 36), (80, 36), (80, 44), (71, 44), (71, 38)), 0.0, 1.0, 70 + 40j),
+        (lambda s, at: [closed((71, low), (80, low), (80, low + 6), (71, low + 6))(s, at)
+                        for low in (34, 40)], 0.0, 1.0, 70 + 40j),
+        (closed((40, 50), (60, 50), (60, 55), (40, 55)), 90.0, 0.0, 50 + 50j),
+    ],
+    ids=["near block", "near pin", "touching block", "touching pin", "touching tip", "inclined",
+         "end on", "beside", "three points", "vertex in a face", "two blocks", "block on top"],
+)  # fmt: skip
+def test_gap_direction_and_hit_point_are_those_of_the_nearest_way(
+    tmp_path, draw, direction, gap, place
+):
+    def stop(document, space):
+        draw(space, {"layer": "stops"})
+
+    (found,) = drawing(tmp_path, stop).draft.stops
+    assert found.on == -1
+    assert np.degrees(np.angle(found.direction)) == pytest.approx(direction, abs=1e-3)
+    assert 1e3 * found.gap == pytest.approx(gap, abs=3e-3)
+    assert 1e3 * found.point == pytest.approx(place, abs=0.02)
+
+
+def test_a_wall_in_front_of_a_recess_has_the_gap_there(tmp_path):
+    plate = framed_stage().union(box(70, 30, 72, 33))
+    (found,) = drawing(
+        tmp_path, lambda d, s: line((70.5, 40), (70.5, 50))(s, {"layer": "stops"}), plate
+    ).draft.stops
+    assert 1e3 * found.gap == pytest.approx(0.5)
+    assert 1e3 * found.point == pytest.approx(70 + 45j)
+
+
+@pytest.mark.parametrize(
+    ("draw", "reason"),
+    [
+        (line((60, 40), (80, 40)), "overlaps a moving body"),
+        (closed((60, 38), (65, 38), (65, 42), (60, 42)), "overlaps a moving body"),
+        (closed((70, 50), (75, 50), (75, 55), (70, 55)), "touches a body at corners only"),
+        (lambda s, at: s.add_point((71, 40), dxfattribs=at), "a point on the layer stops"),
+    ],
+)
+def test_a_wall_without_a_gap_or_a_side_is_reported_and_left_out(tmp_path, draw, reason):
+    result = drawing(tmp_path, lambda d, s: draw(s, {"layer": "stops"}))
+    assert not result.draft.stops
+    assert any(reason in text for _, text in result.draft.found.doubts)
+
+
+@pytest.mark.parametrize("near", [0.05, 1.0])
+def test_a_wall_on_either_side_does_not_penetrate_the_release(tmp_path, near):
+    """The release is away from the first wall, and before the second one."""
+
+    def stop(document, space):
+        line((72, 35), (72, 45))(space, {"layer": "stops"})
+        line((30 - near, 35), (30 - near, 45))(space, {"layer": "stops"})
+
+    mechanism = drawing(tmp_path, stop).mechanism
+    result = prbm.simulate(mechanism, stop_time=0.01)
+    assert min(result[f"{name}.gap"].min() for name in ("stop_1", "stop_2")) > -1e-9
+
+
 def test_an_open_outline_is_named_with_its_place(tmp_path):
     """The leaf at the gap has one wall only; without the rest there is no flexure."""
     path = tmp_path / "plate.dxf"

@@ -118,7 +118,7 @@ def test_an_fmu_of_another_file_with_the_same_name_is_replaced_with_a_note(capsy
         "build PRBDM --flavour python",
     ],
 )
-def test_a_file_that_is_no_record_is_kept(line, content, capsys):
+def test_a_file_that_is_no_record_is_replaced_as_other_files_are(line, content, capsys):
     names = {
         "simulate": "PRBDM-run.json",
         "study": "PRBDM-study-run.json",
@@ -127,7 +127,6 @@ def test_a_file_that_is_no_record_is_kept(line, content, capsys):
     path = Path(names[line.split()[0]])
     path.parent.mkdir(exist_ok=True)
     path.write_bytes(content)
-    assert run(f"{line} --out .") == cli.MISTAKE
-    assert f"{path} exists and is not the record of a run: rename" in capsys.readouterr().err
-    written = (one for one in Path().rglob("*") if one.is_file())
-    assert {one: one.read_bytes() for one in written} == {path: content}
+    assert run(f"{line} --out .") == 0
+    assert "note: . had results of" not in capsys.readouterr().out
+    assert json.loads(path.read_text("utf-8"))["mechanism"]["file"] == "PRBDM.toml"

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 import shapely
 
 from ..mechanism.flexure import NOTCH, TAPER
-from .marks import FoundStop
 from .periodic import Row, rows
 from .profiles import Shape
 from .recognition import Found, Recognised
+from .stops import FoundStop
 from .symmetry import Mirror, alike, mirrors
 
 SIDE_RTOL = 1e-6  # Parts nearer than this to a mirror line are on it [share of the size].

@@ -19,6 +19,7 @@ from .curves import (
     FLATTENING_RTOL,
     GROUND,
     NESTING_MAX,
+    STOPS,
     Curves,
     DrawingError,
     diagonal,
@@ -127,7 +128,7 @@ class _Reader:
             else:
                 self._polyline(entity, layer)
         elif kind == "POINT":
-            if layer.lower() == GROUND:
+            if layer.lower() in (GROUND, STOPS):
                 self._add(layer, _complex([entity.dxf.location]))
         else:
             z = self._points(entity, kind)

@@ -22,11 +22,12 @@ from .bolted import bolted
 from .curves import Curves, DrawingError, diagonal
 from .draft import Draft, draft
 from .dxf import read_dxf
-from .marks import find_ground, find_stops
+from .marks import find_ground
 from .materials import Material, material
 from .numbers import Unit, plain, roundest
 from .plates import plate
 from .recognition import recognised
+from .stops import find_stops
 from .writing import Heading, file_text
 
 INCH = 0.0254  # m
@@ -413,6 +414,10 @@ def _release(drafted: Draft, mechanism: Mechanism) -> str:
         direction = direction if along <= 0.0 else -direction  # Away from the stop.
         if stop.gap > 0.0:
             amplitude = AMPLITUDE_GAPS * stop.gap
+        for other in (s for s in drafted.stops if s.body == drafted.stage):
+            towards = (np.conj(direction) * other.direction).real
+            if towards * amplitude > 0.5 * other.gap:
+                amplitude = 0.5 * other.gap / towards
     elif direction.real < 0.0 or (abs(direction.real) < 1e-6 and direction.imag < 0.0):
         direction = -direction
     degrees = roundest(float(np.degrees(np.angle(direction))), 0.1)

@@ -79,6 +79,12 @@ class Recognised:
     doubts: list[tuple[complex, str]] = field(default_factory=list)
     noise: float = 0.0
 
+    @property
+    def size(self) -> float:
+        """Diagonal of the plate [m]."""
+        low, high = (complex(*self.plate.shape.bounds[k : k + 2]) for k in (0, 2))
+        return abs(high - low)
+
 
 def recognised(plate: Plate, noise: float, thickest: float | None = None) -> Recognised:
     """Return the bodies and the flexures of a plate.

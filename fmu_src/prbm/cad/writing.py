@@ -13,11 +13,11 @@ from ..files.units import number
 from ..mechanics.profile import Notch
 from ..mechanism.flexure import LEAF, NOTCH
 from .draft import Copied, Draft, Kind
-from .marks import FoundStop
 from .materials import Material
 from .numbers import Unit, plain, roundest
 from .periodic import Row
 from .recognition import Found
+from .stops import FoundStop
 from .symmetry import Mirror
 
 OUTLINE_RTOL = 2e-4  # Largest distance of a written outline from the drawn one, over the size.

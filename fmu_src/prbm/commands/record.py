@@ -34,17 +34,13 @@ class Record:
         Name of the file of the record.
     file : Path
         The mechanism file.
-
-    Raises
-    ------
-    UserMistake
-        If the folder has a file of this name that is not a record.
     """
 
     def __init__(self, folder: Path | None, name: str, file: Path) -> None:
         self.folder, self.name, self.file = folder, name, file
         path = None if folder is None else folder / name
-        self.before = _earlier(path) if path is not None and path.is_file() else file.name
+        earlier = _earlier(path) if path is not None and path.is_file() else None
+        self.before = earlier or file.name
 
     def notes(self, folder: Path | None = None) -> list[str]:
         """Return a note if the results of another mechanism file are replaced.
@@ -88,18 +84,13 @@ class Record:
         return json.dumps(content, indent=2, default=_plain) + "\n"
 
 
-def _earlier(path: Path) -> str:
-    """Return the name of the mechanism file in a record."""
+def _earlier(path: Path) -> str | None:
+    """Return the name of the mechanism file in a record; None if the file is no record."""
     try:
         file = json.loads(reading.content(path, SIZE_MAX, UserMistake))["mechanism"]["file"]
-        if isinstance(file, str):
-            return file
+        return file if isinstance(file, str) else None
     except (ValueError, KeyError, TypeError, RecursionError, UserMistake):
-        pass
-    raise UserMistake(
-        f"{path} exists and is not the record of a run: rename it, or choose another folder with "
-        "--out"
-    )
+        return None
 
 
 def _hash(path: Path) -> str | None:
