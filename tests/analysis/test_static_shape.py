@@ -97,7 +97,11 @@ def test_invalid_arguments_of_shapes_are_rejected(arguments, message):
     [
         ({"start": "1 mm", "end": "1 mm"}, "start = 0.001 m must be below end = 0.001 m"),
         ({"start": 0.0, "end": "1 N"}, "end = 1 N"),
-        ({"start": 0.0, "end": 1e-4, "points": 1}, "points = 1 must be at least 2"),
+        ({"start": 0.0, "end": 1e-4, "points": 1}, "points = 1 must lie between 2 and"),
+        ({"start": 0.0, "end": 1e-4, "points": 10**9}, "points = 1000000000 must lie between"),
+        ({"start": 0.0, "end": 1e-4, "points": 5.0}, "points = 5.0 must be an integer"),
+        ({"start": 0.0, "end": 1e-4, "branches": -1}, "branches = -1 must lie between 0"),
+        ({"start": 0.0, "end": float("nan")}, "end = nan: write a finite number"),
     ],
 )
 def test_invalid_ranges_of_curves_are_rejected(arguments, message):

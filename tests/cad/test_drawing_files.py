@@ -298,6 +298,29 @@ def test_the_ground_is_a_point_or_several(tmp_path, ground):
     assert found.values()["leaf.width"] == 8e-3
 
 
+@pytest.mark.parametrize(
+    "options",
+    [{"thickness": None}, {"thickness": [1]}, {"material": None}, {"material": 5},
+     {"youngs_modulus": 200e9}, {"density": 7850}, {"unit": ""}, {"gap": "wide"}],
+    ids=str,
+)  # fmt: skip
+def test_wrong_types_of_options_are_named(tmp_path, options):
+    path = write(tmp_path / "plate.dxf", framed_stage())
+    (name,) = options
+    with pytest.raises(prbm.PrbmError, match=f"{name.replace('_', '.')}"):
+        prbm.read_drawing(path, **{"thickness": "8 mm"} | options)
+
+
+def test_an_outline_with_many_gaps_is_named_with_their_places(tmp_path):
+    document = ezdxf.new("R2010", units=4)
+    for ring in rings(framed_stage()):
+        for a, b in pairwise(ring):
+            document.modelspace().add_line(a, (b[0] + 0.05 * (abs(b[1] - a[1]) > 25), b[1]))
+    document.saveas(tmp_path / "plate.dxf")
+    with pytest.raises(DrawingError, match=r"lines end at|there are gaps of up to"):
+        import_drawing(tmp_path / "plate.dxf", OPTIONS)
+
+
 @pytest.mark.parametrize("ground", [(1, 2, 3), "5", [5], [("a", "b")], 5, 1j])
 def test_what_is_no_point_is_rejected(tmp_path, ground):
     path = write(tmp_path / "plate.dxf", framed_stage())

@@ -1,8 +1,11 @@
 """The displacement or rotation at which the released body is held: units and bounds."""
 
 import math
+import operator
 from dataclasses import dataclass
+from typing import Any, SupportsIndex
 
+from ..base.errors import ParameterError
 from ..files.settings import UserMistake
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
@@ -33,6 +36,7 @@ class HeldUnit:
 
 DISPLACED = HeldUnit("displacement", "m", 1e3, "mm", "force", "N", "N/m")
 TURNED = HeldUnit("rotation", "rad", 180 / math.pi, "deg", "moment", "N.m", "N.m/rad")
+POINTS_MAX = 100_000  # Points of a curve.
 TURN_MAX = 2 * math.pi  # rad; a larger held rotation is a mistake in the unit.
 
 
@@ -46,6 +50,22 @@ def held_scale(system: System) -> float:
     return 1.0 if system.mechanism.release.turns else system.length
 
 
+def check_count(name: str, value: Any, least: int, largest: int = POINTS_MAX) -> int:
+    """Return a number of points or branches.
+
+    Raises
+    ------
+    ParameterError
+        If it is no integer, or out of its bounds.
+    """
+    if isinstance(value, bool) or not isinstance(value, SupportsIndex):
+        raise ParameterError(f"{name} = {value!r} must be an integer")
+    count = operator.index(value)
+    if not least <= count <= largest:
+        raise ParameterError(f"{name} = {count} must lie between {least} and {largest}")
+    return count
+
+
 def check_held(x: float, system: System, option: str) -> float:
     """Return a displacement [m] or rotation [rad] at which the released body is held.
 
@@ -54,6 +74,8 @@ def check_held(x: float, system: System, option: str) -> float:
     UserMistake
         If it is larger than the mechanism, or than a turn.
     """
+    if not math.isfinite(x):
+        raise UserMistake(f"{option} {x:g}: write a finite number")
     if not system.mechanism.release.turns:
         return check_length(x, system.length, option)
     if abs(x) > TURN_MAX:

@@ -20,7 +20,7 @@ from ..mechanics.stress import Stress, static_stresses
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import Probe
-from .held import check_held, held_unit
+from .held import check_count, check_held, held_unit
 from .holding import Curve, curve
 
 
@@ -250,7 +250,7 @@ def holding_curve(
     ------
     ParameterError
         If a parameter or a displacement is out of its bounds, the displacements are not ascending,
-        or there are fewer than two points.
+        or the number of points or branches is no integer or out of its bounds.
     UserMistake
         If a text is not a quantity of the right dimension.
     EquilibriumError
@@ -271,6 +271,5 @@ def holding_curve(
     )
     if not low < high:
         raise ParameterError(f"start = {low:g} {si} must be below end = {high:g} {si}")
-    if not points >= 2:
-        raise ParameterError(f"points = {points!r} must be at least 2")
-    return curve(system, np.linspace(low, high, points), branches=branches)
+    count, followed = check_count("points", points, 2), check_count("branches", branches, 0)
+    return curve(system, np.linspace(low, high, count), branches=followed)

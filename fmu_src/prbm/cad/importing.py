@@ -25,7 +25,7 @@ from .dxf import read_dxf
 from .marks import find_ground
 from .materials import Material, material
 from .numbers import Unit, plain, roundest
-from .plates import plate
+from .plates import open_ends, plate
 from .recognition import recognised
 from .stops import find_stops
 from .writing import Heading, file_text
@@ -99,11 +99,13 @@ class Options:
             If it is not a length, not positive, or larger than the drawing.
         """
         given = getattr(self, name)
-        if given is None:
+        if given is None and name != "thickness":
             return None
         if isinstance(given, str) and name == "unit" and given.strip().lower() in INCHES:
             return INCH
         option = f"--{name.replace('_', '-')}"
+        if given == "":
+            raise UserMistake(f'{option} "": write a length with a unit, for instance mm')
         if isinstance(given, str):
             value = quantity(f"1 {given}" if name == "unit" else given, "m", option)
         else:
@@ -214,7 +216,11 @@ def import_drawing(path: str | Path, options: Options) -> Imported:
     )
     cut = [plate(group, gap) for group in outlines]
     noise = tolerance or NOISE_RTOL * size
-    found = bolted([recognised(one, noise, thickest) for one in cut])
+    try:
+        found = bolted([recognised(one, noise, thickest) for one in cut])
+    except DrawingError as error:
+        reasons = [open_ends(one.loose) or str(error) for one in cut]
+        raise DrawingError(f"no mechanism was found: {'; '.join(dict.fromkeys(reasons))}") from None
     loose = "a free end of a line: not part of an outline"
     found.doubts += [(z, loose) for z in found.plate.loose]
     find_ground(found, curves, options.grounds(curves.unit))

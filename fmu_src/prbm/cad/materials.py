@@ -49,6 +49,15 @@ def material(name: str, youngs_modulus: str | None = None, density: str | None =
     >>> material("spring steel").name
     'spring_steel'
     """
+    for key, given in (
+        ("material", name),
+        ("youngs_modulus", youngs_modulus),
+        ("density", density),
+    ):
+        if not isinstance(given, str) and not (given is None and key != "material"):
+            example = "200 GPa" if key == "youngs_modulus" else "7.85 g/cm3"
+            example = "steel" if key == "material" else example
+            raise DrawingError(f'{key} = {given!r} must be a text, for instance "{example}"')
     known = MATERIALS.get(re.sub(r"[\s-]+", "_", name.strip().lower()))
     if known is None and (youngs_modulus is None or density is None):
         raise DrawingError(

@@ -13,7 +13,7 @@ import shapely
 from ..mechanics.arrays import Complex
 from ..mechanism.flexure import NOTCH
 from .curves import DrawingError
-from .plates import Plate, open_ends
+from .plates import Plate
 from .profiles import Shape, shape_of
 from .tracing import STEPS_TOTAL_MAX, End, Trace, Tracer
 from .walls import Walls
@@ -109,8 +109,8 @@ def recognised(plate: Plate, noise: float, thickest: float | None = None) -> Rec
     chosen = _chosen(walls, plate.shape, candidates, thickest, doubts)
     if not chosen:
         raise DrawingError(
-            "no flexures were found: no part is thin between two thicker ones; "
-            + (open_ends(plate.loose) or "check the unit of the drawing, or give --flexures-below")
+            "no flexures were found: no part is thin between two thicker ones; check the unit of "
+            "the drawing, or give --flexures-below"
         )
     bodies, flexures = _divided(walls, plate.shape, chosen, doubts)
     return Recognised(plate, [*bodies], flexures, doubts=doubts, noise=noise)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..analysis import holding
-from ..analysis.held import HeldUnit, check_held, held_scale, held_unit
+from ..analysis.held import POINTS_MAX, HeldUnit, check_held, held_scale, held_unit
 from ..analysis.static_shape import StaticShape
 from ..base.progress import reporter
 from ..base.tolerances import RIGID_RTOL
@@ -22,7 +22,6 @@ from .load_paths import given_loads, load_text, vary
 from .output import Output, aligned
 from .systems import ZERO_RTOL, assembled, rounded
 
-POINTS_MAX = 100_000
 MATRIX_UNITS = {  # Heads of the columns and of the rows.
     "compliance": (("1 N along x", "1 N along y", "1 N m"), ("x [m]", "y [m]", "angle [rad]")),
     "stiffness": (("1 m along x", "1 m along y", "1 rad"), ("x [N]", "y [N]", "moment [N m]")),

@@ -237,8 +237,7 @@ def _settled(columns: Columns, span: float, rests: bool, last: float, damped: bo
     when = settling(columns)
     vibrates = bool(column(columns, FREQUENCY).any())
     estimate = settling_estimate(columns, last)
-    undamped = vibrates and not damped and not math.isfinite(estimate)
-    expected = UNDAMPED if undamped else _expected(estimate, vibrates)
+    expected = UNDAMPED if vibrates and not damped else _expected(estimate, vibrates)
     if math.isnan(when) and rests:
         return (
             "settled              not yet: a body rests on its stop, but the mechanism still "

@@ -172,8 +172,9 @@ def two_writers() -> list[str]:
         texts = [process.communicate()[0] for process in processes]
         failures = [f"writer: {t[-300:]}" for p, t in zip(processes, texts, strict=True)
                     if p.returncode]  # fmt: skip
-        files = [p for p in out.rglob("*") if p.is_file()]
-        if [p.name for p in files] != ["PRBDM.fmu"] or zipfile.ZipFile(files[0]).testzip():
+        files = sorted((p for p in out.rglob("*") if p.is_file()), key=lambda p: p.suffix)
+        expected = ["PRBDM.fmu", "PRBDM-build.json"]
+        if [p.name for p in files] != expected or zipfile.ZipFile(files[0]).testzip():
             failures.append(f"writers left {[p.name for p in files]}")
     return failures
 
