@@ -10,6 +10,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ..base.errors import MechanismError
 from ..drawing.shapes import FlexureLine, Shapes, corners
+from ..files.outlines import CORNERS_MIN
 from ..mechanics.arrays import Complex, Real
 from ..mechanics.assembly import assemble
 from ..mechanics.beam import Beam
@@ -28,7 +29,6 @@ SLOT_SHARE = 0.02  # at most this share of the size.
 OVERLAP_RTOL = 1e-6  # Overlap of parts that are joined, as a share of the size.
 AREA_RTOL = 1e-6  # Overlap of parts that are apart, as a share of the square of the size.
 STOP_SHARE = 0.05  # Length of the line of a stop.
-CORNERS_MIN = 3
 CURVE_POINTS = 161  # Points of an arc of a notch, or of a curved flexure.
 SAME_RTOL = 1e-9  # Points nearer than this share of the length coincide.
 CONTACT_MIN = 0.99  # Share of the end of a flexure that lies on its body.

@@ -20,7 +20,7 @@ from .recognition import Recognised
 
 NEAR_SHARE = 0.25  # Largest distance of a stop from a body, as a share of the diagonal.
 JOINED_SHARE = 1e-3  # Largest distance of lines that form one wall.
-TOUCHING_SHARE = 1e-5  # Largest distance of parts that touch, and twice the accuracy.
+TOUCHING_SHARE = 1e-5  # Largest distance of parts that touch, at least twice the accuracy.
 SQUARE_MAX = 1e-3  # Largest inclination of a side to the shortest way between wall and body [rad].
 TURN_MAX = 0.1  # Largest angle between sides that separate a wall and a body [rad].
 AROUND = 100.0  # Radius around a contact, over the distance of parts that touch.
@@ -75,10 +75,11 @@ def find_stops(found: Recognised, curves: Curves) -> list[FoundStop]:
 
     Walls without a stop are added to the doubts.
     """
-    stops = []
-    lines = [c.z for c in curves.on(STOPS) if np.ptp(np.abs(c.z - c.z[0])) > 0.0]
+    stops, lines = [], []
     for curve in curves.on(STOPS):
-        if not np.ptp(np.abs(curve.z - curve.z[0])) > 0.0:
+        if np.ptp(np.abs(curve.z - curve.z[0])) > 0.0:
+            lines.append(curve.z)
+        else:
             found.doubts.append((complex(curve.z[0]), "a point on the layer stops is no wall"))
     for joined in _joined(lines, JOINED_SHARE * found.size):
         stop = _stop(found, joined)

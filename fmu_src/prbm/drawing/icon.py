@@ -18,7 +18,7 @@ from ..mechanism.description import Mechanism
 from ..mechanism.parts import value
 from .motion import angles, closed, stretched
 from .shapes import Shapes
-from .style import area, own_style, png
+from .style import GROUND_COLOUR, area, own_style, png
 
 STEEL, BODY, WALL, GHOST = "#1f4e79", "#9dc3e6", "#595959", "#d0d0d0"
 BACKGROUND = "#ffffff"  # As of the PNG: lines are dark and would vanish in tools with a dark theme.
@@ -52,7 +52,7 @@ STYLES = {
     "spring": Style(3.1, STEEL, 0.9),
     "profile": Style(1.0, STEEL, fill=BODY),
     "body": Style(2.0, STEEL, fill=BODY),
-    "fixed": Style(-1.0, WALL, 0.7, fill="#dedede"),
+    "fixed": Style(-1.0, WALL, 0.7, fill=GROUND_COLOUR),
     "centre": Style(4.0, STEEL, fill=STEEL, diameter=3.5),
     "pin": Style(5.0, STEEL, fill="#ffffff", diameter=4.5),
     "ground": Style(3.2, WALL),
