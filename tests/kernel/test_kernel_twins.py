@@ -27,6 +27,7 @@ from kernel_library import (
     KernelSystem,
     array,
     constants,
+    coulomb_laws,
     kernel,
     placed,
     prototypes,
@@ -1005,7 +1006,7 @@ def test_forces_that_satisfy_the_laws_of_contact_are_the_same(k, m):
         normal = np.array([j if j < k and rng.uniform() < 0.7 else -1 for j in range(m)], int)
         P, z = np.full(k + m, np.nan), np.full(k + m, np.nan)
         tolerance = 1e-9 * np.abs(u).max()
-        assert kernel().coulomb(k, m, W, u, mu, fixed, normal, tolerance, P)
+        assert kernel().coulomb(k, m, W, u, coulomb_laws(mu, fixed, normal), tolerance, P)
         expected = complementarity.coulomb(W, u, mu, fixed, normal, tolerance)
         assert_same(P, expected, 1e-10)
         limit = fixed + mu * np.append(P[:k], 0.0)[normal]
@@ -1613,7 +1614,7 @@ def test_contact_forces_are_the_same(name):
             assert kernel().stick_force(mine.structure, lam, c) == force
             found = kernel().friction_limit(mine.structure, e, mine.evaluation, c)
             assert_same(found, limit, scale=abs(force))
-        for c in (*theirs.slipping_points, *theirs.slipping_stops):
+        for c in (*theirs.slipping_points, *theirs.slipping_rows):
             found = kernel().slip_force(mine.structure, e, mine.evaluation, c)
             force = dynamics.sliding_friction(theirs, c, e, given)
             assert_same(found, -contacts.modes[c].slip * force)

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import linprog
 
 import random_contacts
-from kernel_library import kernel
+from kernel_library import coulomb_laws, kernel
 from prbm.base.tolerances import COMPLEMENTARITY_RTOL
 from prbm.mechanics import complementarity
 
@@ -60,7 +60,7 @@ def test_contacts_that_separate_without_forces_receive_none(engine):
         mu, zero, normal = rng.uniform(0, 2, k), np.zeros(k), np.arange(k)
         P, tolerance = np.ones(2 * k), COMPLEMENTARITY_RTOL * np.abs(u).max()
         if engine == "kernel":
-            assert kernel().coulomb(k, k, W, u, mu, zero, normal, tolerance, P)
+            assert kernel().coulomb(k, k, W, u, coulomb_laws(mu, zero, normal), tolerance, P)
         else:
             P = complementarity.coulomb(W, u, mu, zero, normal, tolerance)
         assert np.abs(P * np.diag(W)).max() < 1e-12 * np.abs(u).max()

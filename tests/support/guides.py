@@ -125,3 +125,8 @@ def beaded():
             Spring("pair", "bead.e", "rider.c", 30.0, 0.011),
         ),
     )  # fmt: skip
+
+
+def rough(model, friction):
+    """Return a mechanism whose guides have a coefficient of friction."""
+    return replace(model, guides=tuple(replace(g, friction=friction) for g in model.guides))

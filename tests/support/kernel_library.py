@@ -281,6 +281,18 @@ def kernel() -> Kernel:
     return Kernel(compiled())
 
 
+def coulomb_laws(
+    friction: Any, fixed: Any, normal: Any, L: Any = (), b: Any = ()
+) -> ctypes.Structure:
+    """Return the laws of friction of contacts, whose arrays stay alive with them."""
+    arrays = [np.ascontiguousarray(x, float) for x in (friction, fixed, L, b)]
+    arrays.insert(2, np.ascontiguousarray(normal, np.int32))
+    mu, most, of, matrix, constants = (x.ctypes.data for x in arrays)
+    laws = structures()["CoulombLaws"](mu, most, of, len(arrays[-1]), matrix, constants)
+    laws.arrays = arrays
+    return laws
+
+
 # --- a mechanism in the kernel --------------------------------------------------------------------
 
 

@@ -122,7 +122,7 @@ class KernelSimulation:
         self.tables, self.inner, self.states_of = None, None, None
         self.library = library(changes)
         self.sentence = ctypes.create_string_buffer(SENTENCE)
-        self.stops, self.points = mechanism.stops, len(mechanism.frictions)
+        self.stops, self.points = mechanism.stops, len(mechanism.rubbing)
         chosen = independent(mechanism)
         self.slots = slots(mechanism, chosen)
         data = tables(mechanism, interface(mechanism, {}), "token", chosen)
@@ -202,7 +202,7 @@ class KernelSimulation:
         for stop in self.stops:
             places.append(at)
             at += per_stop + (per_contact if stop.compliant else 0)
-        return [*places, *range(at, at + self.points)]
+        return [*places, *range(at, at + 2 * self.points, 2)]  # Modes and sides in turn.
 
     # -- model exchange --
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from kernel_library import KernelError, kernel
+from kernel_library import KernelError, coulomb_laws, kernel
 from prbm.base.errors import SimulationError
 from prbm.base.tolerances import COMPLEMENTARITY_RTOL
 from prbm.mechanics import complementarity, contact
@@ -99,7 +99,7 @@ def rest(engine, rng):
     fixed[normal < 0] = rng.uniform(0, 1) * np.abs(u).max() / np.diag(W).max()
     P, tolerance = np.zeros(k + m), COMPLEMENTARITY_RTOL * np.abs(u).max()
     if engine == "kernel":
-        if not kernel().coulomb(k, m, W, u, mu, fixed, normal, tolerance, P):
+        if not kernel().coulomb(k, m, W, u, coulomb_laws(mu, fixed, normal), tolerance, P):
             raise KernelError("no forces")
     else:
         found = complementarity.coulomb(W, u, mu, fixed, normal, tolerance)

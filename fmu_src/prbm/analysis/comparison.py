@@ -302,6 +302,7 @@ def compare(
 def _without(mechanism: Mechanism) -> dict[str, float]:
     """Return zeros for friction and for damping in proportion to mass."""
     off = {f"{f.name}.coefficient": 0.0 for f in mechanism.frictions}
+    off |= {f"{g.name}.friction": 0.0 for g in mechanism.guides if g.friction is not None}
     off |= {f"{s.name}.friction": 0.0 for s in mechanism.stops}
     return off | {"damping.zeta": 0.0}
 

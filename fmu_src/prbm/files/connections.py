@@ -60,6 +60,7 @@ class GuideTable(Named):
         description="Whether the guided body may turn; otherwise it keeps its angle relative to "
         "the line",
     )
+    friction: Annotated[Quantity, measured(parts.Guide, "friction")] | None = None
     mirror: LineOrLines = mirror_key()
     repeat: RepeatTable | None = repeat_key()
 
@@ -77,4 +78,5 @@ def spring_of(table: SpringTable) -> parts.Spring:
 
 def guide_of(table: GuideTable) -> parts.Guide:
     """Return the guide of a table."""
-    return parts.Guide(table.name, table.point, table.start, table.end, table.turning)
+    given = dict(table)
+    return parts.Guide(**{key: given[key] for key in given if key not in ("mirror", "repeat")})

@@ -584,13 +584,14 @@ _EVENT_LOOP = """\
 
 
 def _events(mechanism: Mechanism, interface: NativeInterface, version: int) -> str:
-    if not (mechanism.stops or mechanism.frictions):
+    if not (mechanism.stops or mechanism.rubbing):
         return "<h2>Events</h2>\n<p>This mechanism has no events.</p>"
     parts = [
         "<h2>Events</h2>\n<p>Events are: the closing of a stop (an impact, or the capture into "
-        "rest), the release of a stop that holds, and the beginning and the end of sliding with "
-        "friction. Each has an event indicator, which changes its sign at the event. Indicators "
-        "are scaled to the order of 1 and are never 0 after an event.</p>",
+        "rest), the release of a stop that holds, the beginning and the end of sliding with "
+        "friction, and, while a guide slides, the change of the side to which it pushes. Each has "
+        "an event indicator, which changes its sign at the event. Indicators are scaled to the "
+        "order of 1 and are never 0 after an event.</p>",
         *_peaks(mechanism),
         "<p>At an event, values are those <em>before</em> the event until it has been handled; in "
         "model exchange, that is the update of the discrete states in event mode. In "

@@ -65,6 +65,10 @@ GUIDES = (
     "line, and, if the body keeps its angle, the sine of this angle times the size, both in the "
     "frame of the body that carries the line.</p>\n"
 )
+RUBBING = (
+    f"<p>A guide with friction that slides has the force {inline('-mu abs(lambda) sgn(v)')} along "
+    "its line, with its multiplier as normal force.</p>\n"
+)
 
 
 def equations(mechanism: Mechanism) -> str:
@@ -93,6 +97,7 @@ def equations(mechanism: Mechanism) -> str:
         f"{inline('g')} has the rate {inline('dot(g) = G v + w')}, with {inline('w')} the velocity "
         f"of the wall.</p>\n{''.join(STOP_LAWS[law] for law in laws)}"
         f"{SPRINGS if mechanism.springs else ''}{GUIDES if mechanism.guides else ''}"
+        f"{RUBBING if any(g.friction is not None for g in mechanism.guides) else ''}"
         f"{_flexure_table(mechanism)}"
         "<p>Energy balance: kinetic + elastic + gravitational + dissipated energy - work is "
         "constant, also across impacts.</p>"

@@ -12,10 +12,10 @@ from collections.abc import Sequence
 from ..base.text import printable
 
 GREEK = {
-    "alpha": "\u03b1", "beta": "β", "epsilon": "ε", "zeta": "ζ", "lambda": "λ", "omega": "ω",
-    "Lambda": "Λ", "Phi": "Φ",
+    "alpha": "\u03b1", "beta": "β", "epsilon": "ε", "zeta": "ζ", "lambda": "λ", "mu": "μ",
+    "omega": "ω", "Lambda": "Λ", "Phi": "Φ",
 }  # fmt: skip
-FUNCTIONS = {"Re", "Im", "exp", "diag", "max"}
+FUNCTIONS = {"Re", "Im", "abs", "diag", "exp", "max", "sgn"}
 WORDS = {
     "position", "displacement", "restitution", "springs", "gravity", "damping", "friction",
     "inputs", "force",

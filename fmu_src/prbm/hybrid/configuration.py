@@ -92,6 +92,11 @@ class Scales:
         return ZERO_RATE_RTOL * self.rate**2 * self.length
 
     @property
+    def zero_force(self) -> float:
+        """Force below which the direction of the force of a guide is round-off [N]."""
+        return ZERO_RATE_RTOL * self.energy / self.length
+
+    @property
     def touching(self) -> float:
         """Gap below which a stop closes together with others [m].
 
@@ -261,8 +266,8 @@ class Configuration:
 
 
 def contact_names(mechanism: Mechanism, contacts: Iterable[int]) -> str:
-    """Return the names of stops and friction points, in their order, without repetition."""
-    names = [s.name for s in mechanism.stops] + [f.name for f in mechanism.frictions]
+    """Return the names of contacts, in their order, without repetition."""
+    names = [part.name for part in (*mechanism.stops, *mechanism.rubbing)]
     return ", ".join(names[c] for c in sorted(set(contacts)))
 
 

@@ -42,6 +42,12 @@ def release(configuration: Configuration, front: Front, stop: int) -> Front:
     return choose_modes(configuration, front.with_contacts(front.contacts.released(stop)))
 
 
+def change_side(configuration: Configuration, front: Front, contact: int) -> Front:
+    """Return the front after the force of a guide that slips has changed its side."""
+    contacts = front.contacts.with_side(contact, -front.contacts.side(contact))
+    return choose_modes(configuration, front.with_contacts(contacts))
+
+
 def slip(configuration: Configuration, front: Front, contact: int) -> Front:
     """Return the front after a sticking contact has reached the limit of friction."""
     return choose_modes(configuration, front, slipped=contact)
@@ -109,10 +115,31 @@ def _chosen(
     slipped: int | None,
     turning: Mapping[int, float],
 ) -> Front:
-    """Return the front with the modes that its forces choose; not projected."""
-    holding = holding_stops(configuration, front, candidates)
-    front = front.with_contacts(front.contacts.holding(holding))
-    return _with_friction(configuration, front, candidates, slipped, turning)
+    """Return the front with the modes that its forces choose; not projected.
+
+    The friction of a guide that slips depends on the side to which the guide pushes.  Changing the
+    side of the first wrong one at a time ends, however many guides there are, if forces and sides
+    determine each other uniquely (Murty's method for linear complementarity problems).
+    """
+    wrong: int | None = None
+    for _ in range(MODE_ITERATIONS_MAX):
+        holding = holding_stops(configuration, front, candidates)
+        front = front.with_contacts(front.contacts.holding(holding))
+        front = _with_friction(configuration, front, candidates, slipped, turning)
+        wrong = _guide_on_wrong_side(configuration, front)
+        if wrong is None:
+            return front
+        contacts = front.contacts.with_side(wrong, -front.contacts.side(wrong))
+        front = front.with_contacts(contacts)
+    failed = list(candidates) if wrong is None else [*candidates, wrong]
+    raise SimulationError(_failure(configuration, front, failed, JAMMED))
+
+
+def _guide_on_wrong_side(configuration: Configuration, front: Front) -> int | None:
+    """Return the first slipping guide that does not push to the side of its friction."""
+    slipping, least = front.equations.slipping_guides, -configuration.scales.zero_force
+    lam = front.evaluate().lam if slipping else np.zeros(0)
+    return next((c for c in slipping if front.equations.side_force(c, lam) < least), None)
 
 
 def release_moving(configuration: Configuration, front: Front) -> tuple[Front, int | None]:
@@ -303,6 +330,9 @@ def _modes_of(
     for i in (stops[k] for k in pressed):
         contacts = contacts.held_with(i, modes[i] if i in rubbing else FRICTIONLESS)
     contacts = _sticking_or_slipping(scales, contacts, at_rest, found, pressed, slipped)
+    guides = [c for c in at_rest if equations.is_guide(c)]
+    for c, force in zip(guides, found.sides, strict=True):
+        contacts = contacts.with_side(c, -1 if force < 0.0 else 1)
     slack = dict(zip(at_rest, scales.zero_acceleration / found.mobility, strict=True))
     return contacts if _agrees(scales, front, contacts, every, slack) else None
 
@@ -331,11 +361,11 @@ def _sliding_modes(
 
 
 def _with_coefficients(equations: Equations, stops: Sequence[int]) -> list[int]:
-    """Return those of ``stops``, pressed stops and all friction points that have friction."""
+    """Return those of ``stops``, pressed stops, friction points and guides that have friction."""
     contacts = equations.contacts
     pressed = [i for i in contacts.pressed if i not in stops and not contacts.is_free(i)]
-    points = range(contacts.stops, len(contacts.modes))
-    return [c for c in (*stops, *pressed, *points) if equations.friction_coefficient(c) > 0.0]
+    others = range(contacts.stops, len(contacts.modes))
+    return [c for c in (*stops, *pressed, *others) if equations.friction_coefficient(c) > 0.0]
 
 
 def _sliding_mode(scales: Scales, front: Front, contact: int, slow: float) -> ContactMode:

@@ -26,17 +26,19 @@ class EventKind(IntEnum):
     """A sticking contact reaches the limit of friction."""
     REVERSAL = 3
     """The sliding velocity of a contact falls to zero: it sticks or slips the other way."""
-    SWITCH = 4
+    SIDE = 4
+    """The force of a guide that slips changes its side."""
+    SWITCH = 5
     """The phase of a contact at a compliant stop changes, see :class:`.contact_state.Phase`."""
-    SEPARATION = 5
+    SEPARATION = 6
     """The indentation of a compliant stop falls to zero: the contact ends."""
-    IMPACT = 6
+    IMPACT = 7
     """The gap of an open stop closes: an impact or a capture, or the first touch of a contact."""
 
 
 @dataclass(frozen=True)
 class Event:
-    """An event of a contact at a time [s].  Contacts are the stops, then the friction points."""
+    """An event of a contact at a time [s]; see :mod:`prbm.mechanics.contact_state`."""
 
     kind: EventKind
     contact: int
@@ -90,6 +92,10 @@ TRANSITIONS = (
     Transition(
         EventKind.REVERSAL, guards.slip_speed, guards.slipping_contacts, guards.reversal_time,
         _choosing_modes(contact_modes.reverse),
+    ),
+    Transition(
+        EventKind.SIDE, guards.guide_force, guards.slipping_guides, guards.side_time,
+        _choosing_modes(contact_modes.change_side),
     ),
     Transition(
         EventKind.SWITCH, guards.switching, guards.pressed_stops, guards.switching_time,

@@ -85,6 +85,11 @@ def friction_margin(equations: Equations, contact: int, t: float, y: Real) -> fl
     return _friction_margin(equations, contact, e, equations.at(t, y))
 
 
+def guide_force(equations: Equations, contact: int, t: float, y: Real) -> float:
+    """Return the force of a slipping guide to its side [N]."""
+    return equations.side_force(contact, equations.at(t, y).lam)
+
+
 def slip_speed(equations: Equations, contact: int, t: float, y: Real) -> float:
     """Return the speed of a slipping contact in its direction [m/s]."""
     n = equations.n
@@ -93,7 +98,7 @@ def slip_speed(equations: Equations, contact: int, t: float, y: Real) -> float:
 
 
 def _stop_force(equations: Equations, stop: int, evaluation: Evaluation) -> float:
-    force = float(evaluation.lam[equations.hold_row(stop)])
+    force = equations.side_force(stop, evaluation.lam)
     depth = equations.contacts.depth(stop)
     if not depth:
         return force
@@ -197,7 +202,12 @@ def pressed_stops(view: StepView) -> Sequence[int]:
 
 def slipping_contacts(view: StepView) -> Sequence[int]:
     """Return the contacts that are watched for reversals."""
-    return view.equations.slipping_points + view.equations.slipping_stops
+    return view.equations.slipping_points + view.equations.slipping_rows
+
+
+def slipping_guides(view: StepView) -> Sequence[int]:
+    """Return the guides that are watched for changes of their side."""
+    return view.equations.slipping_guides
 
 
 def sticking_contacts(view: StepView) -> Sequence[int]:
@@ -341,6 +351,14 @@ def release_time(view: StepView, guard: Guard, stop: int) -> float | None:
     """Return when the force of a held stop falls to zero."""
     seen = [(t, _stop_force(view.equations, stop, at)) for t, _, at in view.evaluations]
     return _first_fall(view, view.along(guard, stop), seen)
+
+
+def side_time(view: StepView, guard: Guard, contact: int) -> float | None:
+    """Return when the force of a slipping guide changes its side by more than round-off."""
+    equations, slack = view.equations, view.scales.zero_force
+    seen = [(t, equations.side_force(contact, at.lam) + slack) for t, _, at in view.evaluations]
+    z = view.along(guard, contact)
+    return _first_fall(view, lambda t: z(t) + slack, seen)
 
 
 def slip_time(view: StepView, guard: Guard, contact: int) -> float | None:

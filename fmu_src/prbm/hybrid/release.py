@@ -67,7 +67,7 @@ def released(configuration: Configuration, inputs: Inputs, time: float) -> Front
     speed = value(mechanism.release, "velocity", configuration.values)
     velocity = release_velocity(system, q, speed)
     stops = len(mechanism.stops)
-    contacts = ContactState.free(stops, len(mechanism.frictions))
+    contacts = ContactState.free(stops, len(mechanism.rubbing))
     equations = configuration.equations(inputs, contacts)
     y = np.concatenate([q, velocity, np.zeros(2 + equations.compliant.size)])
     front = Front(time, y, equations, (Latched(),) * stops, (None,) * stops).projected()

@@ -6,14 +6,15 @@ friction of sliding contacts may exclude them (Painleve's paradox).
 """
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.tolerances import COMPLEMENTARITY_RTOL, LIMIT_RTOL
 from ..mechanics.arrays import Real
-from ..mechanics.complementarity import coulomb
+from ..mechanics.complementarity import TwoSided, coulomb, limits
+from ..mechanics.constraints import solve_saddle
 from ..mechanics.dynamics import Equations
 from .configuration import Scales
 from .front import Front
@@ -34,6 +35,8 @@ class RestForces:
         Accelerations of sliding [m/s^2].
     W : (k + m, k + m)
         Accelerations of the gaps, and of sliding, by unit forces [1/kg].
+    sides : (g,)
+        Normal forces of the guides among the contacts, positive to the left of their lines [N].
     """
 
     normal: Real
@@ -41,6 +44,7 @@ class RestForces:
     limit: Real
     slide: Real
     W: Real
+    sides: Real = field(default_factory=lambda: np.zeros(0))
 
     @property
     def mobility(self) -> Real:
@@ -80,7 +84,7 @@ def rest_forces(
     slips : sequence of int
         Signs of the sliding velocities of these stops; 0: at rest.
     at_rest : sequence of int
-        Contacts with friction that do not slide: those of ``stops`` and of the friction points.
+        Contacts with friction that do not slide: those of ``stops``, friction points and guides.
     """
     n, k, at, t, v = equations.n, len(stops), front.at, front.time, front.v
     e, evaluation = at.e, equations.at(t, front.y)
@@ -93,32 +97,39 @@ def rest_forces(
         for i, sign in zip(stops, slips, strict=True)
     ]
     rows, pushes = np.vstack([G, T]), np.vstack([G - np.reshape(rubs, (-1, n)), T])
-    W = at.inverse_mass(rows, at.response(pushes))
+    unit_forces = np.vstack([pushes.T, np.zeros((len(equations.rows), len(rows)))])
+    response = solve_saddle(evaluation.factors, unit_forces)
+    W = at.inverse_mass(rows, response[:n])
     slide = [equations.slip_acceleration(c, e, v, a) for c in at_rest]
     opening = equations.gap_accelerations(t, e, v, a, evaluation.pressure)
     u = np.concatenate([opening[list(stops)], slide])
-    friction = np.array([equations.stop_friction[c] if c in stops else 0.0 for c in at_rest])
+    guides = [c for c in at_rest if equations.is_guide(c)]
+    carrying = [equations.normal_row(c) for c in guides]
+    carried = TwoSided(-response[n:][carrying], evaluation.lam[carrying])
+    normals = [*stops, *guides]
+    normal = np.array([normals.index(c) if c in normals else -1 for c in at_rest], int)
+    friction = np.where(normal < 0, 0.0, [equations.friction_coefficient(c) for c in at_rest])
     fixed = np.array([
-        0.0 if c in stops else equations.friction_limit(c, e, evaluation.pressure) for c in at_rest
+        equations.friction_limit(c, e, evaluation.pressure) if c not in normals else 0.0
+        for c in at_rest
     ])  # fmt: skip
-    normal = np.array([list(stops).index(c) if c in stops else -1 for c in at_rest], int)
-    pulls = fixed * W.diagonal()[k:]
+    pulls = limits(np.zeros(len(u)), friction, fixed, normal, carried) * W.diagonal()[k:]
     tolerance = max(
         COMPLEMENTARITY_RTOL * float(np.abs(u).max(initial=0.0)),
         LIMIT_RTOL * float(pulls.max(initial=0.0)),
         scales.zero_acceleration / 2,
     )
-    P = coulomb(W, u, friction, fixed, normal, tolerance)
+    P = coulomb(W, u, friction, fixed, normal, tolerance, carried)
     if P is None:
         return None
-    limit = fixed + friction * np.append(P[:k], 0.0)[normal]
+    limit = limits(P, friction, fixed, normal, carried)
     sliding = (W @ P + u)[k:]
     sliding[np.abs(sliding) <= tolerance] = 0.0  # Round-off of the forces at the contacts.
     alone = P[:k] * W.diagonal()[:k]
     own = normal[:, None] == np.arange(k)  # Friction of a stop.
     together = alone + ((W[:k, k:].T * P[k:, None]) * own).sum(axis=0)
     pressing = np.where(P[:k] > 0.0, np.maximum(alone, np.abs(together)), 0.0)
-    return RestForces(pressing, P[k:], limit, sliding, W)
+    return RestForces(pressing, P[k:], limit, sliding, W, carried.of(P))
 
 
 def sticking(

@@ -62,6 +62,7 @@ def plain_front(front: Front) -> Plain:
         "inputs": plain_inputs(front.inputs),
         "modes": [int(mode) for mode in front.contacts.modes],
         "touching": [asdict(one) if one else None for one in front.contacts.touching],
+        "sides": list(front.contacts.sides),
         "latched": [asdict(latched) for latched in front.latched],
         "touches": [asdict(touch) if touch else None for touch in front.touches],
     }
@@ -74,7 +75,8 @@ def front_of(plain: Mapping[str, Any], configuration: Configuration) -> Front:
         _made(ContactPhase, {**one, "phase": Phase(one["phase"])}) if one is not None else None
         for one in plain["touching"]
     )
-    contacts = ContactState(modes, len(configuration.mechanism.stops), touching)
+    stops, sides = len(configuration.mechanism.stops), tuple(plain["sides"])
+    contacts = ContactState(modes, stops, touching, sides)
     return Front(
         plain["time"],
         np.array(plain["y"]),
@@ -310,16 +312,22 @@ def _conditions(found: Mapping[str, Any]) -> dict[str, bool]:
     configuration, front, fastest = found["configuration"], found["front"], found["fastest"]
     arc, event = found["arc"], found["pending"]
     n, mechanism = configuration.system.n, configuration.mechanism
-    stops, modes = len(mechanism.stops), front.contacts.modes
-    friction = event is not None and event.kind in (EventKind.SLIP, EventKind.REVERSAL)
+    stops, modes, sides = len(mechanism.stops), front.contacts.modes, front.contacts.sides
+    points = len(mechanism.frictions)
+    allowed = {
+        EventKind.SLIP: range(len(modes)),
+        EventKind.REVERSAL: range(len(modes)),
+        EventKind.SIDE: range(stops + points, len(modes)),
+    }
     begun = zip(mechanism.stops, front.contacts.touching, front.touches, strict=True)
     return {
         "shapes": _shaped(len(front.y), n, arc, found["k1"], fastest),
         "touching": all(stop.compliant or (one, two) == (None, None) for stop, one, two in begun),
         "modes": ContactMode.OPEN not in modes[stops:],
+        "sides": all(x in (-1, 1) for x in sides) and -1 not in sides[:points],
         "latched": all(0 <= x.impact_count <= IMPACT_COUNT_MAX for x in front.latched),
         "window": 0 <= found["window"].count <= EVENTS_MAX,
-        "pending": event is None or 0 <= event.contact < (len(modes) if friction else stops),
+        "pending": event is None or event.contact in allowed.get(event.kind, range(stops)),
         "controller": found["controller"].h >= 0.0,
         "tolerance": TOLERANCE_MIN <= configuration.tolerance <= TOLERANCE_USED_MAX,
         "frequency": configuration.frequency >= 0.0,

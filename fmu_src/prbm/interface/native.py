@@ -28,6 +28,7 @@ INDICATOR_DESCRIPTIONS = {
     "impact": "Event indicator of an impact at {name}",
     "release": "Event indicator of the release from rest on {name}",
     "slip": "Event indicator of the beginning and the end of sliding at {name}",
+    "side": "Event indicator of the change of the side to which {name} pushes",
 }
 
 
@@ -170,7 +171,8 @@ def _derivative(name: str, nominal: Scales) -> Variable:
 
 def _indicators(mechanism: Mechanism) -> Iterator[Variable]:
     kinds = [(stop.name, kind) for stop in mechanism.stops for kind in INDICATORS]
-    kinds += [(friction.name, "slip") for friction in mechanism.frictions]
+    kinds += [(part.name, "slip") for part in mechanism.rubbing]
+    kinds += [(guide.name, "side") for guide in mechanism.guides if guide.friction is not None]
     for name, kind in kinds:
         yield Variable(
             f"{name}.{kind}_indicator",

@@ -66,7 +66,7 @@ TYPES = {"Real": 0, "Integer": 1, "Boolean": 2, CLOCK: 3}
 COORDINATES_MAX = 512  # The mass matrix then has 2 MB.
 DIRECTIONS_MAX = 1024  # The mass matrix of the directions then has 16 MB.
 DIRECTION_MAP_MAX = 16384  # Changes of directions with coordinates.
-STOPS_MAX = 64  # Largest number of stops, and of friction points.
+STOPS_MAX = 64  # Largest number of stops, and of friction points and guides with friction.
 PLACES_MAX = 1024  # Largest number of forces, of probes, of springs, and of guides.
 GROUND_POINTS_MAX = 4096  # The kernel computes the distance of every pair of points.
 GROUND_NUMBER = 0  # Bodies are counted from 1.
@@ -133,7 +133,7 @@ def check_size(mechanism: Mechanism) -> None:
         ("springs", len(m.springs), PLACES_MAX),
         ("guides", len(m.guides), PLACES_MAX),
         ("stops", len(m.stops), STOPS_MAX),
-        ("frictions", len(m.frictions), STOPS_MAX),
+        ("frictions", len(m.rubbing), STOPS_MAX),
         ("forces", len(m.forces), PLACES_MAX),
         ("probes", len(m.probes), PLACES_MAX),
         ("points of the ground", len(m.ground), GROUND_POINTS_MAX),
@@ -194,7 +194,8 @@ def _groups(mechanism: Mechanism, independent: Sequence[int]) -> dict[str, Itera
         "derivatives": state_derivatives(mechanism, coordinates, independent),
         "indicators": [
             *(f"{stop}.{kind}_indicator" for stop in stops for kind in INDICATORS),
-            *(f"{friction.name}.slip_indicator" for friction in mechanism.frictions),
+            *(f"{part.name}.slip_indicator" for part in mechanism.rubbing),
+            *(f"{g.name}.side_indicator" for g in mechanism.guides if g.friction is not None),
         ],
         "time": ["time"],
     }
@@ -276,6 +277,7 @@ class _Writer:
         for guide in m.guides:
             yield _text(guide.name) + self._between(guide, "point", "start")
             yield self._point(m.point(guide.end, guide.name)) + _u32(not guide.turning)
+            yield _u32(guide.friction is not None) + self._fields(guide)
 
     def _contacts(self) -> Iterator[bytes]:
         """Yield stops, friction points, forces and probes."""
@@ -369,6 +371,7 @@ class _Writer:
         """Yield the bounds of the fields that are expressions."""
         m = self.mechanism
         parts: tuple[Part, ...] = (*m.flexure_types, *m.bodies, *m.joints, *m.springs)
+        parts = (*parts, *m.guides)
         for part in (*parts, *m.frictions, *m.stops, m.release):
             for name, (unit, _, minimum, maximum, *_) in fields_of(part).items():
                 quantity = _given(part, name)

@@ -184,10 +184,11 @@ typedef enum {
     EVENT_RELEASE = 1,
     EVENT_SLIP = 2,
     EVENT_REVERSAL = 3,
-    EVENT_SWITCH = 4,
-    EVENT_SEPARATION = 5,
-    EVENT_IMPACT = 6,
-    EVENT_KINDS = 7,
+    EVENT_SIDE = 4,
+    EVENT_SWITCH = 5,
+    EVENT_SEPARATION = 6,
+    EVENT_IMPACT = 7,
+    EVENT_KINDS = 8,
 } EventKind;
 
 /* --- prbm.mechanism.flexure --------------------------------------------------------------------- */

@@ -12,7 +12,7 @@
 
 PRBM int exchange_indicators(const Simulation *simulation) {
     const Mechanism *m = simulation->configuration.mechanism;
-    return STOP_INDICATORS * m->stop_count + m->friction_count;
+    return indicator_count(m);
 }
 
 /* Slip and reversal share an indicator, because a contact either sticks or slips.  So do impact and
@@ -26,7 +26,11 @@ PRBM int indicator_place(const Simulation *sim, EventKind kind, int contact) {
         [EVENT_SEPARATION] = INDICATOR_IMPACT,
         [EVENT_IMPACT] = INDICATOR_IMPACT,
     };
-    int s = system_of(sim)->s;
+    const System *system = system_of(sim);
+    int s = system->s, points = system->mechanism->friction_count;
+    if (kind == EVENT_SIDE) {
+        return STOP_INDICATORS * s + system->f + contact - s - points;
+    }
     return contact < s ? STOP_INDICATORS * contact + PLACE[kind]
                        : STOP_INDICATORS * s + contact - s;
 }
@@ -55,6 +59,7 @@ PRBM double lifted_guard(const Simulation *sim, const Instant *at, EventKind kin
     if (kind == EVENT_IMPACT || kind == EVENT_SEPARATION) {
         return z + sim->state.floors[contact];
     }
+    z += kind == EVENT_SIDE ? zero_force(&sim->configuration) : 0.0;
     return kind == EVENT_REVERSAL ? z + SLIDING_ENDS_FACTOR * zero_speed(&sim->configuration)
                                  : z;
 }

@@ -284,15 +284,18 @@ static bool sliding_ends(const Simulation *sim, const Instant *at, int contact) 
     return fabs(speed) <= SLIDING_ERROR_RTOL * guard_scale(sim, EVENT_REVERSAL);
 }
 
-/* Make a contact stick, so that a solver's error does not count as sliding backwards. */
+/* Make a contact stick, so that a solver's error does not count as sliding backwards.  If other
+ * constraints keep it from sliding, as at a dead centre, nothing changes. */
 static void stop_sliding(Simulation *sim, int contact) {
-    Problem ignored; /* If the constraints are dependent, the front does not change. */
+    Problem ignored;
     size_t mark = sim->scratch.used;
+    ContactMode slipping = sim->state.modes[contact];
     double *kept = take(&sim->scratch, (size_t)state_size(sim));
     copy(state_size(sim), sim->state.front, kept);
     set_mode(sim, contact, CONTACT_STICK);
     if (!project(&sim->equations, sim->state.time, sim->state.front, &sim->scratch, &ignored)) {
         copy(state_size(sim), kept, sim->state.front);
+        set_mode(sim, contact, slipping);
     }
     sim->scratch.used = mark;
 }

@@ -158,7 +158,7 @@ static void rub_change(const Tangent *t) {
     Scratch *scratch = &t->sim->scratch;
     size_t mark = scratch->used;
     double *row = take(scratch, (size_t)eq->system->n);
-    for (int k = eq->slipping_stops; k < eq->slipping_count; k++) {
+    for (int k = eq->slipping_rows; k < eq->slipping_count; k++) {
         int contact = eq->slipping[k], i;
         Rows rows = tangential_rows(eq->system, contact, &i);
         row_jacobian(&rows, i, t->e, row);
@@ -172,15 +172,14 @@ static void rub_change(const Tangent *t) {
  * second time derivatives of these rows at constant accelerations. */
 static void row_change(const Tangent *t) {
     const Equations *eq = t->eq;
-    Rows walls = slide_rows(eq->system);
     for (int k = 0; k < eq->r; k++) {
         add_pull(t, &eq->active, k, t->lam[k]);
         t->dlam[k] = -second_change(t, &eq->active, k);
     }
-    for (int k = 0; k < eq->slipping_stops; k++) {
-        int i = eq->slipping[k];
-        double share = -eq->stop_friction[i] * sliding_sign(t, i);
-        add_pull(t, &walls, i, share * stop_force(eq, t->lam, i));
+    for (int k = 0; k < eq->slipping_rows; k++) {
+        int i;
+        Rows rows = tangential_rows(eq->system, eq->slipping[k], &i);
+        add_pull(t, &rows, i, slip_force(eq, t->e, t->evaluation, eq->slipping[k]));
     }
 }
 
@@ -374,24 +373,15 @@ static bool mobility_change(const Tangent *t, int i, double *result, Problem *pr
 
 static double dissipation_change(const Tangent *t) {
     const Equations *eq = t->eq;
-    const System *system = eq->system;
-    Rows walls = slide_rows(system);
     double sum = 2.0 * eq->mass_damping * kinetic_change(t) + element_loss_change(t);
-    for (int k = eq->slipping_stops; k < eq->slipping_count; k++) {
+    for (int k = 0; k < eq->slipping_count; k++) {
         int contact = eq->slipping[k], i;
-        Rows rows = tangential_rows(system, contact, &i);
-        double change = -sliding_sign(t, contact) * limit_change(t, contact);
-        sum -= change * row_rate(&rows, i, t->e, t->v) +
+        Rows rows = tangential_rows(eq->system, contact, &i);
+        sum -= slip_force_change(t, contact) * row_rate(&rows, i, t->e, t->v) +
                slip_force(eq, t->e, t->evaluation, contact) * rate_change(t, &rows, i);
     }
     for (int k = 0; k < eq->pressed_count; k++) {
         sum += contact_loss_change(t, eq->pressed[k]);
-    }
-    for (int k = 0; k < eq->slipping_stops; k++) {
-        int i = eq->slipping[k], h = eq->first_hold + held_at(eq, i);
-        sum += eq->stop_friction[i] * sliding_sign(t, i) *
-               (t->dlam[h] * row_rate(&walls, i, t->e, t->v) +
-                t->lam[h] * rate_change(t, &walls, i));
     }
     return sum;
 }

@@ -42,7 +42,10 @@ static double slip_indicator_change(const Tangent *t, int contact) {
     const Equations *eq = t->eq;
     int row = eq->first_stick + place_in(eq->sticking, contact);
     double friction = sign_times(t->lam[row], t->dlam[row]), limit;
-    if (is_stop(eq->system, contact) && is_held(&eq->contacts, contact)) {
+    if (is_guide(eq->system, contact)) {
+        int normal = normal_row(eq, contact);
+        limit = friction_coefficient(eq, contact) * sign_times(t->lam[normal], t->dlam[normal]);
+    } else if (is_stop(eq->system, contact) && is_held(&eq->contacts, contact)) {
         limit = eq->stop_friction[contact] * stop_force(eq, t->dlam, contact);
     } else {
         limit = limit_change(t, contact);
@@ -65,6 +68,8 @@ static double indicator_change(const Tangent *t, EventKind kind, int contact) {
     case EVENT_SWITCH: return switch_indicator_change(t, contact);
     case EVENT_SEPARATION: return separation_indicator_change(t, contact);
     case EVENT_SLIP: return slip_indicator_change(t, contact);
+    case EVENT_SIDE:
+        return side_force(t->eq, t->dlam, contact) / guard_scale(t->sim, EVENT_SIDE);
     default: return reversal_indicator_change(t, contact);
     }
 }

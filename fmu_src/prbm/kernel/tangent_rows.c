@@ -143,7 +143,8 @@ PRBM void add_pull(const Tangent *t, const Rows *rows, int i, double force) {
 
 static double lift_change(const Tangent *t, int i) {
     const System *system = t->eq->system;
-    Rows lifts = plain_rows(system, system->f, system->lifts, system->lifts_c);
+    int points = system->mechanism->friction_count;
+    Rows lifts = plain_rows(system, points, system->lifts, system->lifts_c);
     return value_change(t, &lifts, i);
 }
 
@@ -155,6 +156,16 @@ PRBM double limit_change(const Tangent *t, int contact) {
     int i = contact - t->eq->system->s;
     const double *law = t->eq->rub_law + 3 * i;
     return rub_limit(t->eq, i, t->e) > 0.0 ? law[0] * law[2] * lift_change(t, i) : 0.0;
+}
+
+PRBM double slip_force_change(const Tangent *t, int contact) {
+    const Equations *eq = t->eq;
+    double limit = is_guide(eq->system, contact) ? side_force(eq, t->dlam, contact)
+                   : held_stop(eq, contact)      ? stop_force(eq, t->dlam, contact)
+                                                 : limit_change(t, contact);
+    bool carried = is_guide(eq->system, contact) || held_stop(eq, contact);
+    double mu = carried ? friction_coefficient(eq, contact) : 1.0;
+    return -sliding_sign(t, contact) * mu * limit;
 }
 
 PRBM int sliding_sign(const Tangent *t, int contact) {

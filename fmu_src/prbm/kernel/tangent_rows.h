@@ -38,6 +38,8 @@ PRBM double second_change(const Tangent *t, const Rows *rows, int i);
 PRBM void add_pull(const Tangent *t, const Rows *rows, int i, double force);
 /* Change of the friction limit of a friction point or of a pressed stop. */
 PRBM double limit_change(const Tangent *t, int contact);
+/* Change of the force of a slipping contact along its direction. */
+PRBM double slip_force_change(const Tangent *t, int contact);
 /* Sign of the sliding velocity of a contact. */
 PRBM int sliding_sign(const Tangent *t, int contact);
 /* Change of E w: E (i dphi w + dw) */

@@ -40,9 +40,8 @@ static void stop_pull_changes(const Tangent *t, Complex *on) {
         bool sticks = eq->contacts.modes[i] == CONTACT_STICK;
         double force = held ? stop_force(eq, t->lam, i) : t->evaluation->pressure[i];
         double dforce = stop_force_change(t, i);
-        double dlimit = held ? eq->stop_friction[i] * dforce : limit_change(t, i);
         double along = sticks ? stick_force(eq, t->lam, i) : slip_force(eq, t->e, t->evaluation, i);
-        double dalong = sticks ? stick_force(eq, t->dlam, i) : -sliding_sign(t, i) * dlimit;
+        double dalong = sticks ? stick_force(eq, t->dlam, i) : slip_force_change(t, i);
         Complex change = complex_of(-dforce, dalong);
         if (carrier != FIXED) {
             change = plus(product(t->e[carrier], change),
@@ -54,17 +53,27 @@ static void stop_pull_changes(const Tangent *t, Complex *on) {
     }
 }
 
-/* Add the changes of the forces of guides. */
+/* Add the changes of the forces of guides and of their friction. */
 static void guide_pull_changes(const Tangent *t, Complex *on) {
-    const System *system = t->eq->system;
+    const Equations *eq = t->eq;
+    const System *system = eq->system;
     const Mechanism *m = system->mechanism;
+    int contact = system->s + m->friction_count;
     for (int i = 0; i < m->guide_count; i++) {
         const GuideRows *guide = &system->guided[i];
         int carrier = system->loops_on[guide->across];
+        Complex pull = complex_of(t->lam[guide->across], 0.0);
         Complex change = complex_of(t->dlam[guide->across], 0.0);
+        if (m->guides[i].rubs) {
+            bool sticks = eq->contacts.modes[contact] == CONTACT_STICK;
+            pull.im = -(sticks ? stick_force(eq, t->lam, contact)
+                               : slip_force(eq, t->e, t->evaluation, contact));
+            change.im = -(sticks ? stick_force(eq, t->dlam, contact)
+                                 : slip_force_change(t, contact));
+            contact++;
+        }
         if (carrier != FIXED) {
-            change = plus(product(t->e[carrier], change),
-                          scaled(t->lam[guide->across], t->dE[carrier]));
+            change = plus(product(t->e[carrier], change), product(t->dE[carrier], pull));
         }
         change = product(guide->normal, change);
         add_change(on, m->guides[i].between.start, change);
@@ -77,11 +86,10 @@ static void pull_changes(const Tangent *t, Complex *on) {
     const Equations *eq = t->eq;
     const System *system = eq->system;
     const Mechanism *m = system->mechanism;
-    for (int i = 0; i < system->f; i++) {
+    for (int i = 0; i < m->friction_count; i++) {
         int contact = system->s + i;
         bool sticks = eq->contacts.modes[contact] == CONTACT_STICK;
-        double size = sticks ? stick_force(eq, t->dlam, contact)
-                             : -sliding_sign(t, contact) * limit_change(t, contact);
+        double size = sticks ? stick_force(eq, t->dlam, contact) : slip_force_change(t, contact);
         Complex change = scaled(size, unit(m->frictions[i].direction));
         add_change(on, m->frictions[i].body, change);
         add_change(on, GROUND, scaled(-1.0, change));

@@ -175,7 +175,7 @@ class _Assembler(Collection):
         spread = A[:, arm]
         frames = {body.name: self.frame(body.name, body.name, None) for body in mechanism.bodies}
         self.lines += [(body, "body", self.corners(body), NO_THICKNESS) for body in frames]
-        release = mechanism.release
+        release, loops = mechanism.release, self.loop_arrays(d)
         released = self.frame(release.body, release.body, release.point)
         along_release, release_c = self.displaced(released, release.direction, e0)
         return System(
@@ -194,10 +194,10 @@ class _Assembler(Collection):
             A=A,
             c=np.array([place.c for place, _ in self.masses]),
             m=m,
-            **self.loop_arrays(d),
+            **loops,
             **self.span_arrays(d),
             **self.stop_arrays(d, e0),
-            **self.friction_arrays(d, e0),
+            **self.rubbing_arrays(d, e0, loops),
             release=along_release,
             release_c=release_c,
             released=released,
@@ -257,15 +257,23 @@ class _Assembler(Collection):
             "on": np.array([hit.on for hit in hits], int),
         }
 
-    def friction_arrays(self, d: int, e0: Complex) -> dict[str, Any]:
-        """Return the displacements of friction points along and across their directions."""
-        rubbing = [
+    def rubbing_arrays(self, d: int, e0: Complex, loops: dict[str, Any]) -> dict[str, Any]:
+        """Return the displacements of friction points, and those along the guides with friction.
+
+        A guide does not permit the displacement across its line, which has a row of the loops.
+        """
+        points = [
             (f.direction, self.frame(f.body, f.body, f.point)) for f in self.mechanism.frictions
         ]
-        along = [self.displaced(frame, direction, e0) for direction, frame in rubbing]
-        across = [self.displaced(frame, direction + 90.0, e0) for direction, frame in rubbing]
+        along = [self.displaced(frame, direction, e0) for direction, frame in points]
+        across = [self.displaced(frame, direction + 90.0, e0) for direction, frame in points]
+        guides = zip(self.mechanism.guides, loops["guided"], strict=True)
+        normals = [rows.across for guide, rows in guides if guide.friction is not None]
         return {
-            "rubs": stacked([B for B, _ in along], d),
+            "rubs": stacked([*(B for B, _ in along), *(1j * loops["loops"][normals])], d),
+            "rubs_z": np.append(np.zeros(len(points), complex), 1j * loops["loops_z"][normals]),
+            "rubs_on": np.append(np.full(len(points), FIXED), loops["loops_on"][normals]),
+            "normals": np.append(np.full(len(points), FIXED), np.array(normals, int)),
             "lifts": stacked([B for B, _ in across], d),
             "lifts_c": np.array([c for _, c in across]),
         }

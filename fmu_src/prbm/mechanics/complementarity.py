@@ -19,6 +19,7 @@ Sources
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,14 +116,54 @@ def _values(table: Real, basis: list[int]) -> Real:
     return z[m : 2 * m]
 
 
+class TwoSided(NamedTuple):
+    """Normal forces that act in both directions, and depend on the forces of other contacts.
+
+    The normal force of the g-th of them is b + (L P)_g [N] at forces P, and limits a tangent by its
+    magnitude.
+
+    Parameters
+    ----------
+    L : (g, k + m)
+        Changes of the normal forces by unit forces [-].
+    b : (g,)
+        Normal forces without the forces of contacts [N].
+    """
+
+    L: Real
+    b: Real
+
+    def of(self, P: Real) -> Real:
+        """Return the normal forces, (g,) [N]."""
+        result: Real = self.b + self.L @ P
+        return result
+
+
+def limits(
+    P: Real, friction: Real, fixed: Real, normal: Integers, carried: TwoSided | None = None
+) -> Real:
+    """Return the limits of the tangential forces at forces P, see :func:`coulomb`, (m,) [N]."""
+    every = [P[: len(P) - len(fixed)], [0.0] if carried is None else np.abs(carried.of(P)), [0.0]]
+    result: Real = fixed + friction * np.concatenate(every)[normal]
+    return result
+
+
 def coulomb(
-    W: Real, u: Real, friction: Real, fixed: Real, normal: Integers, tolerance: float
+    W: Real,
+    u: Real,
+    friction: Real,
+    fixed: Real,
+    normal: Integers,
+    tolerance: float,
+    carried: TwoSided | None = None,
 ) -> Real | None:
     r"""Return normal and tangential forces (or impulses) of contacts; None without a solution.
 
     The rates are W P + u.  For normal forces P >= 0, rate >= 0, and one of both is zero.  For
     tangential forces abs(P) <= limit, and P = -limit sign(rate) where the rate is not zero.  The
-    limit is fixed + friction P_n, with the normal force P_n of the contact.
+    limit is fixed + friction P_n, with the normal force P_n of the contact.  P_n may be the
+    magnitude of a force of constraints that act in both directions, abs(b + L P): a further unknown
+    z is its negative part, z >= 0, b + L P + z >= 0, and one of both is zero.
 
     The solution need not be unique: friction can jam contacts that would also slide or separate.
     Contacts that do not close without forces are therefore left out at first.  They take part only
@@ -142,9 +183,12 @@ def coulomb(
     friction, fixed : (m,)
         Coefficients mu [-], and the constant parts of the limits [N].
     normal : (m,) int
-        Index of the normal force on which the limit of each tangent depends; -1 if on none.
+        Index of the normal force on which the limit of each tangent depends; -1 if on none.  The
+        forces of ``carried`` have the indices from k on.
     tolerance : float
         Largest violation of the laws that is accepted as round-off, as a rate.
+    carried : TwoSided or None
+        Normal forces that act in both directions.
 
     Examples
     --------
@@ -159,24 +203,20 @@ def coulomb(
     >>> W = np.array([[1.0, 1.4], [1.4, 2.0]])
     >>> coulomb(W, np.array([1.1, 1.6]), none + 2.0, none, np.array([0]), 1e-9).tolist()
     [0.0, 0.0]
+
+    A slider whose guide carries a load of 10 N, reduced by 0.2 of its friction, pushed by 3 N.
+
+    >>> carried = TwoSided(np.array([[0.2]]), np.array([-10.0]))
+    >>> u, zero = np.array([3.0]), np.array([0])
+    >>> coulomb(np.eye(1), u, none + 0.25, none, zero, 1e-9, carried).round(9)
+    array([-2.63157895])
     """
     m = len(fixed)
     k = len(u) - m
     diagonal = np.abs(np.diag(W))
     scale = np.where(diagonal > 0.0, 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0)), 1.0)
-    S = scale[:, None] * W * scale
-    # The unknowns z are (P_n, P_t+, P_t-, sliding speeds), with P_t = P_t+ - P_t-.
-    spread = np.zeros((k + m, k + 2 * m))
-    spread[:k, :k] = np.eye(k)
-    spread[k:, k:] = np.hstack([np.eye(m), -np.eye(m)])
+    M, spread, constants = _coulomb_problem(scale, W, friction, fixed, normal, carried)
     size = k + 2 * m
-    M = np.zeros((size + m, size + m))
-    M[:size, :size] = spread.T @ S @ spread
-    M[k:size, size:] = np.vstack([np.eye(m), np.eye(m)])
-    M[size:, k:size] = -np.hstack([np.eye(m), np.eye(m)])
-    for j in range(m):
-        if normal[j] >= 0:
-            M[size + j, normal[j]] = friction[j] * scale[normal[j]] / scale[k + j]
     given, u = u, np.where(np.abs(u) <= tolerance / 2, 0.0, u)
     attempts = [(M, u), (M, u + tolerance / 2 * (np.arange(k + m) < k))]
     unloaded = np.flatnonzero(u[:k] >= -tolerance)
@@ -187,7 +227,7 @@ def coulomb(
         rates[unloaded] = np.maximum(rates[unloaded], 0.0)
         attempts.insert(0, (reduced, rates))
     for matrix, rates in attempts:
-        q = np.concatenate([spread.T @ (scale * rates), fixed / scale[k:]])
+        q = np.concatenate([spread.T @ (scale * rates), constants])
         for heavy in range(-1, k):
             cover = np.ones(len(q))
             cover[:k][np.arange(k) == heavy] = COVER_FACTOR
@@ -195,10 +235,44 @@ def coulomb(
             if z is None:
                 continue
             P = scale * (spread @ z[:size])
-            limit = fixed + friction * np.append(P[:k], 0.0)[normal]
+            limit = limits(P, friction, fixed, normal, carried)
             if violation(W, given, P, limit) <= tolerance:
                 return P
     return None
+
+
+def _coulomb_problem(
+    scale: Real, W: Real, friction: Real, fixed: Real, normal: Integers, carried: TwoSided | None
+) -> tuple[Real, Real, Real]:
+    """Return the matrix of :func:`coulomb`, the map of its forces, and its constants.
+
+    The unknowns z are (P_n, P_t+, P_t-, sliding speeds, negative parts of two-sided normal forces),
+    with P_t = P_t+ - P_t-, all of them scaled.
+    """
+    m = len(fixed)
+    k, sides = len(W) - m, 0 if carried is None else len(carried.b)
+    S = scale[:, None] * W * scale
+    spread = np.zeros((k + m, k + 2 * m))
+    spread[:k, :k] = np.eye(k)
+    spread[k:, k:] = np.hstack([np.eye(m), -np.eye(m)])
+    size = k + 2 * m
+    M = np.zeros((size + m + sides, size + m + sides))
+    M[:size, :size] = spread.T @ S @ spread
+    M[k:size, size : size + m] = np.vstack([np.eye(m), np.eye(m)])
+    M[size : size + m, k:size] = -np.hstack([np.eye(m), np.eye(m)])
+    constants = np.concatenate([fixed / scale[k:], np.zeros(sides)])
+    for j in range(m):
+        g, row = normal[j] - k, size + j
+        if 0 <= normal[j] < k:
+            M[row, normal[j]] = friction[j] * scale[normal[j]] / scale[k + j]
+        elif carried is not None and g >= 0:
+            side = size + m + g
+            M[side, :size] = (carried.L[g] * scale / scale[k + j]) @ spread
+            M[side, side], constants[m + g] = 1.0, carried.b[g] / scale[k + j]
+            M[row] += friction[j] * M[side]
+            M[row, side] += friction[j]
+            constants[j] += friction[j] * constants[m + g]
+    return M, spread, constants
 
 
 def impulses(W: Real, u: Real, friction: Real, least: Real, tolerance: float) -> Real | None:

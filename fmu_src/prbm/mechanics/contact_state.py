@@ -1,7 +1,8 @@
 """The modes of the contacts: the discrete state of a mechanism.
 
-Contacts are numbered in one list, the stops first, then the friction points.  A closed stop is a
-constraint (it is held) or, if it is compliant and not frozen, a force (it is pressed).
+Contacts are numbered in one list, the stops first, then the friction points, then the guides with
+friction.  A closed stop is a constraint (it is held) or, if it is compliant and not frozen, a force
+(it is pressed).  A guide pushes to either side of its line; the side is part of the state.
 """
 
 from dataclasses import dataclass, replace
@@ -10,7 +11,7 @@ from functools import cached_property
 
 
 class ContactMode(IntEnum):
-    """The mode of a contact.  A friction point is never open."""
+    """The mode of a contact.  Friction points and guides are never open."""
 
     OPEN = 0
     FRICTIONLESS = 1
@@ -83,11 +84,14 @@ class ContactState:
     Parameters
     ----------
     modes : (s + f,) tuple of ContactMode
-        Modes of the s stops, then of the f friction points.
+        Modes of the s stops, then of the f friction points and guides with friction.
     stops : int
         Number of stops s.
     touching : (s,) tuple of ContactPhase or None
         The contacts at compliant stops that are closed; None for all other stops.
+    sides : (f,) tuple of int
+        The side to which a guide pushes while it slips: 1 to the left of its line, -1 to the right.
+        It is 1 at friction points.
 
     Examples
     --------
@@ -99,20 +103,18 @@ class ContactState:
     modes: tuple[ContactMode, ...]
     stops: int
     touching: tuple[ContactPhase | None, ...] = ()
+    sides: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         if len(self.touching) != self.stops:
             object.__setattr__(self, "touching", (None,) * self.stops)
+        if len(self.sides) != len(self.modes) - self.stops:
+            object.__setattr__(self, "sides", (1,) * (len(self.modes) - self.stops))
 
     @classmethod
     def free(cls, stops: int, points: int) -> "ContactState":
         """Return the state with all stops open and no friction at the friction points."""
         return cls((ContactMode.OPEN,) * stops + (ContactMode.FRICTIONLESS,) * points, stops)
-
-    @property
-    def points(self) -> int:
-        """Number of friction points f."""
-        return len(self.modes) - self.stops
 
     @cached_property
     def held(self) -> tuple[int, ...]:
@@ -144,6 +146,16 @@ class ContactState:
         """Return the indentation at which a held stop is a constraint [m]."""
         touching = self.touching[stop]
         return touching.depth if touching else 0.0
+
+    def side(self, contact: int) -> int:
+        """Return the side to which a slipping contact is pushed; 1 at stops."""
+        return 1 if self.is_stop(contact) else self.sides[contact - self.stops]
+
+    def with_side(self, contact: int, side: int) -> "ContactState":
+        """Return the state in which a guide pushes to a side."""
+        sides = list(self.sides)
+        sides[contact - self.stops] = side
+        return replace(self, sides=tuple(sides))
 
     def with_mode(self, contact: int, mode: ContactMode) -> "ContactState":
         """Return the state in which one contact has another mode."""

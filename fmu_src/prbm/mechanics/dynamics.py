@@ -9,7 +9,7 @@ directions e with the rates w of the arms (:mod:`prbm.mechanics.system`), and pu
 coordinates by Phi (:mod:`prbm.mechanics.direction_map`).  Forces of friction, of inputs and of
 pressed stops with the compliant law (:mod:`prbm.mechanics.compliant_stops`) are added to the loads.
 The force of a held stop that slips acts along its gap and, by Coulomb's law, along its wall; its
-column in R^T therefore differs from its row in R.
+column in R^T therefore differs from its row in R.  So does that of a guide that slips.
 """
 
 from typing import NamedTuple
@@ -24,7 +24,7 @@ from .contact_state import ContactMode, ContactState
 from .elements import Elements
 from .inputs import Inputs
 from .kinetics import kinetic_energy, mass_accelerations, turned_moments
-from .system import Rows, System
+from .system import FIXED, Rows, System
 
 
 class Evaluation(NamedTuple):
@@ -90,6 +90,9 @@ class Equations:
         self.beta = values["damping.beta"]
         self.mass_damping = 2.0 * values["damping.zeta"] * omega
         self.stop_friction = [value(s, "friction", values) for s in mechanism.stops]
+        self.guide_friction = [
+            value(g, "friction", values) for g in mechanism.guides if g.friction is not None
+        ]
         self.friction_laws = [
             FrictionLaw(*(value(f, name, values) for name in FrictionLaw._fields))
             for f in mechanism.frictions
@@ -105,14 +108,16 @@ class Equations:
         modes, stops = self.contacts.modes, self.contacts.stops
         self.held, self.pressed = list(self.contacts.held), list(self.contacts.pressed)
         self.sticking = [c for c, mode in enumerate(modes) if mode is ContactMode.STICK]
-        self.slipping_stops = [i for i in self.held if modes[i].slip]
-        # Contacts whose limit of friction does not depend on the multipliers.
-        self.slipping_points = [
-            c for c in [*self.pressed, *range(stops, len(modes))]
-            if modes[c].slip and self.friction_coefficient(c) > 0.0
-        ]  # fmt: skip
         self.first_hold = len(self.system.loops)
         self.first_stick = self.first_hold + len(self.held)
+        guides = [stops + k for k in np.flatnonzero(self.system.normals != FIXED).tolist()]
+        # The normal forces of these contacts are multipliers.
+        self.slipping_rows = [c for c in [*self.held, *guides] if modes[c].slip]
+        self.slipping_guides = [c for c in guides if modes[c].slip]
+        self.slipping_points = [
+            c for c in [*self.pressed, *range(stops, len(modes))]
+            if modes[c].slip and c not in guides and self.friction_coefficient(c) > 0.0
+        ]  # fmt: skip
 
     def _collect_loads(self) -> None:
         """Add up the rows of gravity, of the base and of the forces."""
@@ -202,9 +207,10 @@ class Equations:
         for c in self.slipping_points:
             limit = self.friction_limit(c, e, pressure)
             Q -= self.contacts.modes[c].slip * limit * self.slip_row(c, e)
-        for i in self.slipping_stops:
-            share = self.stop_friction[i] * self.contacts.modes[i].slip
-            kkt[: self.n, self.n + self.hold_row(i)] -= share * self.slip_row(i, e)
+        for c in self.slipping_rows:
+            share = self.friction_coefficient(c) * self.contacts.modes[c].slip
+            share *= self.contacts.side(c)
+            kkt[: self.n, self.n + self.normal_row(c)] -= share * self.slip_row(c, e)
         factors = constraints.factor_saddle(kkt, self.n, system.length, self.scale)
         x = constraints.solve_saddle(factors, np.concatenate([Q, bent]))
         return Evaluation(x[: self.n], -x[self.n :], M, factors, e, pressure)
@@ -223,7 +229,7 @@ class Equations:
         loss, power = self.elements.loss(evaluation.e, v, self.beta), 0.0
         if self.mass_damping:
             loss += 2.0 * self.mass_damping * kinetic_energy(evaluation.M, v)
-        if self.slipping_points or self.slipping_stops:
+        if self.slipping_points or self.slipping_rows:
             loss += friction_power(self, q, v, evaluation)
         if self.driven or self.moving_walls:
             power = input_power(self, t, q, v, evaluation.lam)
@@ -292,7 +298,7 @@ class Equations:
         factors : Factors
             Factors of the evaluation at the state.
         """
-        if self.slipping_stops:
+        if self.slipping_rows:
             return self.project(t, y)
         system, n, r = self.system, self.n, self.first_stick
         c = self.offsets(t)
@@ -352,9 +358,16 @@ class Equations:
             result[self.pressed] = pressure.force
         return result
 
-    def hold_row(self, stop: int) -> int:
-        """Return the row of the gap of a held stop."""
-        return self.first_hold + self.held.index(stop)
+    def normal_row(self, contact: int) -> int:
+        """Return the row whose multiplier is the normal force of a held stop or of a guide."""
+        if self.contacts.is_stop(contact):
+            return self.first_hold + self.held.index(contact)
+        return int(self.system.normals[contact - self.contacts.stops])
+
+    def is_guide(self, contact: int) -> bool:
+        """Return whether a contact is a guide with friction."""
+        stops = self.contacts.stops
+        return contact >= stops and bool(self.system.normals[contact - stops] != FIXED)
 
     # -- friction --
 
@@ -383,19 +396,27 @@ class Equations:
 
     def friction_coefficient(self, contact: int) -> float:
         """Return the coefficient of friction of a contact [-]."""
-        stops = self.contacts.stops
+        stops, points = self.contacts.stops, len(self.friction_laws)
         if contact < stops:
             return self.stop_friction[contact]
-        return self.friction_laws[contact - stops].coefficient
+        if contact < stops + points:
+            return self.friction_laws[contact - stops].coefficient
+        return self.guide_friction[contact - stops - points]
 
     def friction(
         self, contact: int, e: Complex, lam: Real, pressure: Pressure | None = None
     ) -> tuple[float, float]:
         """Return the friction force of a sticking contact, and its limit mu N [N]."""
         force = float(lam[self.first_stick + self.sticking.index(contact)])
-        if contact in self.held:
-            return force, self.stop_friction[contact] * float(lam[self.hold_row(contact)])
+        if contact in self.held or self.is_guide(contact):
+            normal = float(lam[self.normal_row(contact)])
+            normal = normal if self.contacts.is_stop(contact) else abs(normal)
+            return force, self.friction_coefficient(contact) * normal
         return force, self.friction_limit(contact, e, pressure)
+
+    def side_force(self, contact: int, lam: Real) -> float:
+        """Return the normal force of a held stop, or that of a guide to its side [N]."""
+        return self.contacts.side(contact) * float(lam[self.normal_row(contact)])
 
     def friction_limit(self, contact: int, e: Complex, pressure: Pressure | None = None) -> float:
         """Return mu N of a friction point, or of a pressed stop [N]."""
@@ -413,16 +434,16 @@ def sliding_friction(
     equations: Equations, contact: int, e: Complex, evaluation: Evaluation
 ) -> float:
     """Return the friction force of a slipping contact against its motion [N]."""
-    if contact in equations.held:
-        force = float(evaluation.lam[equations.hold_row(contact)])
-        return equations.stop_friction[contact] * force
+    if contact in equations.slipping_rows:
+        force = equations.side_force(contact, evaluation.lam)
+        return equations.friction_coefficient(contact) * force
     return equations.friction_limit(contact, e, evaluation.pressure)
 
 
 def friction_power(equations: Equations, q: Real, v: Real, evaluation: Evaluation) -> float:
     """Return the power that friction dissipates [W]."""
     e, modes, power = equations.system.directions(q), equations.contacts.modes, 0.0
-    for c in (*equations.slipping_points, *equations.slipping_stops):
+    for c in (*equations.slipping_points, *equations.slipping_rows):
         force = sliding_friction(equations, c, e, evaluation)
         power += modes[c].slip * force * equations.slip_rate(c, e, v)
     return power

@@ -20,8 +20,8 @@ import numpy as np
 
 from ..base.errors import ParameterError
 from ..base.names import unknown
-from ..base.tolerances import ROW_RTOL
-from ..mechanism.parts import value
+from ..base.tolerances import ROW_RTOL, ZERO_RATE_RTOL
+from ..mechanism.parts import Friction, Guide, value
 from .arrays import Complex, Real
 from .elements import Elements
 from .forces import field_row, load_rows, normal_force
@@ -140,8 +140,9 @@ class _SmallMotions:
     ) -> None:
         self.system, self.shape, self.loads, self.stops = system, shape, loads, list(stops)
         self.e = system.directions(shape.q)
-        self.rows, self.contacts = self._rows()
         elements = Elements(system)
+        self.largest = float(np.abs(elements.drawn).max())
+        self.rows, self.contacts = self._rows()
         self.K_t = tangent_stiffness(
             elements.tangent(self.e), shape.load, shape.rows, shape.lam, self.e
         )
@@ -166,9 +167,10 @@ class _SmallMotions:
             if value(mechanism.stops[i], "friction", values) > 0.0
         ]  # fmt: skip
         sticking += [
-            (friction.name, rubs[[i]])
-            for i, friction in enumerate(mechanism.frictions)
-            if value(friction, "coefficient", values) > 0.0 and self._pressing(i) > 0.0
+            (part.name, rubs[[i]])
+            for i, part in enumerate(mechanism.rubbing)
+            if value(part, "friction" if isinstance(part, Guide) else "coefficient", values) > 0.0
+            and self._pressing(i, part) > 0.0
         ]
         for name, row in sticking:
             left = row - (rows.T @ np.linalg.lstsq(rows.T, row.T, rcond=None)[0]).T
@@ -177,9 +179,13 @@ class _SmallMotions:
                 contacts[name] = "sticking"
         return rows, tuple(contacts.items())
 
-    def _pressing(self, i: int) -> float:
-        """Return the normal force of a friction point [N]."""
-        system, friction = self.system, self.system.mechanism.frictions[i]
+    def _pressing(self, i: int, friction: Friction | Guide) -> float:
+        """Return the normal force of a friction point or guide; zero if it is round-off [N]."""
+        system = self.system
+        if isinstance(friction, Guide):
+            least = ZERO_RATE_RTOL * self.largest / system.length
+            force = abs(float(self.shape.lam[system.normals[i]]))
+            return force if force > least else 0.0
         preload, stiffness = (
             value(friction, name, system.values) for name in ("normal_force", "normal_stiffness")
         )

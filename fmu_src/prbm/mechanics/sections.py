@@ -24,7 +24,7 @@ is the torque of its spring.
 
 from collections.abc import Iterable, Mapping
 
-from ..mechanism.parts import GROUND
+from ..mechanism.parts import GROUND, Guide
 from .arrays import Complex, Real
 from .contact_state import ContactMode
 from .dynamics import Equations, Evaluation, sliding_friction
@@ -180,7 +180,7 @@ def _inputs(equations: Equations) -> Pulls:
 
 
 def contact_forces(equations: Equations, e: Complex, found: Evaluation) -> Pulls:
-    """Yield the forces of closed stops and of friction points on bodies and on the ground."""
+    """Yield the forces of closed stops, and of friction, on bodies and on the ground."""
     system, modes = equations.system, equations.contacts.modes
     lam, pressure = found.lam, found.pressure
     for i, force in enumerate(equations.stop_forces(lam, pressure).tolist()):
@@ -196,11 +196,19 @@ def contact_forces(equations: Equations, e: Complex, found: Evaluation) -> Pulls
         pull = u * complex(-force, along)
         yield stop.body, pull
         yield stop.on, -pull
-    for k, friction in enumerate(system.mechanism.frictions):
-        contact = equations.contacts.stops + k
+    lines = {
+        guide.name: -1j * rows.normal
+        for guide, rows in zip(system.mechanism.guides, system.guided, strict=True)
+    }
+    for k, part in enumerate(system.mechanism.rubbing):
+        contact, carrier = equations.contacts.stops + k, int(system.rubs_on[k])
         if modes[contact] is ContactMode.STICK:
             size = equations.friction(contact, e, lam)[0]
+        elif modes[contact].slip:
+            size = -modes[contact].slip * sliding_friction(equations, contact, e, found)
         else:
-            size = -modes[contact].slip * equations.friction_limit(contact, e)
-        yield friction.body, size * unit(friction.direction)
-        yield GROUND, -size * unit(friction.direction)
+            continue
+        direction = lines[part.name] if isinstance(part, Guide) else unit(part.direction)
+        pull = size * direction * (1.0 if carrier == FIXED else complex(e[carrier]))
+        yield part.body, pull
+        yield (part.on if isinstance(part, Guide) else GROUND), -pull

@@ -273,8 +273,13 @@ class System:
         Displacement of the hit points along their walls, to the left of the direction [m].
     on : (s,) int
         The direction of the body that a wall is fixed to; :data:`FIXED`: the ground.
-    rubs, lifts, lifts_c : (f, d) complex, (f, d) complex, (f,)
-        Displacement along and to the left of the direction of each friction point [m].
+    rubs, rubs_z, rubs_on : (f, d) complex, (f,) complex, (f,) int
+        Displacement along the direction of each of the p friction points, then along the line of
+        each guide with friction, Re(f (rubs E + rubs_z)) with f as that of ``loops`` [m].
+    normals : (f,) int
+        The row of the guide that carries the normal force; :data:`FIXED` at friction points.
+    lifts, lifts_c : (p, d) complex, (p,)
+        Displacement to the left of the direction of each friction point [m].
     release, release_c : (d,) complex, float
         Displacement of the released point along the direction of the release [m].
     released : BodyFrame
@@ -335,6 +340,9 @@ class System:
     slides_z: Complex
     on: Whole
     rubs: Complex
+    rubs_z: Complex
+    rubs_on: Whole
+    normals: Whole
     lifts: Complex
     lifts_c: Real
     release: Complex
@@ -390,8 +398,8 @@ class System:
 
     @cached_property
     def rub_rows(self) -> Rows:
-        """The displacements of all friction points, up to a constant [m]."""
-        return Rows(self, self.rubs, np.zeros(len(self.rubs)))
+        """The displacements of friction points and along guides, up to a constant [m]."""
+        return Rows(self, self.rubs, np.zeros(len(self.rubs)), self.rubs_z, self.rubs_on)
 
     @cached_property
     def loop_rows(self) -> Rows:

@@ -222,7 +222,7 @@ class Mechanism:
             "Time constant of damping in proportion to the rate of every spring", 0.0, 1e-2,
             1e-5, tunable=True,
         )  # fmt: skip
-        tuned: tuple[Part, ...] = (*self.frictions, *self.stops)
+        tuned: tuple[Part, ...] = (*self.frictions, *self.guides, *self.stops)
         for part in tuned:
             yield from _fields(part)
 
@@ -270,8 +270,13 @@ class Mechanism:
     def _parts(self) -> tuple[Part, ...]:
         """Return the parts whose fields are parameters or expressions."""
         parts: tuple[Part, ...] = (*self.flexure_types, *self.bodies, *self.joints)
-        parts = (*parts, *self.springs)
+        parts = (*parts, *self.springs, *self.guides)
         return (*parts, *self.frictions, *self.stops, self.release)
+
+    @cached_property
+    def rubbing(self) -> tuple[Friction | Guide, ...]:
+        """The friction points, then the guides with friction: the contacts beside the stops."""
+        return (*self.frictions, *(guide for guide in self.guides if guide.friction is not None))
 
     @cached_property
     def floating_bodies(self) -> tuple[str, ...]:

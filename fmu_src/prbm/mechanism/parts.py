@@ -253,6 +253,9 @@ class Guide:
         The line is unlimited, and passes through the guided point as drawn.
     turning : bool
         Whether the guided body may turn; otherwise it keeps its angle relative to the carrier.
+    friction : Quantity or None
+        Coefficient of friction along the line [-]; its normal force is the force of the guide.
+        None: the guide has no friction, and no such parameter.
     """
 
     name: str
@@ -260,6 +263,7 @@ class Guide:
     start: str
     end: str
     turning: bool = True
+    friction: Quantity | None = None
 
     @property
     def body(self) -> str:
@@ -518,6 +522,9 @@ FIELDS: dict[type, dict[str, tuple[str, str, float, float, float | None, bool]]]
             "N/m3", "Coefficient of the cube of the elongation in the force", -1e18, 1e18, 1e6
         ),
         "damping": _meta("N.s/m", "Coefficient of viscous damping", 0.0, 1e12, 1.0),
+    },
+    Guide: {
+        "friction": _meta("", "Coefficient of friction along the guide", 0.0, 100.0, tunable=True),
     },
     Stop: {
         "position": _meta(

@@ -77,7 +77,7 @@ def march(
     mechanism.check_rigid("the integration with fixed steps")
     simulation = Simulation(mechanism, values)
     system, n, y = simulation.system, simulation.system.n, simulation.front.y
-    contacts = ContactState.free(len(mechanism.stops), len(mechanism.frictions))
+    contacts = ContactState.free(len(mechanism.stops), len(mechanism.rubbing))
     equations = Equations(system, simulation.inputs, contacts, simulation.configuration.omega)
     armed = [True] * len(mechanism.stops)
     times, states, impacts = [0.0], [y], []

@@ -178,11 +178,13 @@ static void add_frictions(System *system, const Complex *e0, Scratch *scratch) {
     size_t mark = scratch->used;
     int d = system->d;
     Place spot = new_place(system, scratch);
-    for (int i = 0; i < system->f; i++) {
+    for (int i = 0; i < system->mechanism->friction_count; i++) {
         const Friction *friction = &system->mechanism->frictions[i];
         Complex u = unit(friction->direction), across = product(complex_of(0.0, 1.0), u);
         on_body(system, friction->body, at_point(system, friction->point), &spot);
         along(d, u, spot.A, e0, system->rubs + i * d);
+        system->rubs_z[i] = complex_of(0.0, 0.0);
+        system->rubs_on[i] = system->normals[i] = FIXED;
         system->lifts_c[i] = along(d, across, spot.A, e0, system->lifts + i * d);
     }
     scratch->used = mark;

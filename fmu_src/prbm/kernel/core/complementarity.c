@@ -155,17 +155,42 @@ PRBM bool lemke(int m, const double *M, const double *q, const double *cover, do
 
 /* --- Coulomb's law ---------------------------------------------------------------------------- */
 
+PRBM double limit_of(int k, int size, const CoulombLaws *laws, int j, const double *P) {
+    int normal = laws->normal[j], g = normal - k;
+    double force = normal < 0 ? 0.0
+                   : g < 0    ? P[normal]
+                              : fabs(laws->b[g] + dot(size, laws->L + g * size, P));
+    return laws->fixed[j] + (normal < 0 ? 0.0 : laws->friction[j] * force);
+}
+
 /* Return the index in P = (P_n, P_t) of the a-th force of (P_n, P_t+, P_t-), and set its sign. */
 static int force_at(int k, int m, int a, double *sign) {
     *sign = a < k + m ? 1.0 : -1.0;
     return a < k + m ? a : a - m;
 }
 
-/* Set the scaled problem for z = (P_n, P_t+, P_t-, sliding speeds), with P_t = P_t+ - P_t-. */
-static void set_problem(int k, int m, const double *W, const double *u, const double *friction,
-                        const double *fixed, const int *normal, const double *scale, double *M,
-                        double *q) {
-    int forces = k + 2 * m, size = forces + m;
+/* Set the row and the column of the negative part of a normal force that acts in both directions, on
+ * which the limit of tangent j depends. */
+static void set_side(int k, int m, const CoulombLaws *laws, int j, const double *scale, int size,
+                     double *M, double *q) {
+    int forces = k + 2 * m, g = laws->normal[j] - k, row = forces + j, side = forces + m + g;
+    double sign, mu = laws->friction[j], unit = 1.0 / scale[k + j];
+    for (int a = 0; a < forces; a++) {
+        int i = force_at(k, m, a, &sign);
+        M[side * size + a] = sign * (laws->L[g * (k + m) + i] * scale[i] * unit);
+        M[row * size + a] += mu * M[side * size + a];
+    }
+    M[side * size + side] = 1.0;
+    M[row * size + side] = 2.0 * mu;
+    q[side] = laws->b[g] * unit;
+    q[row] += mu * q[side];
+}
+
+/* Set the scaled problem for z = (P_n, P_t+, P_t-, sliding speeds, negative parts of normal forces that
+ * act in both directions), with P_t = P_t+ - P_t-. */
+static void set_problem(int k, int m, const double *W, const double *u, const CoulombLaws *laws,
+                        const double *scale, double *M, double *q) {
+    int forces = k + 2 * m, size = forces + m + laws->sides;
     double sign_a, sign_b;
     zeros(size * size, M);
     for (int a = 0; a < forces; a++) {
@@ -180,9 +205,12 @@ static void set_problem(int k, int m, const double *W, const double *u, const do
         int row = forces + j, positive = k + j, negative = k + m + j;
         M[positive * size + row] = M[negative * size + row] = 1.0;
         M[row * size + positive] = M[row * size + negative] = -1.0;
-        q[row] = fixed[j] / scale[k + j];
-        if (normal[j] >= 0) {
-            M[row * size + normal[j]] = friction[j] * scale[normal[j]] / scale[k + j];
+        q[row] = laws->fixed[j] / scale[k + j];
+        if (laws->normal[j] >= k) {
+            set_side(k, m, laws, j, scale, size, M, q);
+        } else if (laws->normal[j] >= 0) {
+            int normal = laws->normal[j];
+            M[row * size + normal] = laws->friction[j] * scale[normal] / scale[k + j];
         }
     }
 }
@@ -225,10 +253,9 @@ static void leave_out(int k, int size, const double *u, double tolerance, double
 }
 
 /* Follow the path of one covering vector to forces P; false if it ends in a ray. */
-static bool follow_path(int k, int m, const double *M, const double *q, int heavy,
+static bool follow_path(int k, int m, int size, const double *M, const double *q, int heavy,
                         const double *scale, double *P, Scratch *scratch) {
     size_t used = scratch->used;
-    int size = k + 3 * m;
     double *z = take(scratch, (size_t)size), *cover = take(scratch, (size_t)size);
     for (int i = 0; i < size; i++) {
         cover[i] = i == heavy ? COVER_FACTOR : 1.0;
@@ -241,11 +268,10 @@ static bool follow_path(int k, int m, const double *M, const double *q, int heav
     return solved;
 }
 
-PRBM bool coulomb(int k, int m, const double *W, const double *u, const double *friction,
-                  const double *fixed, const int *normal, double tolerance, double *P,
-                  Scratch *scratch) {
+PRBM bool coulomb(int k, int m, const double *W, const double *u, const CoulombLaws *laws,
+                  double tolerance, double *P, Scratch *scratch) {
     size_t used = scratch->used;
-    int size = k + 3 * m;
+    int size = k + 3 * m + laws->sides;
     double *scale = take(scratch, (size_t)(k + m)), *M = take_matrix(scratch, size, size);
     double *q = take(scratch, (size_t)size), *limit = take(scratch, (size_t)m);
     double *rates = take(scratch, (size_t)(k + m)); /* without round-off */
@@ -260,7 +286,7 @@ PRBM bool coulomb(int k, int m, const double *W, const double *u, const double *
         scale[i] = mobility > 0.0 ? 1.0 / square_root(mobility) : 1.0;
     }
     for (int attempt = first; !solved && attempt < 3; attempt++) {
-        set_problem(k, m, W, rates, friction, fixed, normal, scale, M, q);
+        set_problem(k, m, W, rates, laws, scale, M, q);
         if (attempt == 0) {
             leave_out(k, size, rates, tolerance, M, q);
         }
@@ -269,9 +295,9 @@ PRBM bool coulomb(int k, int m, const double *W, const double *u, const double *
             q[i] += scale[i] * (tolerance / 2);
         }
         for (int heavy = -1; !solved && heavy < k; heavy++) {
-            solved = follow_path(k, m, M, q, heavy, scale, P, scratch);
+            solved = follow_path(k, m, size, M, q, heavy, scale, P, scratch);
             for (int j = 0; solved && j < m; j++) {
-                limit[j] = fixed[j] + (normal[j] < 0 ? 0.0 : friction[j] * P[normal[j]]);
+                limit[j] = limit_of(k, k + m, laws, j, P);
             }
             solved = solved && violation(k, m, W, u, P, limit) <= tolerance;
         }
@@ -294,7 +320,8 @@ PRBM bool impulses(int k, int m, const double *W, const double *u, const double 
         fixed[j] = friction[j] * least[j];
         normal[j] = j;
     }
-    bool solved = coulomb(k, m, W, given, friction, fixed, normal, tolerance, P, scratch);
+    CoulombLaws laws = {friction, fixed, normal, 0, NULL, NULL};
+    bool solved = coulomb(k, m, W, given, &laws, tolerance, P, scratch);
     for (int i = 0; solved && i < k; i++) {
         P[i] += least[i];
     }

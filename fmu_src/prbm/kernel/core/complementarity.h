@@ -8,13 +8,24 @@
  * cover (m,) > 0.  Return false if the method ends in a ray. */
 PRBM bool lemke(int m, const double *M, const double *q, const double *cover, double *z,
                 Scratch *scratch);
+/* Coulomb's laws of m tangents beside k normals, with forces P (k + m,).  The limit of tangent j is
+ * fixed[j] + friction[j] N, with the normal force N = P[i] for i = normal[j] < k, and N = 0 for i = -1.
+ * For i >= k it is the magnitude of a force that acts in both directions, N = |b[g] + L[g] P| with
+ * g = i - k. */
+typedef struct {
+    const double *friction, *fixed; /* (m,) */
+    const int *normal;              /* (m,) */
+    int sides;
+    const double *L, *b; /* (sides, k + m), (sides,) */
+} CoulombLaws;
+
+/* The limit of tangent j at forces P (size,). */
+PRBM double limit_of(int k, int size, const CoulombLaws *laws, int j, const double *P);
 /* Compute forces P (k + m,) of k normals and m tangents that satisfy the laws of contact and of
- * friction, with the rates W P + u.  Return false if there is no solution.  The friction limit of
- * tangent j is fixed[j] + friction[j] P[normal[j]], or fixed[j] if normal[j] is -1.  Violations of
- * the laws up to the tolerance, a rate, are accepted as round-off. */
-PRBM bool coulomb(int k, int m, const double *W, const double *u, const double *friction,
-                  const double *fixed, const int *normal, double tolerance, double *P,
-                  Scratch *scratch);
+ * friction, with the rates W P + u.  Return false if there is no solution.  Violations of the laws up
+ * to the tolerance, a rate, are accepted as round-off. */
+PRBM bool coulomb(int k, int m, const double *W, const double *u, const CoulombLaws *laws,
+                  double tolerance, double *P, Scratch *scratch);
 /* Compute impulses P (k + m,) of an impact by the laws of coulomb.  Tangent j belongs to normal j;
  * m is k, or 0 without friction.  The normal impulses have the lower bounds least (k,). */
 PRBM bool impulses(int k, int m, const double *W, const double *u, const double *friction,

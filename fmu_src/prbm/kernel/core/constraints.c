@@ -47,7 +47,8 @@ PRBM Rows slide_rows(const System *system) {
 }
 
 PRBM Rows rub_rows(const System *system) {
-    return plain_rows(system, system->f, system->rubs, NULL);
+    Rows rows = {system, system->f, system->rubs, NULL, system->rubs_z, system->rubs_on};
+    return rows;
 }
 
 PRBM int seen_from(const Rows *rows, int i) {

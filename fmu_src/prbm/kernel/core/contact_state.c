@@ -24,6 +24,10 @@ PRBM bool is_stop(const System *system, int contact) {
     return contact < system->s;
 }
 
+PRBM bool is_guide(const System *system, int contact) {
+    return contact >= system->s && system->normals[contact - system->s] != FIXED;
+}
+
 /* Return the rows that contain the sliding velocity of a contact; i is its index among them. */
 PRBM Rows tangential_rows(const System *system, int contact, int *i) {
     *i = is_stop(system, contact) ? contact : contact - system->s;

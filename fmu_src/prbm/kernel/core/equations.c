@@ -14,6 +14,7 @@ PRBM void equations_place(Equations *equations, const System *system, Memory *me
     q.system = system;
     q.contacts.modes = place(memory, s + f, sizeof(ContactMode));
     q.contacts.touching = place(memory, s, sizeof(ContactPhase));
+    q.contacts.sides = place(memory, f, sizeof(int));
     q.held = place(memory, s, sizeof(int));
     q.pressed = place(memory, s, sizeof(int));
     q.laws = place(memory, s, sizeof(ComplianceLaw));
@@ -55,7 +56,7 @@ PRBM double friction_coefficient(const Equations *eq, int contact) {
                                        : eq->rub_law[3 * (contact - eq->system->s)];
 }
 
-/* List the contacts that slip: held stops, then pressed stops and friction points. */
+/* List the contacts that slip: held stops, guides, then pressed stops and friction points. */
 static void list_slipping(Equations *eq) {
     const ContactMode *modes = eq->contacts.modes;
     int s = eq->system->s;
@@ -65,9 +66,16 @@ static void list_slipping(Equations *eq) {
             eq->slipping[eq->slipping_count++] = eq->held[k];
         }
     }
-    eq->slipping_stops = eq->slipping_count;
+    int stops = eq->slipping_count;
+    for (int contact = s; contact < s + eq->system->f; contact++) {
+        if (is_guide(eq->system, contact) && slip_sign(modes[contact]) != 0) {
+            eq->slipping[eq->slipping_count++] = contact;
+        }
+    }
+    eq->slipping_rows = eq->slipping_count;
+    eq->slipping_guides = eq->slipping_rows - stops;
     for (int contact = 0; contact < s + eq->system->f; contact++) {
-        bool held = contact < s && is_held(&eq->contacts, contact);
+        bool held = contact < s ? is_held(&eq->contacts, contact) : is_guide(eq->system, contact);
         if (!held && slip_sign(modes[contact]) != 0 && friction_coefficient(eq, contact) > 0.0) {
             eq->slipping[eq->slipping_count++] = contact;
         }
@@ -134,6 +142,11 @@ PRBM int held_at(const Equations *eq, int stop) {
     return place_in(eq->held, stop);
 }
 
+PRBM int normal_row(const Equations *eq, int contact) {
+    return is_stop(eq->system, contact) ? eq->first_hold + held_at(eq, contact)
+                                        : eq->system->normals[contact - eq->system->s];
+}
+
 static void set_laws(Equations *eq) {
     const Mechanism *m = eq->system->mechanism;
     const double *values = eq->system->values;
@@ -156,6 +169,13 @@ static void set_laws(Equations *eq) {
         eq->rub_law[3 * i] = evaluate(m->frictions[i].coefficient, values);
         eq->rub_law[3 * i + 1] = evaluate(m->frictions[i].normal_force, values);
         eq->rub_law[3 * i + 2] = evaluate(m->frictions[i].normal_stiffness, values);
+    }
+    for (int i = 0, k = m->friction_count; i < m->guide_count; i++) {
+        if (m->guides[i].rubs) {
+            double *law = eq->rub_law + 3 * k++;
+            law[0] = evaluate(m->guides[i].friction, values);
+            law[1] = law[2] = 0.0;
+        }
     }
 }
 
@@ -207,6 +227,7 @@ PRBM void set_equations(Equations *equations, const Inputs *inputs,
     eq->omega = omega;
     memmove(eq->contacts.modes, contacts->modes, count * sizeof(ContactMode));
     memmove(eq->contacts.touching, contacts->touching, (size_t)eq->system->s * sizeof(ContactPhase));
+    memmove(eq->contacts.sides, contacts->sides, (size_t)eq->system->f * sizeof(int));
     set_laws(eq);
     set_rows(eq);
     set_row_parts(eq);

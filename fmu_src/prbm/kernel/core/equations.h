@@ -38,10 +38,11 @@ typedef struct {
     ComplianceLaw *laws;    /* (s,) of compliant stops */
     double *restitutions;   /* (s,) from which the factors of their damping have been computed */
     int *sticking;          /* contacts; the k-th has the row first_stick + k */
-    int *slipping;          /* contacts; the first slipping_stops of them are held stops */
-    int slipping_stops;
+    int *slipping;          /* contacts; the normal forces of the first slipping_rows of them, held */
+    int slipping_rows;      /* stops, then guides, are multipliers */
+    int slipping_guides;
     double *stop_friction;  /* (s,) */
-    double *rub_law;        /* (f, 3): coefficient, normal force, normal stiffness */
+    double *rub_law;        /* (f, 3): coefficient, normal force, normal stiffness; 0 at guides */
     Complex *B, *z;         /* (r, d), (r,) of the active rows */
     double *c;              /* (r,) */
     int *on, *carried;      /* (r,), (carried_count,) rows relative to a moving body */
@@ -65,6 +66,8 @@ PRBM void set_equations(Equations *equations, const Inputs *inputs,
 PRBM WallMotion wall_motion(const Wall *wall, double t);
 PRBM int place_in(const int *list, int index);
 PRBM int held_at(const Equations *eq, int stop);
+/* The row whose multiplier is the normal force of a held stop or of a guide. */
+PRBM int normal_row(const Equations *eq, int contact);
 PRBM double friction_coefficient(const Equations *eq, int contact);
 /* The contacts at which events may occur. */
 PRBM bool held_stop(const Equations *equations, int contact);

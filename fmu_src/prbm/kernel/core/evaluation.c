@@ -526,14 +526,20 @@ PRBM double kinetic_energy_of(const Evaluation *evaluation) {
 PRBM double rub_limit(const Equations *equations, int i, const Complex *e) {
     const System *system = equations->system;
     const double *law = equations->rub_law + 3 * i;
-    Rows lifts = plain_rows(system, system->f, system->lifts, system->lifts_c);
+    int points = system->mechanism->friction_count;
+    Rows lifts = plain_rows(system, points, system->lifts, system->lifts_c);
     double lift = row_value(&lifts, i, e) + lifts.c[i];
     return law[0] * normal_force(lift, law[1], law[2]);
 }
 
 /* The force of a held stop. */
 PRBM double stop_force(const Equations *eq, const double *lam, int stop) {
-    return lam[eq->first_hold + held_at(eq, stop)];
+    return lam[normal_row(eq, stop)];
+}
+
+/* The force of a guide to its side. */
+PRBM double side_force(const Equations *eq, const double *lam, int contact) {
+    return eq->contacts.sides[contact - eq->system->s] * lam[normal_row(eq, contact)];
 }
 
 /* The friction force of a sticking contact. */
@@ -544,6 +550,10 @@ PRBM double stick_force(const Equations *eq, const double *lam, int contact) {
 /* The largest friction force of a contact, by Coulomb's law. */
 PRBM double friction_limit(const Equations *eq, const Complex *e, const Evaluation *found,
                            int contact) {
+    if (is_guide(eq->system, contact)) {
+        double force = fabs(found->lam[normal_row(eq, contact)]);
+        return friction_coefficient(eq, contact) * force;
+    }
     if (!is_stop(eq->system, contact)) {
         return rub_limit(eq, contact - eq->system->s, e);
     }
@@ -555,7 +565,10 @@ PRBM double friction_limit(const Equations *eq, const Complex *e, const Evaluati
 /* The friction force of a slipping contact along its direction. */
 PRBM double slip_force(const Equations *eq, const Complex *e, const Evaluation *found,
                        int contact) {
-    return -slip_sign(eq->contacts.modes[contact]) * friction_limit(eq, e, found, contact);
+    double most = is_guide(eq->system, contact)
+                      ? friction_coefficient(eq, contact) * side_force(eq, found->lam, contact)
+                      : friction_limit(eq, e, found, contact);
+    return -slip_sign(eq->contacts.modes[contact]) * most;
 }
 
 /* Add the forces of pressed compliant stops. */
@@ -581,7 +594,7 @@ NOINLINE void add_pressure(const Equations *eq, Evaluation *result) {
  * walls of held stops. */
 NOINLINE void add_contacts_and_walls(const Equations *eq, Evaluation *result) {
     add_pressure(eq, result);
-    for (int k = eq->slipping_stops; k < eq->slipping_count; k++) {
+    for (int k = eq->slipping_rows; k < eq->slipping_count; k++) {
         double force = slip_force(eq, result->at.e, result, eq->slipping[k]);
         tangential_row(eq->system, eq->slipping[k], result->at.e, result->row);
         add_scaled(eq->system->n, force, result->row, result->a);
@@ -592,20 +605,21 @@ NOINLINE void add_contacts_and_walls(const Equations *eq, Evaluation *result) {
     }
 }
 
-/* Set the columns of slipping stops.  Coulomb's law adds a force along the wall to the normal
- * force, so that the column of such a stop differs from its row. */
+/* Set the columns of slipping stops and guides.  Coulomb's law adds a force along the wall or line to
+ * the normal force, so that the column of such a contact differs from its row. */
 NOINLINE void set_columns(const Equations *eq, Evaluation *result) {
     const System *system = eq->system;
     int n = system->n, even = system->even;
-    Rows walls = slide_rows(system);
     result->factors.Z_columns = result->columns;
     copy(eq->r * even, result->factors.Z, result->columns);
-    for (int k = 0; k < eq->slipping_stops; k++) {
-        int i = eq->slipping[k], h = eq->first_hold + held_at(eq, i);
-        double share = -eq->stop_friction[i] * slip_sign(eq->contacts.modes[i]);
+    for (int k = 0; k < eq->slipping_rows; k++) {
+        int contact = eq->slipping[k], h = normal_row(eq, contact);
+        int side = is_stop(system, contact) ? 1 : eq->contacts.sides[contact - system->s];
+        double share = -friction_coefficient(eq, contact) * slip_sign(eq->contacts.modes[contact]);
         double *column = result->columns + h * even;
+        share *= side;
         row_jacobian(&eq->active, h, result->at.e, column);
-        row_jacobian(&walls, i, result->at.e, result->row);
+        tangential_row(system, contact, result->at.e, result->row);
         add_scaled(n, share, result->row, column);
         forward_all(&result->factors, column);
     }
@@ -622,7 +636,7 @@ SIZED bool factor_motion(int even, const Equations *eq, Evaluation *result) {
     }
     result->factors.Z_columns = result->factors.Z;
     result->factors.least = eq->system->least_mobility;
-    if (eq->slipping_stops > 0) {
+    if (eq->slipping_rows > 0) {
         set_columns(eq, result);
     }
     return schur_dispatch(even, &result->factors);

@@ -32,6 +32,7 @@ PRBM Kinematics place_kinematics(const System *system, Memory *memory);
 PRBM void zero_placed(const Memory *memory, size_t begin);
 PRBM void find_directions(const System *system, const Reference *near, Kinematics *at);
 PRBM double stop_force(const Equations *eq, const double *lam, int stop);
+PRBM double side_force(const Equations *eq, const double *lam, int contact);
 PRBM double stick_force(const Equations *eq, const double *lam, int contact);
 PRBM double friction_limit(const Equations *eq, const Complex *e, const Evaluation *found,
                            int contact);

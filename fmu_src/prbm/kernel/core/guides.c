@@ -52,6 +52,26 @@ static int add_guide(System *system, const Guide *guide, int k, GuideRows *rows,
     return 1 + guide->keeps_angle;
 }
 
+/* Set the rows of the displacements along the guides with friction, which are across those that the
+ * guides do not permit. */
+static void add_rubbing_guides(System *system) {
+    const Mechanism *m = system->mechanism;
+    int d = system->d, k = m->friction_count;
+    Complex across = {0.0, 1.0};
+    for (int i = 0; i < m->guide_count; i++) {
+        int row = system->guided[i].across;
+        if (!m->guides[i].rubs) {
+            continue;
+        }
+        for (int j = 0; j < d; j++) {
+            system->rubs[k * d + j] = product(across, system->loops[row * d + j]);
+        }
+        system->rubs_z[k] = product(across, system->loops_z[row]);
+        system->rubs_on[k] = system->loops_on[row];
+        system->normals[k++] = row;
+    }
+}
+
 /* Reject a guide without a direction, or with a point beside its line. */
 static bool check_guide(const System *system, const Guide *guide, Problem *problem) {
     const Connection *c = &guide->between;
@@ -112,6 +132,7 @@ PRBM bool add_guides(System *system, Scratch *scratch, Problem *problem) {
         }
         system->tied = floating == 0 ? k : system->tied;
     }
+    add_rubbing_guides(system);
     return true;
 }
 

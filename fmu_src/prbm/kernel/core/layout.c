@@ -101,7 +101,7 @@ static int free_count(Reader *reader, const Mechanism *m) {
 
 static bool too_many_places(const Mechanism *m) {
     return m->coil_count > PLACES_MAX || m->guide_count > PLACES_MAX || m->stop_count > STOPS_MAX ||
-           m->friction_count > STOPS_MAX || m->force_count > PLACES_MAX ||
+           m->rubbing_count > STOPS_MAX || m->force_count > PLACES_MAX ||
            m->probe_count > PLACES_MAX || m->ground_count > GROUND_POINTS_MAX;
 }
 
@@ -480,7 +480,7 @@ PRBM void lay_out_slots(Mechanism *m) {
         [SLOTS_FREQUENCY] = 1,
         [SLOTS_CALCULATED] = calculated_count(m),
         [SLOTS_DERIVATIVES] = m->independent_count + 2 + EXCHANGED_STATES * m->compliant_count,
-        [SLOTS_INDICATORS] = STOP_INDICATORS * m->stop_count + m->friction_count,
+        [SLOTS_INDICATORS] = indicator_count(m),
         [SLOTS_TIME] = 1,
     };
     int at[SLOTS_GROUPS];

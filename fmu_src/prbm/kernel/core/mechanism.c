@@ -5,6 +5,11 @@ PRBM bool has_dimension(const FlexureType *kind, int dimension) {
     return (kind->given >> dimension & 1u) != 0u;
 }
 
+PRBM int indicator_count(const Mechanism *mechanism) {
+    int guides = mechanism->rubbing_count - mechanism->friction_count;
+    return STOP_INDICATORS * mechanism->stop_count + mechanism->rubbing_count + guides;
+}
+
 PRBM bool is_hinge(const FlexureType *kind) {
     return kind->profile == PROFILE_NOTCH && !has_dimension(kind, DIMENSION_WAIST_LENGTH);
 }

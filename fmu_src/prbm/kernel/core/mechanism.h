@@ -81,6 +81,8 @@ typedef struct {
     Connection between; /* from the guided point to a point of the line */
     Point along;        /* Another point of the line. */
     bool keeps_angle;   /* Whether the guided body keeps its angle relative to the line. */
+    bool rubs;          /* Whether it has friction. */
+    Expression friction;
 } Guide;
 
 typedef struct {
@@ -196,6 +198,7 @@ typedef struct {
     const Guide *guides;
     const Stop *stops;
     const Friction *frictions;
+    int rubbing_count; /* Friction points, then the guides with friction. */
     const Force *forces;
     const Probe *probes;
     const Point *ground;
@@ -231,6 +234,8 @@ typedef struct {
     Slots slots;
 } Mechanism;
 
+/* The number of the event indicators. */
+PRBM int indicator_count(const Mechanism *mechanism);
 PRBM bool has_dimension(const FlexureType *kind, int dimension);
 /* Whether a flexure has a notch without a waist, which bends like a hinge. */
 PRBM bool is_hinge(const FlexureType *kind);

@@ -31,9 +31,13 @@ static void place_contacts(System *system, Memory *memory) {
     system->gaps_z = place(memory, s, sizeof(Complex));
     system->slides_z = place(memory, s, sizeof(Complex));
     system->on = place(memory, s, sizeof(int));
+    size_t points = (size_t)system->mechanism->friction_count;
     system->rubs = place(memory, f * d, sizeof(Complex));
-    system->lifts = place(memory, f * d, sizeof(Complex));
-    system->lifts_c = place(memory, f, sizeof(double));
+    system->rubs_z = place(memory, f, sizeof(Complex));
+    system->rubs_on = place(memory, f, sizeof(int));
+    system->normals = place(memory, f, sizeof(int));
+    system->lifts = place(memory, points * d, sizeof(Complex));
+    system->lifts_c = place(memory, points, sizeof(double));
 }
 
 /* Place the vectors along coil springs and their laws. */
@@ -62,7 +66,7 @@ PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memor
     result.mapped = m->map.mapped;
     result.r = (int)r;
     result.s = m->stop_count;
-    result.f = m->friction_count;
+    result.f = m->rubbing_count;
     result.b = (int)b;
     result.q0 = place(memory, n, sizeof(double));
     result.rest = place(memory, n, sizeof(double));

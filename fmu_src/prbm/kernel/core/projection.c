@@ -174,7 +174,7 @@ PRBM bool project_near(const Equations *equations, const Evaluation *evaluation,
     double *kept = take(scratch, (size_t)n);
     copy(n, y, kept);
     scratch->used = mark;
-    if (eq->slipping_stops == 0 && corrected(eq, evaluation, near, t, y, correction)) {
+    if (eq->slipping_rows == 0 && corrected(eq, evaluation, near, t, y, correction)) {
         return true;
     }
     copy(n, kept, y); /* Undo the correction. */

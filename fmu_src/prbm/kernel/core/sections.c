@@ -68,7 +68,7 @@ PRBM void add_contact_pulls(const Equations *eq, const Complex *e, const Evaluat
         int i = eq->pressed[k];
         pull_stop(eq, e, i, found->pressure[i], rubbing_force(eq, e, found, i), on);
     }
-    for (int i = 0; i < system->f; i++) {
+    for (int i = 0; i < m->friction_count; i++) {
         const Friction *friction = &m->frictions[i];
         double size = rubbing_force(eq, e, found, system->s + i);
         Complex pull = scaled(size, unit(friction->direction));
@@ -94,13 +94,17 @@ static void add_spring_pulls(const System *system, const Complex *e, const doubl
     scratch->used = mark;
 }
 
-/* Let guides push their bodies with the forces lam. */
-static void add_guide_pulls(const System *system, const Complex *e, const double *lam, Complex *on) {
+/* Let guides push and rub their bodies. */
+static void add_guide_pulls(const Equations *eq, const Complex *e, const Evaluation *found,
+                            Complex *on) {
+    const System *system = eq->system;
     const Mechanism *m = system->mechanism;
+    int contact = system->s + m->friction_count;
     for (int i = 0; i < m->guide_count; i++) {
         const GuideRows *guide = &system->guided[i];
         int carrier = system->loops_on[guide->across];
-        Complex pull = scaled(lam[guide->across], guide->normal);
+        double along = m->guides[i].rubs ? rubbing_force(eq, e, found, contact++) : 0.0;
+        Complex pull = product(complex_of(found->lam[guide->across], -along), guide->normal);
         pull = carrier == FIXED ? pull : product(pull, e[carrier]);
         pull_body(on, m->guides[i].between.start, pull);
         pull_body(on, m->guides[i].between.end, scaled(-1.0, pull));
@@ -177,7 +181,7 @@ PRBM SectionState section_state(const Equations *eq, const Complex *e, const dou
     }
     add_contact_pulls(eq, e, found, at.on);
     add_spring_pulls(system, e, v, at.on, scratch);
-    add_guide_pulls(system, e, found->lam, at.on);
+    add_guide_pulls(eq, e, found, at.on);
     transmit(system, found->lam, &at);
     return at;
 }

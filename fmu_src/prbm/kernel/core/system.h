@@ -102,7 +102,7 @@ typedef struct {
 } Branch;
 
 /* The constant arrays of a mechanism, as in the twin.  There are n coordinates, d directions, r
- * loop rows, p mass points, s stops, f friction points and b bodies.  Columns of A and of the
+ * loop rows, p mass points, s stops, f friction points and guides with friction, and b bodies.  Columns of A and of the
  * rows are zero at stretches, see spread.  Vectors with the shape (even,) or (wide,) have n or d
  * elements, and are padded to an even length. */
 typedef struct {
@@ -134,8 +134,11 @@ typedef struct {
     double *gaps_c;           /* (s,) */
     Complex *gaps_z, *slides_z; /* (s,) */
     int *on;                  /* (s,) direction of the body that carries a wall, or FIXED */
-    Complex *rubs, *lifts;    /* (f, d) */
-    double *lifts_c;          /* (f,) */
+    Complex *rubs, *rubs_z;   /* (f, d), (f,) along friction points, then along guides with friction */
+    int *rubs_on;             /* (f,) direction of the body that carries a guide, or FIXED */
+    int *normals;             /* (f,) row of a guide, whose multiplier is the normal force, or FIXED */
+    Complex *lifts;           /* (points, d) */
+    double *lifts_c;          /* (points,) */
     BodyFrame released;       /* the released point */
     Complex *release;         /* (d,) */
     double release_c;

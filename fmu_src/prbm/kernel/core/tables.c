@@ -206,6 +206,11 @@ static void read_guides(Reader *reader, Mechanism *m) {
         guides[i].along = read_point(reader, m);
         guides[i].keeps_angle = read_flag(reader);
         m->guided_count += 1 + guides[i].keeps_angle;
+        guides[i].rubs = read_flag(reader);
+        if (guides[i].rubs) {
+            guides[i].friction = read_expression(reader, m);
+            m->rubbing_count++;
+        }
         if (guides[i].between.start == GROUND) {
             reader->wrong = reader->wrong ? reader->wrong : "a guide for a point of the ground";
         }
@@ -251,6 +256,7 @@ static void read_frictions(Reader *reader, Mechanism *m) {
         f->coefficient = read_expression(reader, m);
         f->normal_force = read_expression(reader, m);
         f->normal_stiffness = read_expression(reader, m);
+        m->rubbing_count++;
     }
     m->frictions = frictions;
 }

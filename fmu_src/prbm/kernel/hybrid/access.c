@@ -19,7 +19,7 @@ PRBM const double *extra_states(const Simulation *sim, const double *y) {
 
 PRBM int contact_count(const Simulation *sim) {
     const Mechanism *m = sim->configuration.mechanism;
-    return m->stop_count + m->friction_count;
+    return m->stop_count + m->rubbing_count;
 }
 
 PRBM ContactProblem *contact_problem_at(Simulation *sim, const double *q) {
@@ -47,7 +47,7 @@ PRBM void set_inputs(Simulation *sim) {
     const double *given = sim->state.acting_given, *base = given + m->input.base;
     Inputs inputs = {sim->forces, {base[0], base[1]}, sim->state.walls,
                      given + m->input.mobilities};
-    ContactState contacts = {sim->state.modes, sim->state.touching};
+    ContactState contacts = {sim->state.modes, sim->state.touching, sim->state.sides};
     copy(LOADS * m->force_count, given, sim->forces);
     set_equations(&sim->equations, &inputs, &contacts, sim->configuration.omega);
     forget_outputs(sim);

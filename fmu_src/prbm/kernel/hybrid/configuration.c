@@ -15,6 +15,11 @@ PRBM double zero_acceleration(const Configuration *configuration) {
     return ZERO_RATE_RTOL * scales->rate * scales->rate * scales->length;
 }
 
+PRBM double zero_force(const Configuration *configuration) {
+    const Scales *scales = &configuration->scales;
+    return ZERO_RATE_RTOL * scales->energy / scales->length;
+}
+
 PRBM double closing_depth(const Configuration *configuration) {
     return TOUCHING_RTOL * configuration->scales.length;
 }

@@ -11,6 +11,8 @@ PRBM bool take_values(Simulation *sim, Problem *problem);
 PRBM bool values_changed(const Simulation *sim);
 PRBM bool inputs_changed(const Simulation *sim); /* other than those of walls */
 PRBM bool walls_changed(const Simulation *sim);  /* inputs that move walls */
+/* The force below which the direction of the force of a guide is round-off. */
+PRBM double zero_force(const Configuration *configuration);
 PRBM double zero_speed(const Configuration *configuration); /* lower speeds are round-off */
 /* Penetration at which a stop that was released too early closes again [m]. */
 PRBM double closing_depth(const Configuration *configuration);

@@ -27,6 +27,8 @@ static void try_contacts(Simulation *sim, const ContactMode *modes) {
     memmove(sim->trial.contacts.modes, modes, (size_t)contact_count(sim) * sizeof *modes);
     memmove(sim->trial.contacts.touching, sim->state.touching,
             (size_t)system_of(sim)->s * sizeof *sim->state.touching);
+    memmove(sim->trial.contacts.sides, sim->state.sides,
+            (size_t)system_of(sim)->f * sizeof *sim->state.sides);
     set_equations(&sim->trial.equations, &sim->equations.inputs, &sim->trial.contacts,
                   sim->configuration.omega);
 }
@@ -368,6 +370,16 @@ static void hold_pressed(Simulation *sim, const RestContacts *rest, const RestFo
     }
 }
 
+/* Set the sides to which the guides at rest push. */
+static void set_sides(Simulation *sim, const RestContacts *rest, const RestForces *found) {
+    const System *system = system_of(sim);
+    for (int j = 0; j < rest->count; j++) {
+        if (is_guide(system, rest->contacts[j])) {
+            sim->state.sides[rest->contacts[j] - system->s] = found->pushing[j] < 0.0 ? -1 : 1;
+        }
+    }
+}
+
 /* Compute the forces of the contacts at rest with all rigid stops open. */
 static bool forces_at_rest(Simulation *sim, const RestContacts *rest, ContactMode *modes,
                            RestForces *found, Problem *problem) {
@@ -402,6 +414,7 @@ static bool modes_by_forces(Simulation *sim, const HoldingSet *stops, const Hold
     if (ok && found.solved) {
         hold_pressed(sim, &rest, &found, sliding, modes, holds);
         stick_or_slip(sim, &rest, &found, holds, event, yielding, modes);
+        set_sides(sim, &rest, &found);
         try_contacts(sim, modes);
         ok = modes_agree(sim, q, v, touching, &rest, &found, agree, problem);
     }
@@ -497,8 +510,33 @@ static int resting_candidates(Simulation *sim, const int *touching, int touching
     return count;
 }
 
-/* Choose the modes of all contacts by their forces at the front. */
-static bool choose_all_modes(Simulation *sim, const HoldingSet *touching, const FrictionEvent *event,
+/* Find the first slipping guide that does not push to the side of its friction in the trial
+ * equations; -1: none. */
+static bool find_wrong_side(Simulation *sim, const ContactMode *modes, int *wrong,
+                            Problem *problem) {
+    const Equations *eq = &sim->trial.equations;
+    const double *q = sim->state.front, *v = q + system_of(sim)->n;
+    *wrong = -1;
+    if (system_of(sim)->f == sim->configuration.mechanism->friction_count) {
+        return true;
+    }
+    try_contacts(sim, modes);
+    if (eq->slipping_guides == 0) {
+        return true;
+    }
+    bool ok = evaluate_equations(eq, sim->state.front_time, q, v, extra_states(sim, q), NULL,
+                                 &sim->trial.evaluation, problem);
+    for (int k = 0; ok && *wrong < 0 && k < eq->slipping_rows; k++) {
+        int c = eq->slipping[k];
+        bool changed = is_guide(eq->system, c) && side_force(eq, sim->trial.evaluation.lam, c) <
+                                                      -zero_force(&sim->configuration);
+        *wrong = changed ? c : -1;
+    }
+    return ok;
+}
+
+/* Choose the modes of all contacts by their forces at the front, for the sides of the guides. */
+static bool choose_by_forces(Simulation *sim, const HoldingSet *touching, const FrictionEvent *event,
                              ContactMode *modes, Problem *problem) {
     const System *system = system_of(sim);
     const double *q = sim->state.front, *v = q + system->n;
@@ -512,6 +550,26 @@ static bool choose_all_modes(Simulation *sim, const HoldingSet *touching, const 
         modes[contact] = open ? CONTACT_OPEN : CONTACT_FRICTIONLESS;
     }
     return choose_slips(sim, &holding, touching, event, modes, problem);
+}
+
+/* Choose the modes of all contacts by their forces at the front.  The friction of a guide that slips
+ * depends on the side to which it pushes: the side of the first wrong one at a time is changed. */
+static bool choose_all_modes(Simulation *sim, const HoldingSet *touching, const FrictionEvent *event,
+                             ContactMode *modes, Problem *problem) {
+    HoldingSet failed = *touching;
+    for (int k = 0; k < MODE_ITERATIONS_MAX; k++) {
+        int wrong;
+        if (!choose_by_forces(sim, touching, event, modes, problem) ||
+            !find_wrong_side(sim, modes, &wrong, problem)) {
+            return false;
+        }
+        if (wrong < 0) {
+            return true;
+        }
+        sim->state.sides[wrong - system_of(sim)->s] *= -1;
+        failed.stops[touching->count] = wrong;
+    }
+    return contacts_fail(sim, &JAMMED, touching->count + 1, failed.stops, problem);
 }
 
 /* Remove the compliant stops that are pressed: they are no constraints. */

@@ -5,6 +5,12 @@
 #include "hybrid/contact_names.h"
 
 PRBM const char *contact_name(const Mechanism *m, int contact) {
+    int k = contact - m->stop_count - m->friction_count;
+    for (int i = 0; k >= 0 && i < m->guide_count; i++) {
+        if (m->guides[i].rubs && k-- == 0) {
+            return m->guides[i].name;
+        }
+    }
     return contact < m->stop_count ? m->stops[contact].name
                                    : m->frictions[contact - m->stop_count].name;
 }
@@ -21,7 +27,7 @@ PRBM bool has_contact(int count, const int *contacts, int contact) {
 PRBM void list_contacts(const Mechanism *m, int count, const int *contacts, ContactNames *names) {
     size_t length = 0, size = sizeof names->text;
     names->text[0] = '\0';
-    for (int i = 0; i < m->stop_count + m->friction_count; i++) {
+    for (int i = 0; i < m->stop_count + m->rubbing_count; i++) {
         if (!has_contact(count, contacts, i)) {
             continue;
         }

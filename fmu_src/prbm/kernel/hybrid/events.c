@@ -34,6 +34,12 @@ static bool apply_friction(Simulation *sim, const Event *event, Problem *problem
     return choose_modes(sim, NULL, 0, event, problem);
 }
 
+static bool apply_side(Simulation *sim, const Event *event, Problem *problem) {
+    sim->state.sides[event->contact - system_of(sim)->s] *= -1;
+    set_contacts(sim, sim->state.modes);
+    return choose_modes(sim, NULL, 0, NULL, problem);
+}
+
 /* --- the table -------------------------------------------------------------------------------- */
 
 static const Transition TRANSITIONS[EVENT_KINDS] = {
@@ -43,6 +49,8 @@ static const Transition TRANSITIONS[EVENT_KINDS] = {
                     apply_friction},
     [EVENT_REVERSAL] = {{"reversal", reversal_guard, false}, slipping_contact, reversal_near, true,
                         reversal_time, apply_friction},
+    [EVENT_SIDE] = {{"change of side", side_guard, true}, slipping_guide, side_near, false, yield_time,
+                    apply_side},
     [EVENT_SWITCH] = {{"switch", switching_guard, false}, pressed_stop, pressed_near, false,
                       switching_time, apply_switch},
     [EVENT_SEPARATION] = {{"separation", indentation_guard, false}, pressed_stop,

@@ -62,6 +62,10 @@ PRBM double slip_guard(const Equations *equations, const Instant *at, int contac
     return (1.0 + FRICTION_EXCESS_RTOL) * limit - friction;
 }
 
+PRBM double side_guard(const Equations *equations, const Instant *at, int contact) {
+    return side_force(equations, at->found->lam, contact);
+}
+
 PRBM double reversal_guard(const Equations *equations, const Instant *at, int contact) {
     int sign = slip_sign(equations->contacts.modes[contact]);
     return sign * sliding_velocity(equations->system, contact, at->e, at->v);
@@ -75,7 +79,13 @@ PRBM bool sticking_contact(const Equations *equations, int contact) {
 
 PRBM bool slipping_contact(const Equations *equations, int contact) {
     return slip_sign(equations->contacts.modes[contact]) != 0 &&
-           (held_stop(equations, contact) || friction_coefficient(equations, contact) > 0.0);
+           (held_stop(equations, contact) || is_guide(equations->system, contact) ||
+            friction_coefficient(equations, contact) > 0.0);
+}
+
+PRBM bool slipping_guide(const Equations *equations, int contact) {
+    return is_guide(equations->system, contact) &&
+           slip_sign(equations->contacts.modes[contact]) != 0;
 }
 
 PRBM bool open_stop(const Equations *equations, int contact) {
@@ -109,6 +119,10 @@ PRBM bool release_near(Simulation *sim) {
 
 PRBM bool slip_near(Simulation *sim) {
     return sim->equations.sticking_count > 0;
+}
+
+PRBM bool side_near(Simulation *sim) {
+    return sim->equations.slipping_guides > 0;
 }
 
 PRBM bool reversal_near(Simulation *sim) {
@@ -540,6 +554,7 @@ PRBM bool yield_time(Simulation *sim, const Guard *guard, int contact, Fall *fal
     Search search = {sim, guard, contact, false, problem};
     ArcGuard on_arc = arc_guard(&search);
     const Arc *arc = &sim->state.arc;
+    on_arc.offset = guard->value == side_guard ? zero_force(&sim->configuration) : 0.0;
     double times[3] = {arc->start, arc->start + arc->h / 2, arc->start + arc->h};
     for (int part = 0; !fall->found && part < 2; part++) {
         double a = times[part], b = times[part + 1];

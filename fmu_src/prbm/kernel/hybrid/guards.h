@@ -30,6 +30,7 @@ typedef struct {
 } Fall;
 
 PRBM double release_guard(const Equations *equations, const Instant *at, int contact);
+PRBM double side_guard(const Equations *equations, const Instant *at, int contact);
 PRBM double slip_guard(const Equations *equations, const Instant *at, int contact);
 PRBM double reversal_guard(const Equations *equations, const Instant *at, int contact);
 PRBM double gap_guard(const Equations *equations, const Instant *at, int contact);
@@ -37,11 +38,13 @@ PRBM double indentation_guard(const Equations *equations, const Instant *at, int
 PRBM double switching_guard(const Equations *equations, const Instant *at, int contact);
 PRBM double rising_guard(const Equations *equations, const Instant *at, int contact);
 PRBM bool sticking_contact(const Equations *equations, int contact);
+PRBM bool slipping_guide(const Equations *equations, int contact);
 PRBM bool slipping_contact(const Equations *equations, int contact);
 PRBM bool pressed_stop(const Equations *equations, int contact);
 PRBM bool open_stop(const Equations *equations, int contact);
 /* Whether events may occur in the latest step at any contact. */
 PRBM bool release_near(Simulation *sim);
+PRBM bool side_near(Simulation *sim);
 PRBM bool slip_near(Simulation *sim);
 PRBM bool reversal_near(Simulation *sim);
 PRBM bool pressed_near(Simulation *sim);

@@ -20,6 +20,9 @@ static void free_contacts(Simulation *sim) {
         bool stop = contact < m->stop_count;
         sim->state.modes[contact] = stop ? CONTACT_OPEN : CONTACT_FRICTIONLESS;
     }
+    for (int i = 0; i < m->rubbing_count; i++) {
+        sim->state.sides[i] = 1;
+    }
 }
 
 PRBM void clear_stops(Simulation *sim) {

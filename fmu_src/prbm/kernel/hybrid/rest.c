@@ -2,6 +2,7 @@
 #include <math.h>
 
 #include "core/gaps.h"
+#include "core/vectors.h"
 #include "hybrid/access.h"
 #include "hybrid/configuration.h"
 #include "hybrid/rest.h"
@@ -48,20 +49,51 @@ static void rest_accelerations(const Simulation *sim, const RestContacts *rest, 
     }
 }
 
-/* Set the limits of friction of the contacts at rest, see coulomb. */
-static void rest_laws(const Simulation *sim, const RestContacts *rest, const Complex *e,
-                      double *friction, double *fixed, int *normal) {
-    const Equations *equations = &sim->trial.equations;
-    for (int j = 0; j < rest->count; j++) {
+/* Set the laws of friction of the contacts at rest.  The normal forces of guides are multipliers of the
+ * trial equations, whose changes by unit forces are multipliers (size, r). */
+static CoulombLaws rest_laws(Simulation *sim, const RestContacts *rest, const Complex *e,
+                             const double *multipliers) {
+    const Equations *eq = &sim->trial.equations;
+    const Evaluation *found = &sim->trial.evaluation;
+    int k = rest->stop_count, m = rest->count, size = k + m, r = eq->r, sides = 0;
+    double *friction = take(&sim->scratch, (size_t)m), *fixed = take(&sim->scratch, (size_t)m);
+    double *L = take_matrix(&sim->scratch, m, size), *b = take(&sim->scratch, (size_t)m);
+    int *normal = take_integers(&sim->scratch, m);
+    for (int j = 0; j < m; j++) {
         int contact = rest->contacts[j];
         normal[j] = -1;
-        for (int a = 0; a < rest->stop_count; a++) {
+        for (int a = 0; a < k; a++) {
             normal[j] = rest->stops[a] == contact ? a : normal[j];
         }
-        bool stop = normal[j] >= 0;
-        friction[j] = stop ? equations->stop_friction[contact] : 0.0;
-        fixed[j] = stop ? 0.0
-                        : friction_limit(equations, e, &sim->trial.evaluation, contact);
+        if (is_guide(eq->system, contact)) {
+            int row = normal_row(eq, contact);
+            normal[j] = k + sides;
+            b[sides] = found->lam[row];
+            for (int a = 0; a < size; a++) {
+                L[sides * size + a] = multipliers[a * r + row];
+            }
+            sides++;
+        }
+        friction[j] = normal[j] < 0 ? 0.0 : friction_coefficient(eq, contact);
+        fixed[j] = normal[j] < 0 ? friction_limit(eq, e, found, contact) : 0.0;
+    }
+    return (CoulombLaws){friction, fixed, normal, sides, L, b};
+}
+
+/* Compute the changes X (n, size) of the accelerations, and multipliers (size, r), by unit forces. */
+static void unit_responses(Simulation *sim, int size, const double *pushes, double *X,
+                           double *multipliers) {
+    const Evaluation *found = &sim->trial.evaluation;
+    const System *system = system_of(sim);
+    int n = system->n, r = sim->trial.equations.r;
+    double *x = take(&sim->scratch, (size_t)system->even);
+    zeros(size * r, multipliers);
+    for (int a = 0; a < size; a++) {
+        pad(n, pushes + a * n, x);
+        solve_again(&found->factors, x, multipliers + a * r);
+        for (int i = 0; i < n; i++) {
+            X[i * size + a] = x[i];
+        }
     }
 }
 
@@ -80,14 +112,33 @@ static double pressing(int k, int m, int i, const double *W, const double *P, co
  * the choice of modes, and the round-off of the forces of friction.  These do not vanish with the
  * accelerations u, as in a mechanism at rest, where the limits of friction may still be large. */
 static double accepted_violation(const Simulation *sim, int k, int m, const double *W,
-                                 const double *u, const double *fixed) {
+                                 const double *u, const CoulombLaws *laws, const double *none) {
     int size = k + m;
     double pull = 0.0;
     for (int j = 0; j < m; j++) {
-        pull = greater(pull, fixed[j] * W[(k + j) * size + k + j]);
+        pull = greater(pull, limit_of(k, size, laws, j, none) * W[(k + j) * size + k + j]);
     }
-    double laws = greater(COMPLEMENTARITY_RTOL * largest(size, u), LIMIT_RTOL * pull);
-    return greater(laws, zero_acceleration(&sim->configuration) / 2.0);
+    double laws_of = greater(COMPLEMENTARITY_RTOL * largest(size, u), LIMIT_RTOL * pull);
+    return greater(laws_of, zero_acceleration(&sim->configuration) / 2.0);
+}
+
+/* Set the forces of the contacts from the solution P.  Slides up to the tolerance are round-off of the
+ * forces at the contacts. */
+static void set_forces(int k, int m, const double *W, const double *u, const CoulombLaws *laws,
+                       double tolerance, const double *P, RestForces *found) {
+    int size = k + m;
+    for (int i = 0; i < k; i++) {
+        found->normal[i] = P[i] > 0.0 ? pressing(k, m, i, W, P, laws->normal) : 0.0;
+    }
+    for (int j = 0; j < m; j++) {
+        int i = k + j, g = laws->normal[j] - k;
+        double slide = dot(size, W + i * size, P) + u[i];
+        found->friction[j] = P[i];
+        found->limit[j] = limit_of(k, size, laws, j, P);
+        found->pushing[j] = g < 0 ? 0.0 : laws->b[g] + dot(size, laws->L + g * size, P);
+        found->mobility[j] = W[i * size + i];
+        found->slide[j] = fabs(slide) <= tolerance ? 0.0 : slide;
+    }
 }
 
 PRBM bool rest_forces(Simulation *sim, const double *q, const double *v,
@@ -100,36 +151,24 @@ PRBM bool rest_forces(Simulation *sim, const double *q, const double *v,
     double *rows = take_matrix(&sim->scratch, size, n);
     double *pushes = take_matrix(&sim->scratch, size, n);
     double *X = take_matrix(&sim->scratch, n, size);
+    double *multipliers = take_matrix(&sim->scratch, size, sim->trial.equations.r);
     double *u = take(&sim->scratch, (size_t)size), *P = take(&sim->scratch, (size_t)size);
-    double *friction = take(&sim->scratch, (size_t)m), *fixed = take(&sim->scratch, (size_t)m);
-    int *normal = take_integers(&sim->scratch, m);
-    double tolerance = 0.0;
     bool ok = evaluate_equations(&sim->trial.equations, sim->state.front_time, q, v,
                                  extra_states(sim, sim->state.front), NULL,
                                  &sim->trial.evaluation, problem);
     rest_rows(sim, rest, at->e, rows, pushes);
-    ok = ok && loop_response(at, size, pushes, X, &sim->scratch, problem);
     found->solved = false;
     if (ok) {
+        unit_responses(sim, size, pushes, X, multipliers);
         contact_mobility(n, size, at->M, rows, X, system->length, W);
         rest_accelerations(sim, rest, at->e, v, rows, u);
-        rest_laws(sim, rest, at->e, friction, fixed, normal);
-        tolerance = accepted_violation(sim, k, m, W, u, fixed);
-        found->solved =
-            coulomb(k, m, W, u, friction, fixed, normal, tolerance, P, &sim->scratch);
-    }
-    for (int i = 0; found->solved && i < size; i++) {
-        int j = i - k;
-        if (i < k) {
-            found->normal[i] = P[i] > 0.0 ? pressing(k, m, i, W, P, normal) : 0.0;
-            continue;
+        CoulombLaws laws = rest_laws(sim, rest, at->e, multipliers);
+        zeros(size, P);
+        double tolerance = accepted_violation(sim, k, m, W, u, &laws, P);
+        found->solved = coulomb(k, m, W, u, &laws, tolerance, P, &sim->scratch);
+        if (found->solved) {
+            set_forces(k, m, W, u, &laws, tolerance, P, found);
         }
-        found->friction[j] = P[i];
-        found->limit[j] = fixed[j] + (normal[j] < 0 ? 0.0 : friction[j] * P[normal[j]]);
-        found->mobility[j] = W[i * size + i];
-        /* Slides up to the tolerance are round-off of the forces at the contacts. */
-        double slide = dot(size, W + i * size, P) + u[i];
-        found->slide[j] = fabs(slide) <= tolerance ? 0.0 : slide;
     }
     sim->scratch.used = mark;
     return ok;

@@ -7,19 +7,19 @@
 enum { CONTACTS_MAX = 2 * STOPS_MAX };
 
 /* stops: stops that touch, with the signs of their sliding velocities.  contacts: those of these
- * stops and of the friction points that have friction and do not slide. */
+ * stops, of the friction points and of the guides that have friction and do not slide. */
 typedef struct {
     int stop_count, stops[STOPS_MAX], slips[STOPS_MAX];
     int count, contacts[CONTACTS_MAX];
 } RestContacts;
 
 /* Forces of RestContacts.  normal: acceleration of each gap by its normal force alone; friction and
- * limit: forces; slide: accelerations of sliding; mobility: their changes by unit forces. */
+ * limit: forces; pushing: those of guides to the left of their lines; slide: accelerations of sliding; mobility: their changes by unit forces. */
 typedef struct {
     bool solved;
     double normal[STOPS_MAX];
     double friction[CONTACTS_MAX], limit[CONTACTS_MAX], slide[CONTACTS_MAX];
-    double mobility[CONTACTS_MAX];
+    double mobility[CONTACTS_MAX], pushing[CONTACTS_MAX];
     double *W; /* (k + m, k + m) accelerations of gaps and of sliding by unit forces, in scratch */
 } RestForces;
 

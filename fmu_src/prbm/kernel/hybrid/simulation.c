@@ -46,7 +46,8 @@ static void place_numbers(State *state, const Mechanism *m, Memory *memory) {
 static void place_state(State *state, const Mechanism *m, Memory *memory) {
     size_t s = (size_t)m->stop_count;
     place_numbers(state, m, memory);
-    state->modes = place(memory, s + (size_t)m->friction_count, sizeof *state->modes);
+    state->modes = place(memory, s + (size_t)m->rubbing_count, sizeof *state->modes);
+    state->sides = place(memory, (size_t)m->rubbing_count, sizeof *state->sides);
     state->driven = place(memory, s, sizeof(bool));
     state->touching = place(memory, s, sizeof(ContactPhase));
     state->touches = place(memory, s, sizeof(ContactStart));
@@ -56,14 +57,14 @@ static void place_state(State *state, const Mechanism *m, Memory *memory) {
 
 static void place_scratch(Scratch *scratch, const Mechanism *m, Memory *memory) {
     size_t d = (size_t)m->direction_count, s = (size_t)m->stop_count; /* d is at least n. */
-    size_t size = d + (size_t)m->loop_count + 2 * s + (size_t)m->friction_count + 2;
+    size_t size = d + (size_t)m->loop_count + 2 * s + (size_t)m->rubbing_count + 2;
     size_t drawn = (size_t)m->ground_count + (size_t)m->body_count, pieces = (size_t)m->longest;
     for (int i = 0; i < m->type_count; i++) {
         size_t pivots = (size_t)m->types[i].pivots;
         pieces = pivots > pieces ? pivots : pieces;
     }
     /* The number of unknowns of a complementarity problem of all contacts. */
-    size_t forces = 4 * s + 3 * (size_t)m->friction_count, pivots_size = forces * (2 * forces + 2);
+    size_t forces = 4 * s + 4 * (size_t)m->rubbing_count, pivots_size = forces * (2 * forces + 2);
     size_t single =
         size * size + 4 * size + 2 * drawn + 4 * pieces + 16 + pivots_size + m->beam_size;
     scratch->size = 12 * size * size + 60 * size + 2 * drawn + 16 * pieces + 64 + pivots_size +
@@ -128,6 +129,7 @@ static void place_all(Simulation *sim, Memory *memory) {
                                      sizeof(ContactMode));
     sim->trial.contacts.touching = place(memory, (size_t)system->mechanism->stop_count,
                                         sizeof(ContactPhase));
+    sim->trial.contacts.sides = place(memory, (size_t)system->f, sizeof(int));
     evaluation_place(&sim->trial.evaluation, system, memory);
     place_stepping(&sim->stepping, system, memory);
     place_present(sim, system, memory);

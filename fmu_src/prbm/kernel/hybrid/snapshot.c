@@ -12,7 +12,7 @@ enum { SCALARS = 26, PER_STOP_STATE = 16, PER_CONTACT_STATE = 13 };
 
 PRBM size_t simulation_state_count(const Simulation *simulation) {
     const Mechanism *m = simulation->configuration.mechanism;
-    return SCALARS + PER_STOP_STATE * (size_t)m->stop_count + (size_t)m->friction_count +
+    return SCALARS + PER_STOP_STATE * (size_t)m->stop_count + 2 * (size_t)m->rubbing_count +
            PER_CONTACT_STATE * (size_t)m->compliant_count + simulation->state.number_count;
 }
 
@@ -66,8 +66,9 @@ PRBM void simulation_save(const Simulation *simulation, double *to) {
         to = put_stop(state, i, to);
         to = m->stops[i].compliant ? put_contact(state, i, to) : to;
     }
-    for (int i = 0; i < m->friction_count; i++) {
+    for (int i = 0; i < m->rubbing_count; i++) {
         *to++ = state->modes[m->stop_count + i];
+        *to++ = state->sides[i];
     }
     memcpy(to, state->numbers, state->number_count * sizeof *to);
 }
@@ -178,9 +179,11 @@ static bool read_state(Simulation *sim, const double *from) {
             get_contact(state, i, &reader);
         }
     }
-    for (int i = 0; i < m->friction_count; i++) {
+    for (int i = 0; i < m->rubbing_count; i++) {
         state->modes[m->stop_count + i] =
             (ContactMode)get_integer(&reader, CONTACT_FRICTIONLESS, CONTACT_SLIP_NEGATIVE);
+        state->sides[i] = get_integer(&reader, i < m->friction_count ? 1 : -1, 1);
+        reader.sound = reader.sound && state->sides[i] != 0;
     }
     for (size_t i = 0; i < state->number_count; i++) {
         state->numbers[i] = get_number(&reader);
@@ -193,9 +196,10 @@ static bool consistent(const Simulation *sim) {
     const State *state = &sim->state;
     const Mechanism *m = sim->configuration.mechanism;
     EventKind kind = state->pending.kind;
-    bool friction = kind == EVENT_SLIP || kind == EVENT_REVERSAL;
-    int contacts = friction ? contact_count(sim) : m->stop_count;
-    if (state->step_size < 0.0 || (kind != EVENT_NONE && state->pending.contact >= contacts)) {
+    bool friction = kind == EVENT_SLIP || kind == EVENT_REVERSAL || kind == EVENT_SIDE;
+    int first = kind == EVENT_SIDE ? m->stop_count + m->friction_count : 0;
+    int end = friction ? contact_count(sim) : m->stop_count, contact = state->pending.contact;
+    if (state->step_size < 0.0 || (kind != EVENT_NONE && (contact < first || contact >= end))) {
         return false;
     }
     return !state->started ||

@@ -107,6 +107,7 @@ typedef struct {
     double point;         /* the last communication point; in model exchange the last event */
     double longest;       /* recent longest communication step, at most a tenth of the period */
     ContactMode *modes;   /* (s + f,) of the contacts */
+    int *sides;           /* (f,) to which slipping guides push, see ContactState */
     bool *driven;         /* (s,): whether stop.velocity has ever been non-zero */
     ContactPhase *touching;   /* (s,) contacts at compliant stops */
     ContactStart *touches;       /* (s,) */
