@@ -37,6 +37,7 @@
 #include "core/compliance.h"
 #include "core/equations.h"
 #include "core/evaluated.h"
+#include "core/friction.h"
 #include "core/evaluation.h"
 #include "core/gaps.h"
 #include "core/dynamics.h"

@@ -48,6 +48,7 @@
 #include "core/compliance.c"
 #include "core/equations.c"
 #include "core/gaps.c"
+#include "core/friction.c"
 #include "core/evaluation.c"
 #include "core/dynamics.c"
 #include "core/sections.c"

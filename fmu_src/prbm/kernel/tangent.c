@@ -1,6 +1,7 @@
 /* Directional derivatives: exact changes of all values along changes of states and inputs. */
 #include <string.h>
 
+#include "core/friction.h"
 #include "hybrid/access.h"
 #include "hybrid/present.h"
 #include "dependents.h"

@@ -1,4 +1,5 @@
 /* Directional derivatives of the contacts at compliant stops. */
+#include "core/friction.h"
 #include "core/gaps.h"
 #include "core/vectors.h"
 #include "hybrid/access.h"

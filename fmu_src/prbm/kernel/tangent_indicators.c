@@ -1,4 +1,5 @@
 /* Directional derivatives of the event indicators. */
+#include "core/friction.h"
 #include "core/gaps.h"
 #include "hybrid/access.h"
 #include "hybrid/events.h"

@@ -1,4 +1,5 @@
 /* Changes of rows, gaps and rates along a tangent. */
+#include "core/friction.h"
 #include "tangent_rows.h"
 
 PRBM Complex times_i(Complex z) {

@@ -1,6 +1,7 @@
 /* Directional derivatives of the stress of flexures. */
 #include <string.h>
 
+#include "core/friction.h"
 #include "core/sections.h"
 #include "core/vectors.h"
 #include "tangent_contact.h"

@@ -1,6 +1,7 @@
 /* Rates of the state, powers, stops and base reactions: the twin of mechanics/dynamics.py. */
 #include "core/dynamics.h"
 #include "core/forces.h"
+#include "core/friction.h"
 #include "core/vectors.h"
 
 /* The power that friction dissipates. */

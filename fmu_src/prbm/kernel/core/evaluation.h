@@ -18,7 +18,6 @@ PRBM bool evaluate_equations(const Equations *equations, double t, const double 
 PRBM bool factor_equations(const Equations *equations, const double *q, const double *v,
                            const Reference *near, Evaluation *result, Problem *problem);
 PRBM double kinetic_energy_of(const Evaluation *evaluation);
-PRBM double rub_limit(const Equations *equations, int i, const Complex *e);
 SHARED void directions_of(int even, const System *system, const Reference *near, Kinematics *at);
 SHARED void arms_at(int even, const System *system, const Reference *near, Kinematics *at);
 /* Compute the derivatives of the active rows by the directions, and their convective terms. */
@@ -31,12 +30,5 @@ SHARED bool motion_of_length(int even, const Equations *eq, const Reference *nea
 PRBM Kinematics place_kinematics(const System *system, Memory *memory);
 PRBM void zero_placed(const Memory *memory, size_t begin);
 PRBM void find_directions(const System *system, const Reference *near, Kinematics *at);
-PRBM double stop_force(const Equations *eq, const double *lam, int stop);
-PRBM double side_force(const Equations *eq, const double *lam, int contact);
-PRBM double stick_force(const Equations *eq, const double *lam, int contact);
-PRBM double friction_limit(const Equations *eq, const Complex *e, const Evaluation *found,
-                           int contact);
-PRBM double slip_force(const Equations *eq, const Complex *e, const Evaluation *found,
-                       int contact);
 
 #endif

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/elements.h"
+#include "core/friction.h"
 #include "core/matrix.h"
 #include "core/sections.h"
 #include "core/vectors.h"

@@ -2,6 +2,7 @@
  * twin of hybrid/compliant.py. */
 #include <math.h>
 
+#include "core/friction.h"
 #include "core/matrix.h"
 #include "core/modal.h"
 #include "core/vectors.h"

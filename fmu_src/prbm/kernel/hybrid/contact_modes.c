@@ -2,6 +2,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/friction.h"
 #include "core/gaps.h"
 #include "hybrid/access.h"
 #include "hybrid/configuration.h"

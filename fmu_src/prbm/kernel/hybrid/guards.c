@@ -2,6 +2,7 @@
  * a step: the twin of hybrid/guards.py. */
 #include <math.h>
 
+#include "core/friction.h"
 #include "core/gaps.h"
 #include "hybrid/access.h"
 #include "hybrid/arc.h"

@@ -1,6 +1,7 @@
 /* Forces of all contacts at rest together: the twin of hybrid/rest.py. */
 #include <math.h>
 
+#include "core/friction.h"
 #include "core/gaps.h"
 #include "core/vectors.h"
 #include "hybrid/access.h"
