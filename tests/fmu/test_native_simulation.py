@@ -734,7 +734,10 @@ def test_values_in_initialization_mode_follow_the_parameters(native, model, fmi,
     placed, size = it.released, abs(it.displacement)
     assert abs(softer[placed]) == pytest.approx(size, abs=1e-12)  # Tolerance of the statics.
     assert stiffer[placed] == pytest.approx(0.5 * softer[placed], abs=1e-12)
-    assert stiffer["mode.frequency"] > softer["mode.frequency"] > 0.0
+    if simulation(model).instability().rest:
+        assert stiffer["mode.frequency"] == softer["mode.frequency"] == 0.0
+    else:
+        assert stiffer["mode.frequency"] > softer["mode.frequency"] > 0.0
 
 
 @interfaces

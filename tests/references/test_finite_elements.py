@@ -306,7 +306,7 @@ def test_the_free_pmma_guide_has_the_reference_frequency_and_amplitude():
     assert 26.2e-3 < x.max() < 28.1e-3
 
 
-RIGID = {"SliderCrank"}  # Without flexures.
+RIGID = {"SliderCrank", "ToggleLatch"}  # Without flexures.
 PROFILED = ("CurvedBistable", "NotchGuide")
 
 

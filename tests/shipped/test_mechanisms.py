@@ -19,7 +19,7 @@ PRESSED = {
     "Bistable": "far_stop", "Cantilever": "stop", "CurvedBistable": "far_stop",
     "FoldedSuspension": "stop", "GuideBeam": "stop", "NotchGuide": "stop",
     "PRBDM": "stop", "PRBDM2R": "stop", "PRBDM2RAxial": "stop", "PRBDM3R": "stop",
-    "SliderCrank": "stop",
+    "SliderCrank": "stop", "ToggleLatch": "right",
 }  # fmt: skip
 """The stops on which mechanisms come to rest."""
 

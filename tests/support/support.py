@@ -52,6 +52,7 @@ GUIDES = ("PRBDM", "PRBDM2R")
 IMPACT_END_TIMES = {
     "Bistable": 0.09, "Cantilever": 0.24, "FoldedSuspension": 0.135, "ImpactOscillator": 0.12,
     "PRBDM2RAxial": 0.045, "PRBDM3R": 0.048, "CurvedBistable": 0.01, "NotchGuide": 0.02,
+    "ToggleLatch": 0.03,
 }  # fmt: skip
 """Times [s] before which the default experiment has an impact; 0.3 s for other mechanisms."""
 
@@ -185,11 +186,14 @@ def simulation(name: str, values=None, **options) -> Simulation:
 
 @cache
 def fastest(name: str) -> float:
-    """Return the circular frequency of the fastest mode at release [rad/s]."""
+    """Return the circular frequency of the fastest mode at release [rad/s].
+
+    The frequency of an unstable mode, which may be the only one, is negative.
+    """
     guide = mechanism(name)
     system = assemble(guide, guide.values())
     shape = equilibrium(system, system.values["release.displacement"])
-    return 2.0 * math.pi * float(modes(system, shape).frequency.max())
+    return 2.0 * math.pi * float(np.abs(modes(system, shape).frequency).max())
 
 
 @cache
