@@ -9,6 +9,8 @@ from ..mechanism.expressions import Quantity
 from .tables import Named, RepeatTable
 from .values import LineOrLines, Reference, measured
 
+COPYING = ("mirror", "repeat")  # Keys that are no fields of parts.
+
 
 # Each field has an object of its own: releases of pydantic before 2.12 change it with its class.
 def mirror_key() -> Any:
@@ -27,6 +29,8 @@ class JointTable(Named):
     start: Reference = Field(description="First point, body.point or ground.point")
     end: Reference = Field(description="Second point, body.point or ground.point")
     stiffness: Annotated[Quantity, measured(parts.Joint, "stiffness")] | None = None
+    free_angle: Annotated[Quantity, measured(parts.Joint, "free_angle")] | None = None
+    damping: Annotated[Quantity, measured(parts.Joint, "damping")] | None = None
     mirror: LineOrLines = mirror_key()
     repeat: RepeatTable | None = repeat_key()
 
@@ -67,13 +71,14 @@ class GuideTable(Named):
 
 def joint_of(table: JointTable) -> parts.Joint:
     """Return the joint of a table."""
-    return parts.Joint(table.name, table.start, table.end, table.stiffness)
+    given = dict(table)
+    return parts.Joint(**{key: given[key] for key in given if key not in COPYING})
 
 
 def spring_of(table: SpringTable) -> parts.Spring:
     """Return the spring of a table."""
     given = dict(table)
-    return parts.Spring(**{key: given[key] for key in given if key not in ("mirror", "repeat")})
+    return parts.Spring(**{key: given[key] for key in given if key not in COPYING})
 
 
 def guide_of(table: GuideTable) -> parts.Guide:

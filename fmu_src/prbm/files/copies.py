@@ -201,6 +201,8 @@ class Drawing:
                         f"{_key(chain)}, or change the line or the displacement"
                     )
                 changed: dict[str, Any] = {"name": _name(table.name, chain), **ends}
+                if isinstance(part, Joint) and part.free_angle is not None and _mirrored(chain):
+                    changed["free_angle"] = written(affine(part.free_angle).scaled(-1.0))
                 yield replace(part, **changed)
 
     def _image(self, reference: str, chain: Chain, user: str) -> str:
@@ -261,10 +263,7 @@ def mirrored_types(
     curved = {k.name for k in types if any(getattr(k, f) is not None for f in SIGNED)}
     added: dict[str, FlexureType] = {}
     mirrored = {
-        _name(table.name, chain)
-        for table in tables
-        for chain in _chains(table)
-        if sum(bool(image.exchanged) for image in chain) % 2
+        _name(table.name, chain) for table in tables for chain in _chains(table) if _mirrored(chain)
     }
     result = []
     for flexure in flexures:
@@ -317,6 +316,11 @@ def _repeated(table: Copied) -> Iterator[Image]:
 def _name(name: str, chain: Chain) -> str:
     """Return the name of a copy."""
     return reduce(lambda text, image: image.name(text), chain, name)
+
+
+def _mirrored(chain: Chain) -> bool:
+    """Return whether a copy turns in the opposite direction."""
+    return sum(bool(image.exchanged) for image in chain) % 2 == 1
 
 
 def _key(chain: Chain) -> str:

@@ -24,7 +24,7 @@ UNIT_LENGTH_MAX = 100  # characters
 EXPONENT_MAX = 20  # Exponent of a base unit; no quantity of mechanics has a larger one.
 COHERENT = (
     "m", "kg", "s", "rad", "N", "Pa", "kg/m3", "kg.m2", "N/m", "N.m", "m/s", "m/s2", "Hz", "rad/s",
-    "1/m", "N.m/rad", "N/m3", "N.s/m",
+    "1/m", "N.m/rad", "N/m3", "N.s/m", "N.m.s/rad",
 )  # fmt: skip
 DEGREE = Decimal("0.017453292519943295769236907685")  # rad
 Factors = dict[str, int | Decimal]

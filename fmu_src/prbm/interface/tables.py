@@ -20,6 +20,7 @@ from ..mechanism.description import Mechanism
 from ..mechanism.expressions import Affine, Quantity, affine
 from ..mechanism.flexure import ENDS, PROFILES
 from ..mechanism.parts import (
+    FIELDS,
     GROUND,
     Flexure,
     FlexureType,
@@ -54,7 +55,7 @@ from .variables import (
 )
 
 FILE = "mechanism.bin"
-MAGIC, VERSION = b"PRBM", 11
+MAGIC, VERSION = b"PRBM", 12
 HEAD = 16  # Bytes before those that the checksum covers.
 DIMENSIONS = (
     "end_thickness", "end_width", "notch_radius", "notch_depth", "waist_length", "curvature",
@@ -270,7 +271,8 @@ class _Writer:
             yield _u32(*map(ENDS.index, flexure.ends))
         for joint in m.joints:
             yield _text(joint.name) + self._between(joint)
-            yield _u32(joint.stiffness is not None) + self._fields(joint)
+            given = (getattr(joint, name) is not None for name in FIELDS[Joint])
+            yield _u32(*given) + self._fields(joint)
         for spring in m.springs:
             yield _text(spring.name) + self._between(spring)
             yield _u32(spring.free_length is not None) + self._fields(spring)

@@ -51,6 +51,12 @@ PRBM void element_change(const Tangent *t) {
             t->dx[i] -= system->K[i * n + j] * (t->dq[j] + eq->beta * t->dv[j]);
         }
     }
+    for (int k = 0; k < system->torsion_count; k++) {
+        const Torsion *torsion = &system->torsions[k];
+        double damping = eq->beta * torsion->stiffness + torsion->damping;
+        double change = torsion->stiffness * turn_of(torsion, t->dq) + damping * turn_of(torsion, t->dv);
+        turn_back(torsion, change, t->dx);
+    }
     for (int k = 0; k < system->coil_count; k++) {
         SpringMotion x = spring_motion(t, k);
         Complex force = conjugate(end_force(&x));
@@ -74,6 +80,11 @@ PRBM double element_energy_change(const Tangent *t) {
             sum += (t->y[i] - system->rest[i]) * system->K[i * n + j] * t->dq[j];
         }
     }
+    for (int k = 0; k < system->torsion_count; k++) {
+        const Torsion *torsion = &system->torsions[k];
+        double twist = twist_of(system, torsion, t->y, 1.0);
+        sum += torsion->stiffness * twist * turn_of(torsion, t->dq);
+    }
     for (int k = 0; k < system->coil_count; k++) {
         SpringMotion x = spring_motion(t, k);
         sum += x.tension * x.dlength;
@@ -89,6 +100,11 @@ PRBM double element_loss_change(const Tangent *t) {
         for (int j = 0; j < n; j++) {
             sum += 2.0 * t->eq->beta * t->v[i] * system->K[i * n + j] * t->dv[j];
         }
+    }
+    for (int k = 0; k < system->torsion_count; k++) {
+        const Torsion *torsion = &system->torsions[k];
+        double damping = t->eq->beta * torsion->stiffness + torsion->damping;
+        sum += 2.0 * damping * turn_of(torsion, t->v) * turn_of(torsion, t->dv);
     }
     for (int k = 0; k < system->coil_count; k++) {
         SpringMotion x = spring_motion(t, k);

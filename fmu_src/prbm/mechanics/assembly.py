@@ -155,9 +155,6 @@ class _Assembler(Collection):
             self.close(joint.name, place, self.on(far, z_end))
         else:
             self.reach(far, place, z_end, self.turn(far))
-        if joint.stiffness is not None:
-            near, turned = (self.angle(self.index[body]) for body in (body_of(start), far))
-            self.spring(value(joint, "stiffness", self.values), near, turned)
         self.connect(body_of(start), far, known)
         self.lines.append((joint.name, "joint", [place], NO_THICKNESS))
 
@@ -191,6 +188,7 @@ class _Assembler(Collection):
             H=spread.conj().T @ (m[:, None] * spread),
             J=np.array(self.J),
             K=self.stiffness(),
+            turns=self.turns(),
             A=A,
             c=np.array([place.c for place, _ in self.masses]),
             m=m,
@@ -234,6 +232,17 @@ class _Assembler(Collection):
         ends = [self.on(guide.on, self.end(guide, end)) for end in (guide.start, guide.end)]
         self.lines.append((guide.name, "guide", ends, NO_THICKNESS))
         return GuideRows(k[0], None if guide.turning else k[1], 1j * self.line(guide))
+
+    def turns(self) -> Real:
+        """Return the rotations at joints with torsion, the end relative to the start, (k, n)."""
+        joints = [joint for joint in self.mechanism.joints if joint.elastic]
+        rows = np.zeros((len(joints), len(self.q0)))
+        for row, joint in zip(rows, joints, strict=True):
+            for sign, end in ((-1.0, joint.start), (1.0, joint.end)):
+                j = self.angle(self.index[body_of(end)])
+                if j is not None:
+                    row[j] += sign
+        return rows
 
     def span_arrays(self, d: int) -> dict[str, Any]:
         """Return the rows of the vectors along the springs and their constants."""

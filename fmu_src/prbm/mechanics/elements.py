@@ -1,8 +1,11 @@
-r"""Elements with energy: flexures and torsion at joints, and springs between points.
+r"""Elements with energy: flexures, torsion at joints, and springs between points.
 
 All implement one interface, :class:`Element`: force, tangent stiffness, energy, damping, and bounds
 of the fastest rate.  Equations of motion, statics, modes, linear models, scales and the stable step
 read :class:`Elements`, the sum of all.
+
+Torsion at a joint is a function of the rotation phi of one body relative to the other since the
+drawn shape, with the moment k (phi - phi0) + (beta k + c) phi' that turns them back.
 
 A spring is a function of the distance l of its ends, z = c + A E from its start to its end,
 
@@ -31,6 +34,9 @@ from .system import Rows, System
 
 class Element(Protocol):
     """An element, or several, with elastic energy and damping."""
+
+    damped: bool
+    """Whether there is damping that is not in proportion to stiffness."""
 
     def force(self, q: Real, e: Complex, share: float = 1.0) -> Real:
         """Return the elastic forces along the coordinates, (n,) [N m], [N].
@@ -61,7 +67,9 @@ class Element(Protocol):
 
 
 class Bending:
-    """Flexures and torsion at joints: springs between coordinates, with the matrix K."""
+    """Flexures: springs between coordinates, with the matrix K."""
+
+    damped = False
 
     def __init__(self, system: System) -> None:
         self.K, self.q0, self.rest = system.K, system.q0, system.rest
@@ -99,6 +107,63 @@ class Bending:
     def viscous(self, e: Complex) -> Real:
         """Return zeros: all damping is in proportion to stiffness."""
         return np.zeros_like(self.K)
+
+
+class Torsion:
+    """Torsion springs and dampers at joints: constant rows of rotations phi between two bodies."""
+
+    def __init__(self, system: System) -> None:
+        joints = [joint for joint in system.mechanism.joints if joint.elastic]
+        self.rows, self.q0 = system.turns, system.q0
+        self.rates, self.free, self.dampers = (
+            np.array([value(j, name, system.values) if getattr(j, name) is not None else 0.0
+                      for j in joints])
+            for name in ("stiffness", "free_angle", "damping")
+        )  # fmt: skip
+        self.K: Real = (self.rows.T * self.rates) @ self.rows
+        self.C: Real = (self.rows.T * self.dampers) @ self.rows
+        self.damped = bool(np.any(self.dampers))
+
+    def twists(self, q: Real, share: float = 1.0) -> Real:
+        """Return phi - phi0, with a share of the free angles, (k,) [rad]."""
+        result: Real = self.rows @ (q - self.q0) - share * self.free
+        return result
+
+    def force(self, q: Real, e: Complex, share: float = 1.0) -> Real:
+        """Return -k (phi - phi0) dphi/dq."""
+        result: Real = -(self.rates * self.twists(q, share)) @ self.rows
+        return result
+
+    def motion_force(self, q: Real, e: Complex, v: Real, beta: float) -> Real:
+        """Return -(k (phi - phi0) + (beta k + c) phi') dphi/dq."""
+        damping = beta * self.rates + self.dampers
+        moment = self.rates * self.twists(q) + damping * (self.rows @ v)
+        result: Real = -moment @ self.rows
+        return result
+
+    def tangent(self, e: Complex, share: float = 1.0) -> Real:
+        """Return the sum of k dphi/dq dphi/dq^T."""
+        return self.K
+
+    def energy(self, q: Real, e: Complex) -> float:
+        """Return the sum of k (phi - phi0)^2/2 [J]."""
+        return 0.5 * float(self.rates @ self.twists(q) ** 2)
+
+    def damping(self, e: Complex, beta: float) -> Real:
+        """Return the sum of (beta k + c) dphi/dq dphi/dq^T."""
+        return beta * self.K + self.C
+
+    def loss(self, e: Complex, v: Real, beta: float) -> float:
+        """Return the sum of (beta k + c) phi'^2 [W]."""
+        return float((beta * self.rates + self.dampers) @ (self.rows @ v) ** 2)
+
+    def stiffness(self, e: Complex) -> Real:
+        """Return the sum of k dphi/dq dphi/dq^T."""
+        return self.K
+
+    def viscous(self, e: Complex) -> Real:
+        """Return the sum of c dphi/dq dphi/dq^T."""
+        return self.C
 
 
 class SpringLaw(NamedTuple):
@@ -303,11 +368,10 @@ class Elements:
 
     def __init__(self, system: System) -> None:
         self.system = system
-        self.bending = Bending(system)
         self.springs = Springs(system) if system.mechanism.springs else None
-        self.parts: tuple[Element, ...] = (
-            (self.bending,) if self.springs is None else (self.bending, self.springs)
-        )
+        torsion = Torsion(system) if len(system.turns) else None
+        self.parts: list[Element] = [Bending(system)]
+        self.parts += [part for part in (torsion, self.springs) if part is not None]
 
     @cached_property
     def drawn(self) -> Real:
@@ -344,9 +408,8 @@ class Elements:
 
     def viscous(self, e: Complex) -> Real | None:
         """Return the damping that is not in proportion to stiffness, (n, n); None: none."""
-        if self.springs is None or not self.springs.damped:
-            return None
-        return self.springs.viscous(e)
+        damped = [part for part in self.parts if part.damped]
+        return _sum([part.viscous(e) for part in damped]) if damped else None
 
 
 def _sum(parts: list[Real]) -> Real:

@@ -11,7 +11,7 @@ from ..base.errors import ParameterError
 from ..mechanism.description import Mechanism
 from ..mechanism.expressions import affine
 from ..mechanism.flexure import NOTCH, PIN, TAPER, Segments, segments
-from ..mechanism.parts import Flexure, FlexureType, body_of, check_slender, value
+from ..mechanism.parts import Flexure, FlexureType, body_of, value
 from .arrays import Complex, Real
 from .beam import Beam, Material
 from .collection import ROD_POINTS, Collection
@@ -50,6 +50,39 @@ def check_drawn(parts: Collection, flexure: Flexure, kind: FlexureType) -> None:
         _panels(parts, flexure, kind, _line(parts, flexure, kind).length, model.nodes)
     else:
         _segments(parts, flexure, kind)
+
+
+def check_slender(
+    flexure: Flexure, kind: FlexureType, length: float, values: Mapping[str, float]
+) -> None:
+    """Reject a flexure without length, or as thick as long, which is mostly a mistake of units.
+
+    Parameters
+    ----------
+    flexure, kind : Flexure, FlexureType
+        The flexure and its type.
+    length : float
+        Distance of its ends as drawn [m].
+    values : mapping
+        Values of all parameters.
+
+    Raises
+    ------
+    ParameterError
+        If the length is zero, or the thickness is not below the length.
+    """
+    if not length > 0.0:
+        raise ParameterError(
+            f"flexure {flexure.name} from {flexure.start} to {flexure.end} has the length "
+            f"{length:g} m: move its ends apart"
+        )
+    for name in ("thickness", "end_thickness") if kind.profile == TAPER else ("thickness",):
+        thickness = value(kind, name, values)
+        if not thickness < length:
+            raise ParameterError(
+                f"{kind.name}.{name} = {thickness:g} m is not less than the length of the flexure "
+                f"{flexure.name}, {length:g} m: check the units of both"
+            )
 
 
 def _segments(parts: Collection, flexure: Flexure, kind: FlexureType) -> Segments:

@@ -252,8 +252,10 @@ class System:
     J : (d,)
         Rotary inertia of each body about the mass centres of its parts [kg m^2].
     K : (n, n)
-        Flexures and joints: elastic energy (q - rest)^T K (q - rest) / 2 [N m/rad], [N m].  All
-        elements with energy are in :class:`prbm.mechanics.elements.Elements`.
+        Flexures: elastic energy (q - rest)^T K (q - rest) / 2 [N m/rad], [N m].  All elements with
+        energy are in :class:`prbm.mechanics.elements.Elements`.
+    turns : (k, n)
+        Rotations at joints with torsion, of the end's body relative to the start's [rad/rad].
     A, c, m : (p, d) complex, (p,) complex, (p,)
         Mass points z = c + A E [m] and their masses [kg].
     loops, loops_c, loops_z, loops_on : (r, d) complex, (r,), (r,) complex, (r,) int
@@ -322,6 +324,7 @@ class System:
     H: Complex
     J: Real
     K: Real
+    turns: Real
     A: Complex
     c: Complex
     m: Real

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from ..base.errors import ParameterError
+from ..base.errors import MechanismError
 from .expressions import Quantity, affine
 from .flexure import CLAMP, LEAF, NOTCH, TAPER
 
@@ -196,14 +196,42 @@ class Flexure:
 class Joint:
     """A pin between two points, each ``body.point``, that are drawn at the same position.
 
-    With a torsional ``stiffness`` [N m/rad], a spring without a moment in the drawn shape joins the
-    bodies.
+    With a ``stiffness`` or a ``damping``, torsion k (phi - phi0) + c phi' turns the bodies back.
+    The angle phi is the rotation of the body of the end relative to that of the start since the
+    drawn shape, counter-clockwise.
+
+    Parameters
+    ----------
+    name : str
+        Prefix of its parameters, for instance ``joint``.
+    start, end : str
+        The two points.
+    stiffness : Quantity or None
+        Torsional stiffness k [N m/rad]; None: no spring.
+    free_angle : Quantity or None
+        Angle phi0 without a moment of the spring [rad]; None: 0, as drawn.
+    damping : Quantity or None
+        Coefficient c of viscous damping [N m s/rad]; None: no damper.
     """
 
     name: str
     start: str
     end: str
     stiffness: Quantity | None = None
+    free_angle: Quantity | None = None
+    damping: Quantity | None = None
+
+    def __post_init__(self) -> None:
+        if self.free_angle is not None and self.stiffness is None:
+            raise MechanismError(
+                f"{self.name}.free_angle: the joint has no spring; add stiffness, or remove "
+                "free_angle"
+            )
+
+    @property
+    def elastic(self) -> bool:
+        """Whether a spring or a damper joins the bodies."""
+        return self.stiffness is not None or self.damping is not None
 
 
 @dataclass(frozen=True)
@@ -512,7 +540,15 @@ FIELDS: dict[type, dict[str, tuple[str, str, float, float, float | None, bool]]]
     },
     Joint: {
         "stiffness": _meta(
-            "N.m/rad", "Torsional stiffness, without a moment in the drawn shape", 0.0, 1e12, 1.0
+            "N.m/rad", "Torsional stiffness", 0.0, 1e12, 1.0
+        ),
+        "free_angle": _meta(
+            "rad", "Rotation from the drawn shape without a moment, of the body of the end relative "
+            "to that of the start",
+            -ANGLE_MAX, ANGLE_MAX, 0.1,
+        ),
+        "damping": _meta(
+            "N.m.s/rad", "Coefficient of viscous damping of the rotation", 0.0, 1e12, 1e-3
         ),
     },
     Spring: {
@@ -629,39 +665,6 @@ def value(part: Part, name: str, values: Mapping[str, float]) -> float:
     if isinstance(quantity, str):
         return affine(quantity)(values)
     return values[f"{part.name}.{name}"]
-
-
-def check_slender(
-    flexure: Flexure, kind: FlexureType, length: float, values: Mapping[str, float]
-) -> None:
-    """Reject a flexure without length, or as thick as long, which is mostly a mistake of units.
-
-    Parameters
-    ----------
-    flexure, kind : Flexure, FlexureType
-        The flexure and its type.
-    length : float
-        Distance of its ends as drawn [m].
-    values : mapping
-        Values of all parameters.
-
-    Raises
-    ------
-    ParameterError
-        If the length is zero, or the thickness is not below the length.
-    """
-    if not length > 0.0:
-        raise ParameterError(
-            f"flexure {flexure.name} from {flexure.start} to {flexure.end} has the length "
-            f"{length:g} m: move its ends apart"
-        )
-    for name in ("thickness", "end_thickness") if kind.profile == TAPER else ("thickness",):
-        thickness = value(kind, name, values)
-        if not thickness < length:
-            raise ParameterError(
-                f"{kind.name}.{name} = {thickness:g} m is not less than the length of the flexure "
-                f"{flexure.name}, {length:g} m: check the units of both"
-            )
 
 
 def body_of(reference: str) -> str:

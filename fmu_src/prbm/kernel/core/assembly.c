@@ -16,12 +16,6 @@
 
 /* --- flexures, joints and free bodies, from the ground outwards ------------------------------- */
 
-/* Return the coordinate that rotates a body; FIXED: the ground. */
-static int rotation_of_body(const System *system, int body) {
-    int j = system->origins[body].j;
-    return j == FIXED ? FIXED : angle_of(system, j);
-}
-
 static bool walk_joint(System *system, const Step *step, Scratch *scratch, Problem *problem) {
     Span span = span_of(system, step);
     double apart = modulus(minus(span.z_end, span.z_start));
@@ -38,10 +32,6 @@ static bool walk_joint(System *system, const Step *step, Scratch *scratch, Probl
         close_loop(system, &spot, &other);
     } else {
         reach(system, span.far, &spot, span.z_end, step->first_direction);
-    }
-    if (step->joint->elastic) {
-        add_spring(system, evaluate(step->joint->stiffness, system->values),
-                   rotation_of_body(system, span.root), rotation_of_body(system, span.far));
     }
     return true;
 }
@@ -546,15 +536,39 @@ static bool add_coil(System *system, int k, Scratch *scratch, Problem *problem) 
     return true;
 }
 
-/* Add the coil springs, and compute the stiffness of the drawn shape. */
-static bool add_coils(System *system, Scratch *scratch, Problem *problem) {
+/* Return the coordinate that rotates a body; FIXED: the ground. */
+static int rotation_of_body(const System *system, int body) {
+    int j = system->origins[body].j;
+    return j == FIXED ? FIXED : angle_of(system, j);
+}
+
+/* Set the torsion at all joints. */
+static void add_torsions(System *system) {
+    const Mechanism *m = system->mechanism;
+    Torsion *torsion = system->torsions;
+    for (int i = 0; i < m->joint_count; i++) {
+        const Joint *joint = &m->joints[i];
+        if (joint->sprung || joint->damped) {
+            torsion->stiffness = joint->sprung ? evaluate(joint->stiffness, system->values) : 0.0;
+            torsion->damping = joint->damped ? evaluate(joint->damping, system->values) : 0.0;
+            torsion->free_angle = joint->turned ? evaluate(joint->free_angle, system->values) : 0.0;
+            torsion->a = rotation_of_body(system, joint->between.start);
+            torsion->b = rotation_of_body(system, joint->between.end);
+            torsion++;
+        }
+    }
+}
+
+/* Add torsion and coil springs, and compute the stiffness of the drawn shape. */
+static bool add_elements(System *system, Scratch *scratch, Problem *problem) {
     bool ok = true;
+    add_torsions(system);
     for (int k = 0; ok && k < system->coil_count; k++) {
         size_t mark = scratch->used;
         ok = add_coil(system, k, scratch, problem);
         scratch->used = mark;
     }
-    if (ok && system->coil_count > 0) {
+    if (ok && system->stiffness != system->K) {
         element_stiffness(system, system->e0, system->stiffness, scratch);
     }
     return ok;
@@ -591,7 +605,7 @@ PRBM bool assemble(System *system, const double *values, Scratch *scratch, Probl
     bool ok = stubs(system, scratch, problem) && walk_all(system, scratch, problem);
     if (ok) {
         add_arrays(system, scratch);
-        ok = add_coils(system, scratch, problem) && add_guides(system, scratch, problem) &&
+        ok = add_elements(system, scratch, problem) && add_guides(system, scratch, problem) &&
              check_loops(system, system->e0, scratch, problem) &&
              check_masses(system, system->e0, scratch, problem);
     }

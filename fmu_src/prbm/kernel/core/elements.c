@@ -5,6 +5,55 @@
 #include "core/forces.h"
 #include "core/matrix.h"
 
+/* --- torsion at joints ------------------------------------------------------------------------ */
+
+PRBM double turn_of(const Torsion *torsion, const double *x) {
+    double a = torsion->a == FIXED ? 0.0 : x[torsion->a];
+    double b = torsion->b == FIXED ? 0.0 : x[torsion->b];
+    return b - a;
+}
+
+PRBM double twist_of(const System *system, const Torsion *torsion, const double *q, double share) {
+    return turn_of(torsion, q) - turn_of(torsion, system->q0) - share * torsion->free_angle;
+}
+
+PRBM void turn_back(const Torsion *torsion, double moment, double *force) {
+    if (torsion->a != FIXED) {
+        force[torsion->a] += moment;
+    }
+    if (torsion->b != FIXED) {
+        force[torsion->b] -= moment;
+    }
+}
+
+/* Add the moments of torsion to force (n,), and return the power that they dissipate. */
+static double add_torsion_forces(const System *system, double beta, const double *q, const double *v,
+                                 double *force) {
+    double loss = 0.0;
+    for (int k = 0; k < system->torsion_count; k++) {
+        const Torsion *torsion = &system->torsions[k];
+        double rate = turn_of(torsion, v);
+        double damper = (beta * torsion->stiffness + torsion->damping) * rate;
+        double twist = twist_of(system, torsion, q, 1.0);
+        turn_back(torsion, torsion->stiffness * twist + damper, force);
+        loss += damper * rate;
+    }
+    return loss;
+}
+
+/* Add the stiffness of torsion to K (n, n). */
+static void add_torsion_stiffness(const System *system, double *K) {
+    for (int k = 0; k < system->torsion_count; k++) {
+        const Torsion *torsion = &system->torsions[k];
+        if (torsion->a != FIXED) {
+            turn_back(torsion, torsion->stiffness, K + torsion->a * system->n);
+        }
+        if (torsion->b != FIXED) {
+            turn_back(torsion, -torsion->stiffness, K + torsion->b * system->n);
+        }
+    }
+}
+
 /* --- springs ---------------------------------------------------------------------------------- */
 
 PRBM double spring_tension(const SpringLaw *law, double x) {
@@ -55,8 +104,9 @@ PRBM void length_gradient(const System *system, int k, const Complex *e, double 
     span_gradient(system, k, scaled(1.0 / now.length, now.along), e, row);
 }
 
-PRBM double add_coil_forces(const System *system, const Complex *e, const double *v, double *force,
-                            double *row) {
+/* Add the forces of springs and dampers to force (n,), and return the power that they dissipate. */
+static double add_coil_forces(const System *system, const Complex *e, const double *v, double *force,
+                              double *row) {
     double loss = 0.0;
     for (int k = 0; k < system->coil_count; k++) {
         SpringState now = spring_state(system, k, e, 1.0);
@@ -140,7 +190,42 @@ PRBM void add_geometric_stiffness(const System *system, const Complex *pull_of, 
 
 /* --- all elements ----------------------------------------------------------------------------- */
 
-/* Set the deflections (n,) of flexures and joints. */
+PRBM bool element_strained(const System *system) {
+    bool found = false;
+    for (int j = 0; j < system->n; j++) {
+        found = found || system->rest[j] != system->q0[j];
+    }
+    for (int k = 0; k < system->torsion_count; k++) {
+        found = found || system->torsions[k].free_angle != 0.0;
+    }
+    for (int k = 0; k < system->coil_count; k++) {
+        found = found || system->laws[k].free_length != system->laws[k].drawn_length;
+    }
+    return found;
+}
+
+PRBM double add_motion_forces(const System *system, double beta, const double *q, const Complex *e,
+                              const double *v, double *force, double *row) {
+    double loss = add_torsion_forces(system, beta, q, v, force);
+    return loss + add_coil_forces(system, e, v, force, row);
+}
+
+PRBM int damper_count(const System *system) {
+    return system->torsion_count + system->coil_count;
+}
+
+PRBM double damper_row(const System *system, int k, const Complex *e, double *row) {
+    int coil = k - system->torsion_count;
+    if (coil >= 0) {
+        length_gradient(system, coil, e, row);
+        return system->laws[coil].damping;
+    }
+    zeros(system->n, row);
+    turn_back(&system->torsions[k], -1.0, row);
+    return system->torsions[k].damping;
+}
+
+/* Set the deflections (n,) of flexures. */
 static void deflections(const System *system, const double *q, double share, double *turned) {
     for (int j = 0; j < system->n; j++) {
         double strain = system->rest[j] - system->q0[j];
@@ -154,6 +239,11 @@ PRBM void element_forces(const System *system, const double *q, const Complex *e
     double *row = take(scratch, (size_t)system->n);
     deflections(system, q, share, row);
     springs(system->n, system->K, row, force);
+    for (int k = 0; k < system->torsion_count; k++) {
+        const Torsion *torsion = &system->torsions[k];
+        double twist = twist_of(system, torsion, q, share);
+        turn_back(torsion, torsion->stiffness * twist, force);
+    }
     for (int k = 0; k < system->coil_count; k++) {
         SpringState now = spring_state(system, k, e, share);
         span_gradient(system, k, scaled(1.0 / now.length, now.along), e, row);
@@ -169,6 +259,7 @@ PRBM void element_tangent(const System *system, const Complex *e, double share, 
     double *row = take(scratch, (size_t)system->n);
     Complex *pulled = take_complex(scratch, d, 1);
     copy(system->n * system->n, system->K, K_t);
+    add_torsion_stiffness(system, K_t);
     for (int k = 0; k < system->coil_count; k++) {
         SpringState now = spring_state(system, k, e, share);
         Stiffnesses own = stiffnesses(&system->laws[k], &now);
@@ -188,6 +279,10 @@ PRBM double element_energy(const System *system, const double *q, const Complex 
     double *turned = take(scratch, (size_t)system->n);
     deflections(system, q, 1.0, turned);
     double energy = elastic_energy(system->n, system->K, turned);
+    for (int k = 0; k < system->torsion_count; k++) {
+        double twist = twist_of(system, &system->torsions[k], q, 1.0);
+        energy += 0.5 * system->torsions[k].stiffness * (twist * twist);
+    }
     for (int k = 0; k < system->coil_count; k++) {
         energy += spring_energy(&system->laws[k], spring_state(system, k, e, 1.0).elongation);
     }
@@ -199,6 +294,7 @@ PRBM void element_stiffness(const System *system, const Complex *e, double *K, S
     size_t mark = scratch->used;
     double *row = take(scratch, (size_t)system->n);
     copy(system->n * system->n, system->K, K);
+    add_torsion_stiffness(system, K);
     for (int k = 0; k < system->coil_count; k++) {
         SpringState now = spring_state(system, k, e, 1.0);
         Stiffnesses own = positive_stiffnesses(&system->laws[k], &now);
@@ -217,6 +313,10 @@ PRBM void element_torques(const System *system, const Complex *e, const double *
         double torque = system->spring[k].rate * (w[a] - w[b]);
         torques[a] += torque;
         torques[b] -= torque;
+    }
+    for (int k = 0; k < system->torsion_count; k++) {
+        const Torsion *torsion = &system->torsions[k];
+        turn_back(torsion, -torsion->stiffness * turn_of(torsion, w), torques);
     }
     for (int k = 0; k < system->coil_count; k++) {
         SpringState now = spring_state(system, k, e, 1.0);

@@ -1,4 +1,4 @@
-/* Elements with energy: flexures and torsion at joints, and springs between points.  Statics, modes,
+/* Elements with energy: flexures, torsion at joints, and springs between points.  Statics, modes,
  * the equations of motion, scales and the stable step read the sum of all. */
 #ifndef PRBM_ELEMENTS_H
 #define PRBM_ELEMENTS_H
@@ -12,6 +12,13 @@ typedef struct {
     double length, elongation, tension;
 } SpringState;
 
+/* Return the change of the rotation of a torsion for changes x (n,) of the coordinates. */
+PRBM double turn_of(const Torsion *torsion, const double *x);
+/* Return its rotation from that without a moment, with a share of its free angle [rad]. */
+PRBM double twist_of(const System *system, const Torsion *torsion, const double *q, double share);
+/* Add a moment against its rotation to force (n,). */
+PRBM void turn_back(const Torsion *torsion, double moment, double *force);
+
 PRBM double spring_tension(const SpringLaw *law, double x);
 PRBM double spring_slope(const SpringLaw *law, double x);
 PRBM double spring_energy(const SpringLaw *law, double x);
@@ -22,13 +29,20 @@ PRBM SpringState spring_state(const System *system, int k, const Complex *e, dou
 PRBM void span_gradient(const System *system, int k, Complex u, const Complex *e, double *row);
 /* Set row (n,) to the derivatives of the length of spring k. */
 PRBM void length_gradient(const System *system, int k, const Complex *e, double *row);
-/* Add the forces of springs and dampers to force (n,), and return the power that they dissipate.
- * row (n,) is working memory. */
-PRBM double add_coil_forces(const System *system, const Complex *e, const double *v, double *force,
-                            double *row);
 
+/* Add the forces of torsion and springs with their damping to force (n,), and return the power that
+ * they dissipate.  row (n,) is working memory. */
+PRBM double add_motion_forces(const System *system, double beta, const double *q, const Complex *e,
+                              const double *v, double *force, double *row);
+/* Return the number of dampers, whose damping is not in proportion to stiffness. */
+PRBM int damper_count(const System *system);
+/* Return the coefficient of damper k, and set row (n,) to the derivatives of its length or rotation. */
+PRBM double damper_row(const System *system, int k, const Complex *e, double *row);
+
+/* Return whether initial strains, free angles or the pretension of springs load the drawn shape. */
+PRBM bool element_strained(const System *system);
 /* Compute the elastic forces (n,) of all elements along the coordinates.  share: that of the initial
- * strains and of the pretension of springs. */
+ * strains, of the free angles and of the pretension of springs. */
 PRBM void element_forces(const System *system, const double *q, const Complex *e, double share,
                          double *force, Scratch *scratch);
 /* Set K_t (n, n) to minus the derivatives of these forces. */

@@ -180,7 +180,7 @@ static double coriolis(const System *system, const double *turn, int stretch_dir
     return -2.0 * turn[arm_of(system, stretch_direction)] * turn[stretch_direction];
 }
 
-/* Subtract the forces of springs and their damping from the loads, x -= K (q - q0 + beta v), and
+/* Subtract the forces of flexures and their damping from the loads, x -= K (q - q0 + beta v), and
  * compute the power beta v^T K v of the damping. */
 SIZED void add_springs(int even, const Equations *eq, Evaluation *result) {
     const System *system = eq->system;
@@ -613,9 +613,10 @@ SHARED bool motion_of_length(int even, const Equations *eq, const Reference *nea
         rows_dispatch(even, eq, &result->at, result->rows, result->lam);
     }
     add_springs(even, eq, result);
-    if (eq->system->coil_count > 0) {
-        result->spring_loss += add_coil_forces(eq->system, result->at.e, result->at.speed, result->a,
-                                               result->row);
+    if (damper_count(eq->system) > 0) {
+        const Kinematics *at = &result->at;
+        result->spring_loss += add_motion_forces(eq->system, eq->beta, at->angle, at->e, at->speed,
+                                                 result->a, result->row);
     }
     if (eq->contacts_or_walls) {
         add_contacts_and_walls(eq, result);

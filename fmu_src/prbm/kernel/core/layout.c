@@ -125,9 +125,6 @@ PRBM void count_coordinates(Reader *reader, Mechanism *m) {
                           : 0;
         m->beam_size = size > m->beam_size ? size : m->beam_size;
     }
-    for (int i = 0; i < m->joint_count && !reader->wrong; i++) {
-        springs += m->joints[i].elastic;
-    }
     long long parts = (long long)m->flexure_count + m->joint_count;
     long long n = links + strains + b, r = 2 * (parts - b), shifts = 0, floats = 0;
     bool few = n <= COORDINATES_MAX && r < n; /* Otherwise, do not search. */

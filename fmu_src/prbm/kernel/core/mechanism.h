@@ -62,8 +62,8 @@ typedef struct {
 typedef struct {
     const char *name;
     Connection between;
-    bool elastic; /* Whether it has a stiffness. */
-    Expression stiffness;
+    bool sprung, turned, damped; /* Whether stiffness, free_angle and damping are given. */
+    Expression stiffness, free_angle, damping;
 } Joint;
 
 /* A coil spring and a damper between two points. */

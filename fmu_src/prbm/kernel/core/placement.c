@@ -40,17 +40,22 @@ static void place_contacts(System *system, Memory *memory) {
     system->lifts_c = place(memory, points, sizeof(double));
 }
 
-/* Place the vectors along coil springs and their laws. */
-static void place_coils(System *system, Memory *memory) {
+/* Place torsion at joints, the vectors along coil springs and their laws. */
+static void place_elements(System *system, Memory *memory) {
     const Mechanism *m = system->mechanism;
     size_t n = (size_t)system->n, d = (size_t)system->d, coils = (size_t)m->coil_count;
     system->placed_count = m->placed_count;
     system->placed = m->placed;
+    for (int i = 0; i < m->joint_count; i++) {
+        system->torsion_count += m->joints[i].sprung || m->joints[i].damped;
+    }
+    system->torsions = place(memory, (size_t)system->torsion_count, sizeof(Torsion));
     system->coil_count = m->coil_count;
     system->spans = place(memory, coils * d, sizeof(Complex));
     system->spans_c = place(memory, coils, sizeof(Complex));
     system->laws = place(memory, coils, sizeof(SpringLaw));
-    system->stiffness = coils > 0 ? place(memory, n * n, sizeof(double)) : system->K;
+    bool others = coils > 0 || system->torsion_count > 0;
+    system->stiffness = others ? place(memory, n * n, sizeof(double)) : system->K;
 }
 
 PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memory) {
@@ -83,7 +88,7 @@ PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memor
     result.loops_z = place(memory, r, sizeof(Complex));
     result.loops_on = place(memory, r, sizeof(int));
     result.guided = place(memory, (size_t)m->guide_count, sizeof(GuideRows));
-    place_coils(&result, memory);
+    place_elements(&result, memory);
     place_contacts(&result, memory);
     result.release = place(memory, d, sizeof(Complex));
     result.released.A = place(memory, d, sizeof(Complex));

@@ -358,18 +358,6 @@ static bool heavy(const System *system) {
     return system->gravity.re != 0.0 || system->gravity.im != 0.0;
 }
 
-/* Return whether initial strains or the pretension of springs load the drawn shape. */
-static bool strained(const System *system) {
-    bool found = false;
-    for (int j = 0; j < system->n; j++) {
-        found = found || system->rest[j] != system->q0[j];
-    }
-    for (int k = 0; k < system->coil_count; k++) {
-        found = found || system->laws[k].free_length != system->laws[k].drawn_length;
-    }
-    return found;
-}
-
 /* Return whether the weight is far beyond what the springs can carry. */
 static bool limp(const System *system) {
     double weight = modulus(system->gravity) * largest_modulus(system->d, system->S);
@@ -499,7 +487,7 @@ PRBM bool equilibrium(const System *system, bool held, double displacement, Equi
     size_t used = scratch->used;
     int n = system->n, r = system->r;
     double *state = take(scratch, (size_t)n + (size_t)r + 1);
-    bool straight = !heavy(system) && !strained(system) && !(held && displacement != 0.0) &&
+    bool straight = !heavy(system) && !element_strained(system) && !(held && displacement != 0.0) &&
                     drawn_closed(system, scratch);
     held = held && !released_free(system);
     straighten(system, true, state);

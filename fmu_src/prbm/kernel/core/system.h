@@ -27,6 +27,13 @@ typedef struct {
     int a, b;
 } Spring;
 
+/* Torsion between the bodies with the coordinates a and b: stiffness [N m/rad], coefficient of viscous
+ * damping [N m s/rad] and rotation of b relative to a without a moment [rad]. */
+typedef struct {
+    double stiffness, damping, free_angle;
+    int a, b; /* FIXED: the ground */
+} Torsion;
+
 /* The law of a coil spring: stiffness [N/m], coefficient of the cube of the elongation [N/m^3], damping
  * [N s/m], and its length without a force and as drawn [m]. */
 typedef struct {
@@ -125,11 +132,13 @@ typedef struct {
     int tied;                 /* Rows before those of guides that only bodies that float move. */
     int placed_count;         /* Coordinates that no balance determines: those of the mechanism, or, */
     const int *placed;        /* where a motion begins, of all bodies that float. */
+    int torsion_count;
+    Torsion *torsions;        /* of joints */
     int coil_count;
     Complex *spans, *spans_c; /* (coils, d), (coils,) vectors from start to end of the springs */
     SpringLaw *laws;          /* (coils,) */
     double *stiffness;        /* (n, n) of all elements as drawn, without negative parts: K, if there
-                               * are no coils */
+                               * are flexures only */
     Complex *gaps, *slides;   /* (s, d) */
     double *gaps_c;           /* (s,) */
     Complex *gaps_z, *slides_z; /* (s,) */
@@ -155,7 +164,7 @@ typedef struct {
     int corner_count;
     Complex *corners, *corners_c; /* (corners, d), (corners,): flexures, for drawings */
     int spring_count;
-    Spring *spring;           /* the springs between two coordinates: of flexures and joints */
+    Spring *spring;           /* the springs between two coordinates of flexures */
     double *grounded;         /* (even,) rates of the springs between a coordinate and the ground;
                                * K is the sum of both */
     int block_count;

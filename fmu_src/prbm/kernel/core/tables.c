@@ -174,9 +174,17 @@ static void read_joints(Reader *reader, Mechanism *m) {
     for (int i = 0; i < m->joint_count && !reader->wrong; i++) {
         joints[i].name = read_text(reader);
         joints[i].between = read_connection(reader, m);
-        joints[i].elastic = read_flag(reader);
-        if (joints[i].elastic) {
+        joints[i].sprung = read_flag(reader);
+        joints[i].turned = read_flag(reader);
+        joints[i].damped = read_flag(reader);
+        if (joints[i].sprung) {
             joints[i].stiffness = read_expression(reader, m);
+        }
+        if (joints[i].turned) {
+            joints[i].free_angle = read_expression(reader, m);
+        }
+        if (joints[i].damped) {
+            joints[i].damping = read_expression(reader, m);
         }
     }
     m->joints = joints;

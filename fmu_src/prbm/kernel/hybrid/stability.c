@@ -5,19 +5,19 @@
 #include "hybrid/access.h"
 #include "hybrid/stability.h"
 
-/* Return a bound of the rate of the damping of springs: the sum of those of each. */
-static double spring_decay(const Simulation *sim) {
+/* Return a bound of the rate of all dampers: the sum of those of each. */
+static double damper_decay(const Simulation *sim) {
     const System *system = system_of(sim);
     const Stepping *stepping = &sim->stepping;
     double *x = stepping->response, *row = stepping->torques, sum = 0.0;
-    for (int k = 0; k < system->coil_count; k++) {
-        if (system->laws[k].damping > 0.0) {
-            length_gradient(system, k, stepping->evaluation.at.e, row);
+    for (int k = 0; k < damper_count(system); k++) {
+        double damping = damper_row(system, k, stepping->evaluation.at.e, row);
+        if (damping > 0.0) {
             zeros(system->even, x);
             copy(system->n, row, x);
             zeros(sim->equations.r, stepping->multipliers);
             solve_again(&stepping->evaluation.factors, x, stepping->multipliers);
-            sum += system->laws[k].damping * dot(system->n, row, x);
+            sum += damping * dot(system->n, row, x);
         }
     }
     return greater(sum, 0.0);
@@ -43,7 +43,7 @@ PRBM void refine_fastest(Simulation *sim) {
     for (int j = 0; j < n && longest > 0.0; j++) {
         state->fastest[j] = x[j] / longest;
     }
-    state->fastest_decay = spring_decay(sim);
+    state->fastest_decay = damper_decay(sim);
 }
 
 PRBM bool find_fastest(Simulation *sim, Problem *problem) {

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...base.errors import PrbmError
 from ...mechanics.arrays import Complex
+from ...mechanics.flexures import check_slender
 from ...mechanics.inputs import check_input, input_names
 from ...mechanics.system import unit
 from ...mechanism.description import Mechanism
@@ -25,7 +26,6 @@ from ...mechanism.parts import (
     Point,
     Stop,
     body_of,
-    check_slender,
     value,
 )
 
@@ -262,12 +262,13 @@ class ElementModel:
 def _check_supported(
     mechanism: Mechanism, values: Mapping[str, float], given: Mapping[str, float]
 ) -> None:
-    """Reject friction, damping in proportion to mass, torsion springs, moving walls or bases."""
+    """Reject friction, damping in proportion to mass, torsion, moving walls or bases."""
     unsupported = [f"{f.name}.coefficient" for f in mechanism.frictions
                    if value(f, "coefficient", values)]  # fmt: skip
     unsupported += [f"{s.name}.friction" for s in mechanism.stops if value(s, "friction", values)]
-    unsupported += [f"{j.name}.stiffness" for j in mechanism.joints
-                    if j.stiffness is not None and value(j, "stiffness", values)]  # fmt: skip
+    for name in ("stiffness", "damping"):
+        unsupported += [f"{j.name}.{name}" for j in mechanism.joints
+                        if getattr(j, name) is not None and value(j, name, values)]  # fmt: skip
     if values["damping.zeta"]:
         unsupported.append("damping.zeta")
     forces = {f.name for f in mechanism.forces}
@@ -280,6 +281,6 @@ def _check_supported(
             )
     for name in unsupported:
         raise FiniteElementError(
-            f"{name} is not 0: the finite elements have no friction, no torsion springs, no "
+            f"{name} is not 0: the finite elements have no friction, no torsion at joints, no "
             "damping in proportion to mass, no moving walls and no moving base; set it to 0"
         )
