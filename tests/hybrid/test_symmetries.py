@@ -65,15 +65,28 @@ def scalars(model: Mechanism) -> dict[str, float]:
     return found
 
 
+def reversed_joints(given: Mechanism) -> Mechanism:
+    """Return the mechanism whose joints start where they ended: the free angle is the opposite."""
+    joints = tuple(
+        replace(
+            one, start=one.end, end=one.start,
+            free_angle=None if one.free_angle is None else -one.free_angle,
+        )
+        for one in given.joints
+    )  # fmt: skip
+    return replace(given, joints=joints)
+
+
 SEEDS = [*range(6), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(6, 120))]
 
 
+@pytest.mark.parametrize("torsion", [False, True])
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_mechanism_moves_alike_wherever_and_however_it_is_described(seed):
-    model = seeded(seed, friction=False)
+def test_a_mechanism_moves_alike_wherever_and_however_it_is_described(seed, torsion):
+    model = seeded(seed, friction=False, torsion=torsion)
     expected = scalars(model)
     scale = {"energy": max(abs(x) for name, x in expected.items() if name.startswith("energy."))}
-    for change in (turned, mirrored, shifted, reordered, reversed_flexures):
+    for change in (turned, mirrored, shifted, reordered, reversed_flexures, reversed_joints):
         found = scalars(change(model))
         for name, x in expected.items():
             size = scale.get(name.partition(".")[0], 1e-3)

@@ -255,7 +255,8 @@ class Comparison:
         for joint in m.joints:
             assert r.text() == joint.name
             self.between(joint)
-            assert r.take("I") == (joint.stiffness is not None)
+            given = (joint.stiffness, joint.free_angle, joint.damping)
+            assert r.take("III") == tuple(field is not None for field in given)
             self.fields(joint)
         for spring in m.springs:
             assert r.text() == spring.name

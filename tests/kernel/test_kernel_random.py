@@ -67,6 +67,13 @@ def test_the_kernel_moves_random_mechanisms_with_guides_as_the_engine_does(seed,
 SPRUNG_SEEDS = [*range(4), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(4, 12))]
 
 
+@pytest.mark.parametrize("seed", SPRUNG_SEEDS)
+def test_the_kernel_moves_random_mechanisms_with_torsion_as_the_engine_does(seed):
+    found = deviations(seed, bodies=4, torsion=True)
+    worst = max(found, key=found.__getitem__)
+    assert found[worst] <= DEVIATION_MAX, (worst, found[worst])
+
+
 @pytest.mark.parametrize("free", [False, True])
 @pytest.mark.parametrize("seed", SPRUNG_SEEDS)
 def test_the_kernel_moves_random_mechanisms_with_springs_as_the_engine_does(seed, free):

@@ -928,6 +928,11 @@ def test_elements_are_the_same(name):
         assert_same(K, own.stiffness(e))
         kernel().element_torques(ours.structure, e, v, found, row)
         assert_same(found, own.stiffness(e) @ v)
+        C = np.zeros((n, n))
+        for k in range(kernel().damper_count(ours.structure)):
+            C += kernel().damper_row(ours.structure, k, e, row) * np.outer(row, row)
+        viscous = own.viscous(e)
+        assert_same(C, np.zeros((n, n)) if viscous is None else viscous)
 
 
 # --- contact.c -----------------------------------------------------------------------------------

@@ -106,8 +106,8 @@ def elastic():
             Flexure("strut", "bar", "lever.end", "ground.far", ("pin", "pin")),
         ),
         joints=(
-            Joint("hinge", "stage.hinge", "lever.pin", stiffness="L/40"),
-            Joint("hook", "pendulum.pin", "stage.hook"),
+            Joint("hinge", "stage.hinge", "lever.pin", "L/40", 0.02, "L/4000"),
+            Joint("hook", "pendulum.pin", "stage.hook", damping=1e-6),
         ),
         springs=(
             Spring("coil", "stage.right", "hammer.root", "500*L", "1.75*L", 2e4, 0.03),

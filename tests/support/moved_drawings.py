@@ -39,6 +39,10 @@ def moved(given: Mechanism, place, *, turn: float = 0.0, sign: float = 1.0) -> M
             )
             for kind in given.flexure_types
         ),
+        joints=tuple(
+            replace(joint, free_angle=None if joint.free_angle is None else sign * joint.free_angle)
+            for joint in given.joints
+        ),
         stops=tuple(direction(stop, offset=sign * stop.offset) for stop in given.stops),
         frictions=tuple(
             direction(rub, normal_stiffness=sign * rub.normal_stiffness) for rub in given.frictions

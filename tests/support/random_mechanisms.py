@@ -137,12 +137,13 @@ def build(
     free: bool = False,
     springs: int = 0,
     guides: int = 0,
+    torsion: bool = False,
 ) -> Mechanism:
     """Return a mechanism, which may be over-constrained.
 
     ``bodies``, ``loops``, ``stops``, ``springs`` and ``guides`` are the largest numbers of these
     parts.  With ``free``, one or two more bodies fly freely, alone or connected to each other,
-    unless springs or guides hold them.
+    unless springs or guides hold them.  With ``torsion``, joints have springs and dampers.
     """
     b = _Builder(choose, rng)
     for _ in range(choose((1, 2, 3))):
@@ -197,7 +198,7 @@ def build(
         ),
         flexure_types=tuple(b.types),
         flexures=tuple(b.flexures),
-        joints=tuple(b.joints),
+        joints=tuple(_torsion(b, joint) if torsion else joint for joint in b.joints),
         springs=tuple(coils),
         guides=tuple(ways),
         stops=tuple(walls),
@@ -222,6 +223,14 @@ def _spring(b: _Builder, i: int, names: list[str]) -> Spring:
         f"coil{i}", b.point(other, start), b.point(body, end), b.real(5.0, 40.0), free,
         b.choose((0.0, b.real(1e3, 1e5))), b.choose((0.0, b.real(0.01, 0.2))),
     )  # fmt: skip
+
+
+def _torsion(b: _Builder, joint: Joint) -> Joint:
+    """Return a joint with a soft torsion spring, with a moment in the drawn shape, and a damper."""
+    stiffness = b.choose((None, b.real(1e-3, 2e-2)))
+    free = None if stiffness is None else b.choose((None, b.real(-0.1, 0.1)))
+    damping = b.choose((None, b.real(1e-6, 2e-5)))
+    return replace(joint, stiffness=stiffness, free_angle=free, damping=damping)
 
 
 def _guide(b: _Builder, i: int, names: list[str]) -> Guide:
@@ -289,6 +298,7 @@ def starts(mechanism: Mechanism) -> bool:
 def mechanisms(draw, *, starting: bool = False, **most) -> Mechanism:
     """Draw mechanisms that can be assembled and, if ``starting``, also simulated."""
     most.setdefault("free", draw(st.booleans()))
+    most.setdefault("torsion", draw(st.booleans()))
 
     def attempt() -> Mechanism | None:
         rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))

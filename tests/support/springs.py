@@ -1,7 +1,7 @@
-"""Mechanisms with coil springs."""
+"""Mechanisms with coil springs and with torsion at joints."""
 
 from prbm.mechanism.description import Mechanism
-from prbm.mechanism.parts import Body, Force, Probe, Release, Spring
+from prbm.mechanism.parts import Body, Force, Joint, Probe, Release, Spring
 
 
 def oscillator(stiffness=200.0, displacement=0.02, parts=(), **law):
@@ -53,4 +53,26 @@ def web(gravity=(0.3, -2.0)):
         ),
         forces=(Force("push", "ring", (0.02, -0.06)),), probes=(Probe("eye", "ring.a"),),
         release=Release("plate", 20.0, displacement=0.01, velocity=0.1), gravity=gravity,
+    )  # fmt: skip
+
+
+def four_bar(**torsion):
+    """Return three links between two pins of the ground, with torsion at the pin of the loop."""
+    points = {"a": (0.0, 0.0), "b": (0.02, 0.1), "c": (0.15, 0.13), "d": (0.13, 0.0)}
+    links = [
+        Body(one + other, 0.1, 2e-4, tuple(0.5 * (x + y) for x, y in zip(points[one], points[other],
+             strict=True)), {one: points[one], other: points[other]})
+        for one, other in ("ab", "bc", "cd")
+    ]  # fmt: skip
+    return Mechanism(
+        name="FourBar", title="Three links between two pins", flexure_types=(), flexures=(),
+        gravity=(0.0, -3.0), bodies=tuple(links),
+        ground={"a": points["a"], "d": points["d"]},
+        joints=(
+            Joint("first", "ground.a", "ab.a", 0.05, damping=2e-4),
+            Joint("second", "ab.b", "bc.b"),
+            Joint("third", "cd.c", "bc.c", **torsion),
+            Joint("fourth", "cd.d", "ground.d"),
+        ),
+        forces=(Force("push", "bc"),), release=Release("ab", angle=0.3),
     )  # fmt: skip

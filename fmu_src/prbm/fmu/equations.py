@@ -15,6 +15,12 @@ SPRINGS = (
     f"<p>The force of a spring is {inline('k x + k_3 x^3 + c dot(l)')}, positive in tension, with "
     f"the elongation {inline('x = l - l_0')} of the distance {inline('l')} of its ends.</p>\n"
 )
+TORSION = (
+    f"<p>Torsion at a joint has the moment {inline('k (phi - phi_0) + c dot(phi)')} against the "
+    f"rotation {inline('phi')} of one body relative to the other since the drawn shape, with its "
+    f"<code>stiffness</code>, <code>free_angle</code> {inline('phi_0')} and <code>damping</code>."
+    "</p>\n"
+)
 FLOATING = (
     "where a body that nothing connects to the ground has e = x + i y, its displacement, and its "
     "derivatives by x and y in place of i e, "
@@ -96,7 +102,9 @@ def equations(mechanism: Mechanism) -> str:
         "projected onto them. The gap "
         f"{inline('g')} has the rate {inline('dot(g) = G v + w')}, with {inline('w')} the velocity "
         f"of the wall.</p>\n{''.join(STOP_LAWS[law] for law in laws)}"
-        f"{SPRINGS if mechanism.springs else ''}{GUIDES if mechanism.guides else ''}"
+        f"{SPRINGS if mechanism.springs else ''}"
+        f"{TORSION if any(joint.elastic for joint in mechanism.joints) else ''}"
+        f"{GUIDES if mechanism.guides else ''}"
         f"{RUBBING if any(g.friction is not None for g in mechanism.guides) else ''}"
         f"{_flexure_table(mechanism)}"
         "<p>Energy balance: kinetic + elastic + gravitational + dissipated energy - work is "

@@ -3,8 +3,8 @@
 A step is stable if its size times the rate of the fastest mode is below 4.4, with any damping of
 that mode.  In longer steps round-off grows until the error of the step reaches the tolerance.
 The mode is computed with the elements, the mass matrix and the active constraints; the stiffness
-from loads, and negative ones, are neglected.  The damping of springs adds the sum of the rates at
-which each alone would stop a motion, which is at least the largest rate of all together.
+from loads, and negative ones, are neglected.  Dampers add the sum of the rates at which each alone
+would stop a motion, which is at least the largest rate of all together.
 """
 
 import math
@@ -35,7 +35,7 @@ class FastestMode:
     rate : float
         Angular frequency, from below [rad/s]; 0: not known, or there are no springs.
     decay : float
-        Rate of the damping of springs, from above [1/s].
+        Rate of the dampers, from above [1/s].
     """
 
     direction: Real

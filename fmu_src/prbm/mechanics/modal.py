@@ -153,7 +153,7 @@ def moved_by(system: System, q: Real, phi: Real) -> Real:
 def damping(system: System, found: Modes, q: Real) -> tuple[Real, Real]:
     """Return damping ratios [-] and decay times [s] of modes, (k,) each.
 
-    The damping is C = 2 zeta omega_1 M + beta K, and that of springs, with the parameters
+    The damping is C = 2 zeta omega_1 M + beta K, and that of dampers, with the parameters
     ``damping.zeta`` and ``damping.beta``, the fundamental angular frequency omega_1 about the
     equilibrium under gravity and the stiffness K of flexures and joints.  Of a mode phi only
     phi^T C phi counts; couplings of modes by C are neglected.  The amplitude falls to 1/e in the

@@ -543,8 +543,8 @@ FIELDS: dict[type, dict[str, tuple[str, str, float, float, float | None, bool]]]
             "N.m/rad", "Torsional stiffness", 0.0, 1e12, 1.0
         ),
         "free_angle": _meta(
-            "rad", "Rotation from the drawn shape without a moment, of the body of the end relative "
-            "to that of the start",
+            "rad", "Rotation of the end's body relative to the start's without a moment, from the "
+            "drawn shape",
             -ANGLE_MAX, ANGLE_MAX, 0.1,
         ),
         "damping": _meta(
