@@ -118,7 +118,7 @@ def spread(condition):
 # --- mechanisms, parameters, states --------------------------------------------------------------
 
 
-NAMES = ("PRBDM", "PRBDM2R", "Rich", "Elastic", "Beams", "Mixed")
+NAMES = ("PRBDM", "PRBDM2R", "Rich", "Elastic", "Beams", "Mixed", "Beaded")
 OWN_MECHANISMS = {
     "Rich": rich, "Elastic": elastic, "Beams": beams, "Mixed": links_and_beams,
     "Profiles": profiles, "LateBeam": late_beam, "FiveNodes": five_nodes, "Beaded": beaded,
@@ -416,7 +416,9 @@ def test_the_map_to_the_directions_is_the_same(name):
 
 
 REALS = ("q0", "J", "K", "loops_c", "gaps_c", "lifts_c", "release_c", "length", "m")
-COMPLEXES = ("H", "A", "c", "S", "loops", "gaps", "gaps_z", "slides", "slides_z", "rubs", "lifts")
+COMPLEXES = (
+    "H", "A", "c", "S", "loops", "gaps", "gaps_z", "slides", "slides_z", "rubs", "rubs_z", "lifts",
+)  # fmt: skip
 
 
 def outside(blocks, matrix):
@@ -436,7 +438,7 @@ def test_the_arrays_of_a_mechanism_are_the_same(name):
             assert_same(getattr(ours, field), getattr(system, field), scale=size)
         assert ours.links().tolist() == list(system.links)
         assert_same(ours.map(), system.Phi.Phi)
-        for field in ("arm", "on", "stretches", "strains"):
+        for field in ("arm", "on", "stretches", "strains", "rubs_on", "normals"):
             found = getattr(ours, field)
             found = found() if callable(found) else found
             assert found.tolist() == getattr(system, field).tolist()
@@ -1011,10 +1013,16 @@ def test_forces_that_satisfy_the_laws_of_contact_are_the_same(k, m):
         normal = np.array([j if j < k and rng.uniform() < 0.7 else -1 for j in range(m)], int)
         P, z = np.full(k + m, np.nan), np.full(k + m, np.nan)
         tolerance = 1e-9 * np.abs(u).max()
-        assert kernel().coulomb(k, m, W, u, coulomb_laws(mu, fixed, normal), tolerance, P)
-        expected = complementarity.coulomb(W, u, mu, fixed, normal, tolerance)
+        carried = complementarity.TwoSided(
+            0.1 * rng.normal(size=(m // 2, k + m)), rng.normal(size=m // 2)
+        )
+        for g in range(m // 2):  # Some limits depend on forces that act in both directions.
+            normal[-1 - g] = k + g
+        laws = coulomb_laws(mu, fixed, normal, *carried)
+        assert kernel().coulomb(k, m, W, u, laws, tolerance, P)
+        expected = complementarity.coulomb(W, u, mu, fixed, normal, tolerance, carried)
         assert_same(P, expected, 1e-10)
-        limit = fixed + mu * np.append(P[:k], 0.0)[normal]
+        limit = complementarity.limits(P, mu, fixed, normal, carried)
         wrong = complementarity.violation(W, u, P, limit)
         assert wrong <= tolerance
         Q = rng.normal(size=k + m)
@@ -1363,7 +1371,9 @@ class KernelEquations:
         given = [(f.real, f.imag, m) for f, m in zip(inputs.forces, inputs.moments, strict=True)]
         walls = [astuple(wall) for wall in inputs.walls]
         self.arrays = [np.array(part, float) for part in (given, walls, inputs.mobilities)]
-        self.modes = np.array(contacts.modes, np.int32)
+        self.modes, self.sides = (
+            np.array(x, np.int32) for x in (contacts.modes, contacts.sides)
+        )
         base = structures()["Complex"](inputs.base.real, inputs.base.imag)
         self.inputs = structures()["Inputs"](
             self.arrays[0].ctypes.data, base, *(part.ctypes.data for part in self.arrays[1:])
@@ -1374,7 +1384,7 @@ class KernelEquations:
             if one:
                 to.phase, to.reference_speed, to.depth = astuple(one)
         state = structures()["ContactState"](
-            self.modes.ctypes.data, ctypes.addressof(self.touching)
+            self.modes.ctypes.data, ctypes.addressof(self.touching), self.sides.ctypes.data
         )
         kernel().set_equations(self.structure, self.inputs, state, omega)
 
@@ -1424,6 +1434,8 @@ def contact_states(system):
         for first_point in kinds[1:]:
             contacts = ContactState.free(stops, points).with_mode(0, first_stop)
             contacts = contacts.with_mode(stops, first_point) if points else contacts
+            for k in np.flatnonzero(system.normals != system_arrays.FIXED).tolist():
+                contacts = contacts.with_side(stops + k, 1 - 2 * (first_stop % 2))
             sticking = contacts.modes.count(ContactMode.STICK)
             if len(system.loops) + len(contacts.held) + sticking < system.n:
                 yield contacts
@@ -1597,7 +1609,7 @@ def test_gaps_are_the_same(name):
     slip_force=dynamics.sliding_friction, is_held=ContactState.held.func,
     friction_coefficient=dynamics.Equations.friction_coefficient,
 )  # fmt: skip
-@pytest.mark.parametrize("name", ["PRBDM2R", "Rich"])
+@pytest.mark.parametrize("name", ["PRBDM2R", "Rich", "Beaded"])
 def test_contact_forces_are_the_same(name):
     """The forces of closed stops and sticking contacts are computed from random multipliers."""
     for theirs, mine, y, rng in equations(name, 3):
@@ -1623,6 +1635,22 @@ def test_contact_forces_are_the_same(name):
             found = kernel().slip_force(mine.structure, e, mine.evaluation, c)
             force = dynamics.sliding_friction(theirs, c, e, given)
             assert_same(found, -contacts.modes[c].slip * force)
+
+
+@twin(
+    is_guide=dynamics.Equations.is_guide, normal_row=dynamics.Equations.normal_row,
+    side_force=dynamics.Equations.side_force,
+)  # fmt: skip
+def test_the_normal_forces_of_guides_and_held_stops_are_the_same():
+    for theirs, mine, _, rng in equations("Beaded", 3):
+        lam, contacts = rng.normal(size=len(theirs.rows)), theirs.contacts
+        for k in range(len(contacts.modes)):
+            guide = theirs.is_guide(k)
+            assert kernel().is_guide(mine.structure.system, k) == guide
+            if guide or k in contacts.held:
+                assert kernel().normal_row(mine.structure, k) == theirs.normal_row(k)
+            if guide:
+                assert kernel().side_force(mine.structure, lam, k) == theirs.side_force(k, lam)
 
 
 @pytest.mark.parametrize("mode", list(ContactMode)[1:])
@@ -1700,7 +1728,7 @@ def test_laws_of_compliant_stops_are_the_same():
 @pytest.mark.parametrize("name", NAMES)
 def test_limits_of_friction_are_the_same(name):
     for theirs, mine, y, _ in equations(name, 3):
-        e, points = theirs.system.directions(y[: theirs.n]), range(len(theirs.system.rubs))
+        e, points = theirs.system.directions(y[: theirs.n]), range(len(theirs.friction_laws))
         limits = [kernel().rub_limit(mine.structure, i, e) for i in points]
         assert_same(limits, [theirs.friction_limit(theirs.contacts.stops + i, e) for i in points])
 

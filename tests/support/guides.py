@@ -117,7 +117,7 @@ def beaded():
         anvil(), name="Beaded", bodies=(*anvil().bodies, bead, rider),
         ground={**anvil().ground, "post": (0.031, "L + 0.01"), "far": (0.08, "L + 0.02")},
         guides=(
-            Guide("slot", "bead.c", "stage.left", "stage.right"),
+            Guide("slot", "bead.c", "stage.left", "stage.right", friction=0.25),
             Guide("rail", "rider.c", "ground.post", "ground.far", turning=False),
         ),
         springs=(

@@ -353,6 +353,7 @@ class KernelSystem:
     def _shapes(self) -> dict[str, tuple[Any, ...]]:
         x = self.structure
         n, d, r, p, s, f = x.n, x.d, x.r, x.p, x.s, x.f
+        points = self.mechanism.friction_count
         return {
             "q0": ("double", n), "J": ("double", d), "K": ("double", n, n),
             "H": ("Complex", d, d), "A": ("Complex", p, d), "c": ("Complex", p),
@@ -360,7 +361,8 @@ class KernelSystem:
             "loops": ("Complex", r, d), "loops_c": ("double", r),
             "gaps": ("Complex", s, d), "slides": ("Complex", s, d), "gaps_c": ("double", s),
             "gaps_z": ("Complex", s), "slides_z": ("Complex", s), "on": ("int", s),
-            "rubs": ("Complex", f, d), "lifts": ("Complex", f, d), "lifts_c": ("double", f),
+            "rubs": ("Complex", f, d), "rubs_z": ("Complex", f), "rubs_on": ("int", f),
+            "normals": ("int", f), "lifts": ("Complex", points, d), "lifts_c": ("double", points),
             "release": ("Complex", d), "stretches": ("int", x.stretch_count),
         }  # fmt: skip
 
