@@ -186,7 +186,10 @@ def build(
     aimed = [(stop.body, stop.direction) for stop in walls]
     body, direction = choose((*aimed, *aimed, (choose(names), choose(directions))))
     coils = [_spring(b, i, names) for i in range(choose(range(1, springs + 1)) if springs else 0)]
-    ways = [_guide(b, i, names) for i in range(choose(range(1, guides + 1)) if guides else 0)]
+    along = (None, 0.0, 0.2) if friction else (None,)
+    ways = [
+        _guide(b, i, names, along) for i in range(choose(range(1, guides + 1)) if guides else 0)
+    ]
     gravity = choose(((0.0, 0.0), (0.0, -1.0), (0.3, 0.4)))
     return Mechanism(
         name="Random",
@@ -233,7 +236,9 @@ def _torsion(b: _Builder, joint: Joint) -> Joint:
     return replace(joint, stiffness=stiffness, free_angle=free, damping=damping)
 
 
-def _guide(b: _Builder, i: int, names: list[str]) -> Guide:
+def _guide(
+    b: _Builder, i: int, names: list[str], frictions: Sequence[float | None]
+) -> Guide:
     """Return a guide of a point of a body, on a line of the ground or of another body."""
     body = b.choose(names)
     other = b.choose([GROUND, *(name for name in names if name != body)])
@@ -241,7 +246,7 @@ def _guide(b: _Builder, i: int, names: list[str]) -> Guide:
     start = b.point(other, at)
     return Guide(
         f"guide{i}", b.point(body, at), start, b.point(other, at + b.disc(CELL)),
-        b.choose((True, True, False)),
+        b.choose((True, True, False)), b.choose(frictions),
     )  # fmt: skip
 
 
