@@ -376,24 +376,24 @@ def test_the_size_of_a_block_larger_than_all_memory_saturates():
 
 def scratch(size, room):
     block, spare = np.zeros(size), np.zeros(room)
-    known = structures()["Scratch"](block.ctypes.data, spare.ctypes.data, 0, size, 0, False)
-    return known, block, spare
+    known = structures()["ScratchBlock"](block.ctypes.data, spare.ctypes.data, size, 0, False)
+    return structures()["Scratch"](ctypes.addressof(known), 0), known, block, spare
 
 
 def test_exhausted_working_memory_returns_the_spare_block():
     """Arrays in use are not overwritten, and the required size is recorded."""
-    known, block, spare = scratch(10, 8)
+    rest, known, block, spare = scratch(10, 8)
     take = kernel().library.take
     take.restype = ctypes.c_void_p
-    starts = [take(ctypes.byref(known), ctypes.c_size_t(count)) for count in (4, 6)]
+    starts = [take(ctypes.byref(rest), ctypes.c_size_t(count)) for count in (4, 6)]
     assert starts == [block.ctypes.data, block.ctypes.data + 32]
     assert not known.exceeded
     for count in (1, 8):
-        assert take(ctypes.byref(known), ctypes.c_size_t(count)) == spare.ctypes.data
+        assert take(ctypes.byref(rest), ctypes.c_size_t(count)) == spare.ctypes.data
     assert known.exceeded
     assert known.most == 19
-    known.used = 4
-    assert take(ctypes.byref(known), ctypes.c_size_t(6)) == starts[1]
+    rest.used = 4
+    assert take(ctypes.byref(rest), ctypes.c_size_t(6)) == starts[1]
     assert known.most == 19
 
 
@@ -403,11 +403,11 @@ def test_matrices_complex_numbers_and_integers_are_allocated_in_doubles():
         ("take_complex", (3, 4), 24),
         ("take_integers", (5,), 5),
     ):
-        known, block, _ = scratch(30, 1)
+        rest, known, block, _ = scratch(30, 1)
         function = getattr(kernel().library, name)
         function.restype = ctypes.c_void_p
-        assert function(ctypes.byref(known), *given_) == block.ctypes.data
-        assert known.used == doubles
+        assert function(ctypes.byref(rest), *given_) == block.ctypes.data
+        assert rest.used == known.most == doubles
 
 
 def test_a_message_that_is_too_long_is_truncated():

@@ -2,7 +2,7 @@
 
 Everything is derived from the header: its structures become :class:`ctypes.Structure`, its
 prototypes become functions.  Each call gets working memory and a place for an error message.  A
-message is raised as :class:`KernelError`.  After each call the working memory must be free again.
+message is raised as :class:`KernelError`.
 """
 
 import ctypes
@@ -211,8 +211,8 @@ class Kernel:
         self.called: set[str] = set()
         self.memory = np.full(WORKING_MEMORY, np.nan)
         self.spare = np.full(WORKING_MEMORY, np.nan)
-        self.scratch = structures()["Scratch"](
-            self.memory.ctypes.data, self.spare.ctypes.data, 0, WORKING_MEMORY, 0, False
+        self.block = structures()["ScratchBlock"](
+            self.memory.ctypes.data, self.spare.ctypes.data, WORKING_MEMORY, 0, False
         )
         self.problem = structures()["Problem"]()
 
@@ -226,22 +226,22 @@ class Kernel:
         self.called.add(prototype.name)
         function = getattr(self.library, prototype.name)
         function.restype = _result(prototype.result)
-        self.scratch.most, self.scratch.exceeded, self.problem.text = 0, False, b""
+        self.block.most, self.block.exceeded, self.problem.text = 0, False, b""
         supplied, kept = iter(given), []
         arguments = [self._argument(a, supplied, kept) for a in prototype.arguments]
         rest = list(supplied)
         assert prototype.variadic or not rest, f"{prototype.name}: {len(rest)} arguments too many"
         result = function(*arguments, *rest)
-        assert self.scratch.used == 0, f"{prototype.name} does not release its working memory"
-        assert not self.scratch.exceeded, f"{prototype.name} needs more working memory"
-        self.memory[: self.scratch.most] = np.nan  # The next call must not rely on old contents.
+        assert not self.block.exceeded, f"{prototype.name} needs more working memory"
+        self.memory[: self.block.most] = np.nan  # The next call must not rely on old contents.
         if self.problem.text:
             raise KernelError(self.problem.text.decode())
         return complex(result.re, result.im) if hasattr(result, "re") else result
 
     def _argument(self, wanted: Declared, supplied: Iterator[Any], kept: list[Any]) -> Any:
-        if wanted.stars and wanted.type == "Scratch":
-            return ctypes.byref(self.scratch)
+        if wanted.type == "Scratch":
+            scratch = structures()["Scratch"](ctypes.addressof(self.block), 0)
+            return ctypes.byref(scratch) if wanted.stars else scratch
         if wanted.stars and wanted.type == "Problem":
             return ctypes.byref(self.problem)
         value = next(supplied)

@@ -37,7 +37,7 @@ static bool leave_arc(Simulation *sim, bool shown, Problem *problem) {
         ok = end_step(sim, state->time, problem);
     } else {
         ok = arc_state(sim, state->front, sim->present.e, &sim->present.reference, &sim->at_front,
-                       problem);
+                       sim->scratch, problem);
         state->front_time = state->time;
     }
     state->arc.valid = state->has_k1 = false;
@@ -106,19 +106,19 @@ static bool goes_on(const Simulation *sim) {
 
 /* Compute the walls with the displacements by forces of compliant stops in their motion. */
 static bool fold_present(Simulation *sim, Wall *walls, Problem *problem) {
-    size_t mark = sim->scratch.used;
+    Scratch scratch = sim->scratch;
     bool ok = true;
     memcpy(walls, sim->state.walls, (size_t)system_of(sim)->s * sizeof(Wall));
     if (sim->equations.walls_give) {
-        double *y = take(&sim->scratch, (size_t)state_size(sim));
-        ok = arc_state(sim, y, sim->present.e, &sim->present.reference, &sim->at_front, problem);
+        double *y = take(&scratch, (size_t)state_size(sim));
+        ok = arc_state(sim, y, sim->present.e, &sim->present.reference, &sim->at_front, scratch,
+                       problem);
         for (int i = 0; ok && i < system_of(sim)->s; i++) {
             if (sim->configuration.mechanism->stops[i].compliant) {
                 fold_give(&walls[i], sim->state.time, extra_of(sim, y, i));
             }
         }
     }
-    sim->scratch.used = mark;
     return ok;
 }
 

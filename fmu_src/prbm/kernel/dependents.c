@@ -71,8 +71,7 @@ PRBM bool factor_dependents(const Simulation *sim, Loops *loops) {
     return least > DEPENDENT_PIVOT_RTOL * most;
 }
 
-PRBM Loops take_loops(Simulation *sim) {
-    Scratch *scratch = &sim->scratch;
+PRBM Loops take_loops(const Simulation *sim, Scratch *scratch) {
     int r = system_of(sim)->r, n = system_of(sim)->n;
     Loops loops = {take_integers(scratch, r), take_integers(scratch, r),
                    take_matrix(scratch, r, n), take_matrix(scratch, r, r),
@@ -82,14 +81,13 @@ PRBM Loops take_loops(Simulation *sim) {
 }
 
 /* Solve the loops for the dependent angles; the angles in q are the first guess. */
-static bool complete_angles(Simulation *sim, Loops *x, double *q) {
-    size_t mark = sim->scratch.used;
+static bool complete_angles(const Simulation *sim, Loops *x, double *q, Scratch scratch) {
     const System *system = system_of(sim);
     int r = system->r;
     double best = HUGE_VAL, length = system->length;
     bool closed = false, regular = true;
     Rows loops = loop_rows(system);
-    Complex *e = take_complex(&sim->scratch, system->d, 1);
+    Complex *e = take_complex(&scratch, system->d, 1);
     for (int step = 0; step < CONSTRAINT_ITERATIONS_MAX && regular && !closed; step++) {
         directions(system, q, e);
         scalars(&loops, e, x->s);
@@ -106,7 +104,6 @@ static bool complete_angles(Simulation *sim, Loops *x, double *q) {
             }
         }
     }
-    sim->scratch.used = mark;
     return closed && regular;
 }
 
@@ -127,13 +124,12 @@ static void complete_rates(const Simulation *sim, Loops *x, double *v) {
 
 /* Solve the loops for the dependent angles and rates; the angles in q are the first guess. */
 PRBM bool complete(Simulation *sim, double *q, double *v, Problem *problem) {
-    size_t mark = sim->scratch.used;
-    Loops loops = take_loops(sim);
-    bool ok = complete_angles(sim, &loops, q);
+    Scratch scratch = sim->scratch;
+    Loops loops = take_loops(sim, &scratch);
+    bool ok = complete_angles(sim, &loops, q, scratch);
     if (ok) {
         complete_rates(sim, &loops, v);
     }
-    sim->scratch.used = mark;
     return ok || (system_of(sim)->r > 0
                       ? singular_choice(sim, loops.dependent, problem)
                       : fail(problem, "the states are not finite numbers"));

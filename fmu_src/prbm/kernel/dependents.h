@@ -10,7 +10,7 @@ typedef struct {
     double *rows, *a, *s;   /* (r, n), (r, r) factored, (r,) residuals */
 } Loops;
 
-PRBM Loops take_loops(Simulation *sim);
+PRBM Loops take_loops(const Simulation *sim, Scratch *scratch);
 /* Factor the Jacobian of the loops in the dependent coordinates; false if it is singular. */
 PRBM bool factor_dependents(const Simulation *sim, Loops *loops);
 PRBM bool singular_choice(const Simulation *sim, const int *dependent, Problem *problem);

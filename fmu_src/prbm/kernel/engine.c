@@ -254,11 +254,11 @@ EXPORTED bool prbm_sections(Engine *engine, double *faces, char *message) {
     const System *system = system_of(sim);
     bool ok = present_outputs(sim, PLACES | MOTION, &problem) != NULL;
     if (ok) {
-        size_t mark = sim->scratch.used;
+        Scratch scratch = sim->scratch;
         const Present *present = &sim->present;
         SectionState at = section_state(&sim->equations, present->e, present->y,
                                         present->y + system->n, &present->evaluation,
-                                        &sim->scratch);
+                                        &scratch);
         for (int i = 0; i < system->mechanism->flexure_count; i++) {
             const FreeBody *body = &system->free_bodies[i];
             if (has_stress(system->mechanism, i)) {
@@ -266,7 +266,6 @@ EXPORTED bool prbm_sections(Engine *engine, double *faces, char *message) {
                 faces += 2 * body->sections;
             }
         }
-        sim->scratch.used = mark;
     }
     return succeed(ok, &problem, message);
 }
@@ -303,9 +302,9 @@ static double *write_point(Complex c, int d, const Complex *A, const Complex *e,
 EXPORTED void prbm_points(Engine *engine, const double *q, double *points) {
     Simulation *sim = engine->simulation;
     const System *system = system_of(sim);
-    size_t mark = sim->scratch.used;
+    Scratch scratch = sim->scratch;
     int d = system->d;
-    Complex *e = take_complex(&sim->scratch, d, 1);
+    Complex *e = take_complex(&scratch, d, 1);
     directions(system, q, e);
     for (int i = 0; i < system->corner_count; i++) {
         points = write_point(system->corners_c[i], d, system->corners + i * d, e, points);
@@ -316,7 +315,6 @@ EXPORTED void prbm_points(Engine *engine, const double *q, double *points) {
         *points++ = e[frame->arm].re;
         *points++ = e[frame->arm].im;
     }
-    sim->scratch.used = mark;
 }
 
 EXPORTED int prbm_mode_count(const Engine *engine) {
@@ -328,16 +326,15 @@ EXPORTED int prbm_modes(Engine *engine, double *q, double *frequencies, double *
     Problem problem = {""};
     Simulation *sim = engine->simulation;
     const System *system = system_of(sim);
-    size_t mark = sim->scratch.used;
+    Scratch scratch = sim->scratch;
     int n = system->n, count = prbm_mode_count(engine);
-    Equilibrium shape = {q, take(&sim->scratch, (size_t)system->r), 0.0};
-    double *phi = take_matrix(&sim->scratch, n, count);
-    bool ok = equilibrium(system, false, 0.0, &shape, &sim->scratch, &problem) &&
-              modes(system, &shape, frequencies, phi, &sim->scratch, &problem);
+    Equilibrium shape = {q, take(&scratch, (size_t)system->r), 0.0};
+    double *phi = take_matrix(&scratch, n, count);
+    bool ok = equilibrium(system, false, 0.0, &shape, scratch, &problem) &&
+              modes(system, &shape, frequencies, phi, scratch, &problem);
     for (int i = 0; ok && i < n * count; i++) {
         shapes[i % count * n + i / count] = phi[i];
     }
-    sim->scratch.used = mark;
     return succeed(ok, &problem, message) ? count : -1;
 }
 

@@ -137,10 +137,10 @@ static void measure_motion(Simulation *sim) {
     const System *system = system_of(sim);
     const Mechanism *m = system->mechanism;
     const Scales *scales = &sim->configuration.scales;
-    size_t mark = sim->scratch.used;
+    Scratch scratch = sim->scratch;
     int n = system->n;
     const double *q = sim->state.front, *v = q + n;
-    double *amplitude = take(&sim->scratch, (size_t)n), energy = 0.0, angle = NOMINAL_ANGLE_MIN;
+    double *amplitude = take(&scratch, (size_t)n), energy = 0.0, angle = NOMINAL_ANGLE_MIN;
     for (int j = 0; j < n; j++) {
         amplitude[j] = q[j] - system->q0[j] + v[j] / scales->rate;
         angle = m->coordinates[j].strain < 0 ? greater(angle, fabs(amplitude[j])) : angle;
@@ -150,7 +150,6 @@ static void measure_motion(Simulation *sim) {
     }
     sim->state.angle = angle;
     sim->state.energy = greater(energy, scales->energy * (NOMINAL_ANGLE_MIN * NOMINAL_ANGLE_MIN));
-    sim->scratch.used = mark;
 }
 
 /* The strain of a link, if a part of the energy is in the stiffest axial spring. */
@@ -288,16 +287,15 @@ static bool sliding_ends(const Simulation *sim, const Instant *at, int contact) 
  * constraints keep it from sliding, as at a dead centre, nothing changes. */
 static void stop_sliding(Simulation *sim, int contact) {
     Problem ignored;
-    size_t mark = sim->scratch.used;
+    Scratch scratch = sim->scratch;
     ContactMode slipping = sim->state.modes[contact];
-    double *kept = take(&sim->scratch, (size_t)state_size(sim));
+    double *kept = take(&scratch, (size_t)state_size(sim));
     copy(state_size(sim), sim->state.front, kept);
     set_mode(sim, contact, CONTACT_STICK);
-    if (!project(&sim->equations, sim->state.time, sim->state.front, &sim->scratch, &ignored)) {
+    if (!project(&sim->equations, sim->state.time, sim->state.front, scratch, &ignored)) {
         copy(state_size(sim), kept, sim->state.front);
         set_mode(sim, contact, slipping);
     }
-    sim->scratch.used = mark;
 }
 
 /* Whether the gap of an open stop closes at this state. */
@@ -434,11 +432,9 @@ static bool freeze_contacts(Simulation *sim, Problem *problem) {
 PRBM bool exchange_event(Simulation *simulation, bool *changed, Problem *problem) {
     Simulation *sim = simulation;
     State *state = &sim->state;
-    size_t mark = sim->scratch.used;
     int nx = exchange_states(sim);
-    double *before = take(&sim->scratch, (size_t)nx);
     *changed = false;
-    copy(nx, state->states, before);
+    copy(nx, state->states, sim->previous);
     keep_backup(sim);
     Moment now;
     bool ok = sample_before(sim, problem) && apply_inputs(sim, problem) &&
@@ -451,28 +447,26 @@ PRBM bool exchange_event(Simulation *simulation, bool *changed, Problem *problem
         arm(sim, &now.at);
         accept(sim);
         states_of(sim, state->front, state->states);
-        *changed = memcmp(before, state->states, (size_t)nx * sizeof *before) != 0;
+        *changed = memcmp(sim->previous, state->states, (size_t)nx * sizeof(double)) != 0;
     }
-    sim->scratch.used = mark;
     return attempt(sim, ok, problem);
 }
 
 PRBM bool exchange_pending(Simulation *simulation, bool *pending, Problem *problem) {
     Simulation *sim = simulation;
     const bool struck[STOPS_MAX] = {false};
-    size_t mark = sim->scratch.used;
     Moment now;
     if (!exchange_moment(sim, &now, problem)) {
         return false;
     }
-    double *z = take(&sim->scratch, (size_t)exchange_indicators(sim));
+    Scratch scratch = sim->scratch;
+    double *z = take(&scratch, (size_t)exchange_indicators(sim));
     event_indicators(sim, &now.at, z);
     *pending = impulses_changed(sim) || drift(sim, &now.at) > DRIFT_RTOL ||
                due_here(sim, &now.at, struck).kind != EVENT_NONE;
     for (int i = 0; i < exchange_indicators(sim); i++) {
         *pending = *pending || z[i] <= 0.0;
     }
-    sim->scratch.used = mark;
     return true;
 }
 

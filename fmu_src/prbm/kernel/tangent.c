@@ -63,7 +63,8 @@ static bool tangent_coordinates(Tangent *t, const double *dx, Problem *problem) 
     const System *system = system_of(sim);
     const Mechanism *m = system->mechanism;
     int n = system->n, r = system->r, count = m->independent_count;
-    Loops x = take_loops(sim);
+    Scratch scratch = t->scratch;
+    Loops x = take_loops(sim, &scratch);
     Rows loops = loop_rows(system);
     jacobian(&loops, t->e, x.rows);
     if (!factor_dependents(sim, &x)) {
@@ -103,8 +104,8 @@ static void load_row_change(const Tangent *t, Complex *dw, double *dmoment) {
     const Mechanism *m = system->mechanism;
     const double *base = t->du + m->input.base;
     int d = system->d;
-    size_t mark = t->sim->scratch.used;
-    Complex *one = take_complex(&t->sim->scratch, d, 1);
+    Scratch scratch = t->scratch;
+    Complex *one = take_complex(&scratch, d, 1);
     field_row(d, system->S, complex_of(-base[0], -base[1]), dw);
     zeros(d, dmoment);
     for (int i = 0; i < m->force_count; i++) {
@@ -116,7 +117,6 @@ static void load_row_change(const Tangent *t, Complex *dw, double *dmoment) {
         }
         dmoment[frame->arm] += given[2];
     }
-    t->sim->scratch.used = mark;
 }
 
 /* Return the factor of the load on an arm in the pull on it: E, or 1 if it floats. */
@@ -156,9 +156,8 @@ static void arm_load_change(const Tangent *t, const Complex *dw, const double *d
 
 static void rub_change(const Tangent *t) {
     const Equations *eq = t->eq;
-    Scratch *scratch = &t->sim->scratch;
-    size_t mark = scratch->used;
-    double *row = take(scratch, (size_t)eq->system->n);
+    Scratch scratch = t->scratch;
+    double *row = take(&scratch, (size_t)eq->system->n);
     for (int k = eq->slipping_rows; k < eq->slipping_count; k++) {
         int contact = eq->slipping[k], i;
         Rows rows = tangential_rows(eq->system, contact, &i);
@@ -166,7 +165,6 @@ static void rub_change(const Tangent *t) {
         add_scaled(eq->system->n, -sliding_sign(t, contact) * limit_change(t, contact), row, t->dx);
         add_pull(t, &rows, i, slip_force(eq, t->e, t->evaluation, contact));
     }
-    scratch->used = mark;
 }
 
 /* Add the changes of the loads of lam along the active rows.  Set dlam to minus the changes of the
@@ -323,8 +321,7 @@ static void energy_changes(const Tangent *t, const double *dx, double *out) {
 }
 
 /* Return a copy of t whose coordinates have the constant rates x (n,). */
-static Tangent at_rates(const Tangent *t, const double *x) {
-    Scratch *scratch = &t->sim->scratch;
+static Tangent at_rates(const Tangent *t, const double *x, Scratch *scratch) {
     int n = t->eq->system->n, d = t->eq->system->d;
     Tangent u = *t;
     Complex **arrays[] = {&u.w, &u.dw, &u.swing, &u.dswing};
@@ -343,6 +340,7 @@ static Tangent at_rates(const Tangent *t, const double *x) {
     }
     float_swings(t->eq->system, x, u.swing);
     float_swings(t->eq->system, u.dv, u.dswing);
+    u.scratch = *scratch;
     return u;
 }
 
@@ -351,24 +349,23 @@ static Tangent at_rates(const Tangent *t, const double *x) {
 static bool mobility_change(const Tangent *t, int i, double *result, Problem *problem) {
     Simulation *sim = t->sim;
     const System *system = system_of(sim);
-    size_t mark = sim->scratch.used;
+    Scratch scratch = t->scratch;
     int n = system->n, r = system->r, size = n + r;
-    double *x = take(&sim->scratch, (size_t)size);
+    double *x = take(&scratch, (size_t)size);
     Rows gaps = gap_rows(system), loops = loop_rows(system);
-    ContactProblem *at = contact_problem_at(sim, t->y);
+    ContactProblem *at = contact_problem_at(sim, t->y, scratch);
     row_jacobian(&gaps, i, at->e, x);
     zeros(r, x + n);
     bool ok = factor_contacts(at, problem);
     if (ok) {
         solve_saddle(&at->factors, x);
-        Tangent u = at_rates(t, x);
+        Tangent u = at_rates(t, x, &scratch);
         double change = rate_change(&u, &gaps, i) - kinetic_change(&u);
         for (int k = 0; k < r; k++) {
             change -= x[n + k] * rate_change(&u, &loops, k);
         }
         *result = 2.0 * change;
     }
-    sim->scratch.used = mark;
     return ok;
 }
 
@@ -440,12 +437,13 @@ static void all_changes(const Tangent *t, const double *dx, const Complex *dw,
 static Tangent begin_tangent(Simulation *sim, const Moment *now, const double *du) {
     const System *system = system_of(sim);
     const Evaluation *at = now->evaluation;
-    Scratch *scratch = &sim->scratch;
     int n = system->n, d = system->d;
     Tangent t = {0};
+    Scratch *scratch = &t.scratch;
     Complex **arrays[] = {&t.w, &t.alpha, &t.dphi, &t.dw, &t.dE,
                           &t.swing, &t.dswing, &t.bend, &t.dbend, &t.pull};
     t.sim = sim;
+    t.scratch = sim->scratch;
     t.eq = &sim->equations;
     t.e = at->at.e;
     t.factors = &at->factors;
@@ -474,15 +472,14 @@ static Tangent begin_tangent(Simulation *sim, const Moment *now, const double *d
 PRBM bool exchange_directional(Simulation *simulation, const double *dx, const double *du,
                                double *dvalues, Problem *problem) {
     Simulation *sim = simulation;
-    size_t mark = sim->scratch.used;
     int stops = sim->configuration.mechanism->slots.stops;
     Moment now;
     if (!present_moment(sim, &now, problem)) {
         return false;
     }
     Tangent t = begin_tangent(sim, &now, du);
-    double *dmoment = take(&sim->scratch, (size_t)system_of(sim)->d);
-    Complex *dw = take_complex(&sim->scratch, system_of(sim)->d, 1);
+    double *dmoment = take(&t.scratch, (size_t)system_of(sim)->d);
+    Complex *dw = take_complex(&t.scratch, system_of(sim)->d, 1);
     bool ok = tangent_coordinates(&t, dx, problem);
     if (ok) {
         load_row_change(&t, dw, dmoment);
@@ -500,6 +497,5 @@ PRBM bool exchange_directional(Simulation *simulation, const double *dx, const d
         ok = mobility_change(&t, i, dvalues + stops + PER_STOP * i + STOP_POINT_MOBILITY,
                              problem);
     }
-    sim->scratch.used = mark;
     return ok;
 }

@@ -36,9 +36,8 @@ static double pressure_change(const Tangent *t, int stop) {
 
 PRBM void pressure_changes(const Tangent *t) {
     const Equations *eq = t->eq;
-    Scratch *scratch = &t->sim->scratch;
-    size_t mark = scratch->used;
-    double *row = take(scratch, (size_t)eq->system->n);
+    Scratch scratch = t->scratch;
+    double *row = take(&scratch, (size_t)eq->system->n);
     Rows gaps = gap_rows(eq->system);
     for (int k = 0; k < eq->pressed_count; k++) {
         int i = eq->pressed[k];
@@ -47,7 +46,6 @@ PRBM void pressure_changes(const Tangent *t) {
         add_scaled(eq->system->n, t->dpressure[i], row, t->dx);
         add_pull(t, &gaps, i, t->evaluation->pressure[i]);
     }
-    scratch->used = mark;
 }
 
 PRBM double stop_force_change(const Tangent *t, int stop) {
@@ -105,14 +103,12 @@ PRBM double separation_indicator_change(const Tangent *t, int stop) {
 /* Change of the second derivative of the indentation. */
 static double bend_change_of(const Tangent *t, int stop) {
     const System *system = t->eq->system;
-    Scratch *scratch = &t->sim->scratch;
-    size_t mark = scratch->used;
-    double *row = take(scratch, (size_t)system->n);
+    Scratch scratch = t->scratch;
+    double *row = take(&scratch, (size_t)system->n);
     Rows gaps = gap_rows(system);
     row_jacobian(&gaps, stop, t->e, row);
     double change = dot(system->n, row, t->dx) + second_change(t, &gaps, stop) +
                     t->eq->inputs.mobilities[stop] * t->dpressure[stop];
-    scratch->used = mark;
     return -change;
 }
 

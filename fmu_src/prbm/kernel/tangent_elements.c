@@ -41,11 +41,10 @@ static Complex end_force_change(const SpringMotion *x) {
 PRBM void element_change(const Tangent *t) {
     const Equations *eq = t->eq;
     const System *system = eq->system;
-    Scratch *scratch = &t->sim->scratch;
-    size_t mark = scratch->used;
+    Scratch scratch = t->scratch;
     int n = system->n, d = system->d;
-    double *row = take(scratch, (size_t)n);
-    Complex *B = take_complex(scratch, d, 1);
+    double *row = take(&scratch, (size_t)n);
+    Complex *B = take_complex(&scratch, d, 1);
     for (int i = 0; i < n; i++) {
         for (int j = 0; j < n; j++) {
             t->dx[i] -= system->K[i * n + j] * (t->dq[j] + eq->beta * t->dv[j]);
@@ -68,7 +67,6 @@ PRBM void element_change(const Tangent *t) {
         span_gradient(system, k, end_force_change(&x), t->e, row);
         add_scaled(n, 1.0, row, t->dx);
     }
-    scratch->used = mark;
 }
 
 PRBM double element_energy_change(const Tangent *t) {

@@ -20,6 +20,7 @@ typedef struct {
     Complex *dE;                    /* (d,) i E dphi */
     Complex *swing, *dswing;        /* (d,) E w */
     Complex *bend, *dbend;          /* (d,) E (i w' - w^2); bend_arms adds the change of w' */
+    Scratch scratch;                /* the rest */
     Complex *pull;                  /* (d,) of the arms: torques, + i times forces along them */
 } Tangent;
 

@@ -9,12 +9,11 @@
 #include "tangent_stress.h"
 
 /* Compute the changes of the loads of all mass points. */
-static void load_changes(const Tangent *t, Complex *loads) {
+static void load_changes(const Tangent *t, Complex *loads, Scratch scratch) {
     const System *system = t->eq->system;
-    size_t mark = t->sim->scratch.used;
     int d = system->d;
     const double *base = t->du + system->mechanism->input.base;
-    Complex *bend = take_complex(&t->sim->scratch, d, 1);
+    Complex *bend = take_complex(&scratch, d, 1);
     for (int j = 0; j < d; j++) {
         Complex rate = scaled(t->eq->mass_damping, t->dswing[j]);
         bend[j] = plus(t->dbend[j], complex_of(-rate.im, rate.re));
@@ -23,7 +22,6 @@ static void load_changes(const Tangent *t, Complex *loads) {
         Complex moved = along_arms(d, system->A + i * d, bend);
         loads[i] = scaled(-system->m[i], plus(complex_of(base[0], base[1]), moved));
     }
-    t->sim->scratch.used = mark;
 }
 
 static void add_change(Complex *on, int body, Complex change) {
@@ -102,9 +100,8 @@ static void pull_changes(const Tangent *t, Complex *on) {
 }
 
 /* Compute the change of the state at which sections are loaded, in working memory. */
-static SectionState state_change(const Tangent *t) {
+static SectionState state_change(const Tangent *t, Scratch *scratch) {
     const System *system = t->eq->system;
-    Scratch *scratch = &t->sim->scratch;
     double *strained = take(scratch, (size_t)system->n);
     SectionState change = {t->dE, t->dq, strained, take_complex(scratch, system->p, 1),
                            take_complex(scratch, system->b + 1, 1),
@@ -112,7 +109,7 @@ static SectionState state_change(const Tangent *t) {
     for (int j = 0; j < system->n; j++) {
         strained[j] = t->dq[j] + t->eq->beta * t->dv[j];
     }
-    load_changes(t, change.loads);
+    load_changes(t, change.loads, *scratch);
     change.on[GROUND] = complex_of(0.0, 0.0);
     for (int body = 1; body <= system->b; body++) {
         change.on[body] = change.loads[system->body_masses[body - 1]];
@@ -127,12 +124,11 @@ static SectionState state_change(const Tangent *t) {
 
 /* Compute the changes of the stress of a flexure. */
 static void flexure_changes(const Tangent *t, const FreeBody *body, const SectionState *at,
-                            const SectionState *change, double *out) {
+                            const SectionState *change, double *out, Scratch scratch) {
     const System *system = t->eq->system;
-    Scratch *scratch = &t->sim->scratch;
-    size_t mark = scratch->used, m = (size_t)body->sections;
-    double *left = take(scratch, m), *right = take(scratch, m);
-    double *dleft = take(scratch, m), *dright = take(scratch, m);
+    size_t m = (size_t)body->sections;
+    double *left = take(&scratch, m), *right = take(&scratch, m);
+    double *dleft = take(&scratch, m), *dright = take(&scratch, m);
     face_stresses(system, body, at, left, right);
     face_changes(system, body, at, change, dleft, dright);
     Stress found = stress_in(body, left, right);
@@ -141,23 +137,21 @@ static void flexure_changes(const Tangent *t, const FreeBody *body, const Sectio
     out[STRESS_STRESS_START] = dleft[0];
     out[STRESS_STRESS_END] = dleft[m - 1];
     out[STRESS_STRESS] = stress < 0.0 ? -dstress : dstress;
-    scratch->used = mark;
 }
 
 PRBM void stress_changes(const Tangent *t, double *out) {
     const System *system = t->eq->system;
     const Mechanism *m = system->mechanism;
-    Scratch *scratch = &t->sim->scratch;
-    size_t mark = scratch->used;
+    Scratch scratch = t->scratch;
     if (m->stressed_count == 0) {
         return;
     }
-    SectionState at = section_state(t->eq, t->e, t->y, t->v, t->evaluation, scratch);
-    SectionState change = state_change(t);
+    SectionState at = section_state(t->eq, t->e, t->y, t->v, t->evaluation, &scratch);
+    SectionState change = state_change(t, &scratch);
     for (int i = 0, k = 0; i < m->flexure_count; i++) {
         if (has_stress(m, i)) {
-            flexure_changes(t, &system->free_bodies[i], &at, &change, out + PER_STRESS * k++);
+            flexure_changes(t, &system->free_bodies[i], &at, &change, out + PER_STRESS * k++,
+                            scratch);
         }
     }
-    scratch->used = mark;
 }

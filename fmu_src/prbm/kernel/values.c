@@ -34,7 +34,7 @@ static bool load_present(Simulation *sim, Problem *problem) {
         return true;
     }
     return arc_state(sim, present->y, present->e, &present->reference, &present->evaluation,
-                     problem);
+                     sim->scratch, problem);
 }
 
 PRBM const double *present_outputs(Simulation *sim, int groups, Problem *problem) {
@@ -76,15 +76,14 @@ static bool get_derivative(Simulation *sim, int k, double *x, Problem *problem) 
 }
 
 static bool get_indicator(Simulation *sim, int k, double *x, Problem *problem) {
-    size_t mark = sim->scratch.used;
     Moment now;
     if (!present_moment(sim, &now, problem)) {
         return false;
     }
-    double *z = take(&sim->scratch, (size_t)exchange_indicators(sim));
+    Scratch scratch = sim->scratch;
+    double *z = take(&scratch, (size_t)exchange_indicators(sim));
     event_indicators(sim, &now.at, z);
     *x = z[k];
-    sim->scratch.used = mark;
     return true;
 }
 

@@ -16,7 +16,7 @@
 
 /* --- flexures, joints and free bodies, from the ground outwards ------------------------------- */
 
-static bool walk_joint(System *system, const Step *step, Scratch *scratch, Problem *problem) {
+static bool walk_joint(System *system, const Step *step, Scratch scratch, Problem *problem) {
     Span span = span_of(system, step);
     double apart = modulus(minus(span.z_end, span.z_start));
     if (!(apart <= JOINT_DISTANCE_RTOL * system->length)) {
@@ -25,7 +25,7 @@ static bool walk_joint(System *system, const Step *step, Scratch *scratch, Probl
                     "place",
                     step->name, apart);
     }
-    Place spot = new_place(system, scratch), other = new_place(system, scratch);
+    Place spot = new_place(system, &scratch), other = new_place(system, &scratch);
     on_body(system, span.root, span.z_start, &spot);
     if (step->closes) {
         on_body(system, span.far, span.z_end, &other);
@@ -37,10 +37,10 @@ static bool walk_joint(System *system, const Step *step, Scratch *scratch, Probl
 }
 
 /* Place a free body at its centre of mass, with an arm that floats. */
-static void walk_free_body(System *system, const Step *step, Scratch *scratch) {
+static void walk_free_body(System *system, const Step *step, Scratch scratch) {
     const int arm = step->first_direction, turn = arm + 1 + SHIFTS_EACH;
     const int *first = system->mechanism->map.first;
-    Place spot = new_place(system, scratch);
+    Place spot = new_place(system, &scratch);
     Complex drawn = at_point(system, system->mechanism->bodies[step->body - 1].centre);
     for (int j = arm + 1; j < turn; j++) {
         system->factors[first[j]] = system->length;
@@ -50,7 +50,7 @@ static void walk_free_body(System *system, const Step *step, Scratch *scratch) {
     reach(system, step->body, &spot, drawn, turn);
 }
 
-static bool walk_step(System *system, const Step *step, Scratch *scratch, Problem *problem) {
+static bool walk_step(System *system, const Step *step, Scratch scratch, Problem *problem) {
     if (step->body != GROUND) {
         walk_free_body(system, step, scratch);
         return true;
@@ -59,16 +59,14 @@ static bool walk_step(System *system, const Step *step, Scratch *scratch, Proble
                          : walk_joint(system, step, scratch, problem);
 }
 
-static bool walk_all(System *system, Scratch *scratch, Problem *problem) {
+static bool walk_all(System *system, Scratch scratch, Problem *problem) {
     const Mechanism *m = system->mechanism;
     bool ok = true;
     system->r = 0;
     clear_branches(system);
     for (int i = 0; ok && i < m->step_count; i++) {
-        size_t mark = scratch->used;
         begin_branch(system, i);
         ok = walk_step(system, &m->steps[i], scratch, problem);
-        scratch->used = mark;
     }
     system->r = m->loop_count;
     return ok;
@@ -76,24 +74,21 @@ static bool walk_all(System *system, Scratch *scratch, Problem *problem) {
 
 /* Set the frame of a point of a body, given by its drawn position. */
 static void add_frame(System *system, int body, Complex drawn, BodyFrame *frame,
-                      Scratch *scratch) {
-    size_t mark = scratch->used;
-    Place spot = new_place(system, scratch);
+                      Scratch scratch) {
+    Place spot = new_place(system, &scratch);
     on_body(system, body, drawn, &spot);
     frame->arm = system->origins[body].j;
     frame->j = frame->arm == FIXED ? FIXED : angle_of(system, frame->arm);
     frame->c = spot.c;
     frame->drawn = drawn;
     memcpy(frame->A, spot.A, (size_t)system->d * sizeof *frame->A);
-    scratch->used = mark;
 }
 
-static void add_body(System *system, int body, Scratch *scratch) {
-    size_t mark = scratch->used;
+static void add_body(System *system, int body, Scratch scratch) {
     const Body *part = &system->mechanism->bodies[body - 1];
     BodyFrame *frame = &system->bodies[body - 1];
     Complex drawn = at_point(system, part->centre);
-    Place centre = new_place(system, scratch);
+    Place centre = new_place(system, &scratch);
     on_body(system, body, drawn, &centre);
     if (system->mechanism->stressed_count > 0) {
         system->body_masses[body - 1] = system->p;
@@ -101,10 +96,9 @@ static void add_body(System *system, int body, Scratch *scratch) {
     add_mass(system, &centre, evaluate(part->mass, system->values));
     add_frame(system, body, drawn, frame, scratch);
     system->J[frame->arm] += evaluate(part->inertia, system->values);
-    scratch->used = mark;
 }
 
-static void add_pushed_and_probes(System *system, Scratch *scratch) {
+static void add_pushed_and_probes(System *system, Scratch scratch) {
     const Mechanism *m = system->mechanism;
     for (int i = 0; i < m->force_count; i++) {
         const Force *force = &m->forces[i];
@@ -155,19 +149,16 @@ static void add_stop(System *system, int i, const Complex *e0, Place *hit) {
     system->gaps_c[i] = origin->j == FIXED ? straight : seen_drawn.re;
 }
 
-static void add_stops(System *system, const Complex *e0, Scratch *scratch) {
-    size_t mark = scratch->used;
-    Place hit = new_place(system, scratch);
+static void add_stops(System *system, const Complex *e0, Scratch scratch) {
+    Place hit = new_place(system, &scratch);
     for (int i = 0; i < system->s; i++) {
         add_stop(system, i, e0, &hit);
     }
-    scratch->used = mark;
 }
 
-static void add_frictions(System *system, const Complex *e0, Scratch *scratch) {
-    size_t mark = scratch->used;
+static void add_frictions(System *system, const Complex *e0, Scratch scratch) {
     int d = system->d;
-    Place spot = new_place(system, scratch);
+    Place spot = new_place(system, &scratch);
     for (int i = 0; i < system->mechanism->friction_count; i++) {
         const Friction *friction = &system->mechanism->frictions[i];
         Complex u = unit(friction->direction), across = product(complex_of(0.0, 1.0), u);
@@ -177,7 +168,6 @@ static void add_frictions(System *system, const Complex *e0, Scratch *scratch) {
         system->rubs_on[i] = system->normals[i] = FIXED;
         system->lifts_c[i] = along(d, across, spot.A, e0, system->lifts + i * d);
     }
-    scratch->used = mark;
 }
 
 /* Return the end of the block of a symmetric matrix (size, size) that begins at start.  linked
@@ -241,10 +231,10 @@ static void link_coordinates(const System *system, int i, int j, bool *linked) {
 }
 
 /* Find the blocks of the mass matrices of the directions and of the coordinates. */
-static void find_all_blocks(System *system, Scratch *scratch) {
-    size_t mark = scratch->used, n = (size_t)system->n, d = (size_t)system->d;
-    bool *linked = (bool *)take_matrix(scratch, (int)d, (int)d);
-    bool *joined = (bool *)take_matrix(scratch, (int)n, (int)n);
+static void find_all_blocks(System *system, Scratch scratch) {
+    size_t n = (size_t)system->n, d = (size_t)system->d;
+    bool *linked = (bool *)take_matrix(&scratch, (int)d, (int)d);
+    bool *joined = (bool *)take_matrix(&scratch, (int)n, (int)n);
     memset(joined, 0, n * n * sizeof *joined);
     for (int i = 0; i < system->d * system->d; i++) {
         linked[i] = system->H[i].re != 0.0 || system->H[i].im != 0.0 ||
@@ -256,7 +246,6 @@ static void find_all_blocks(System *system, Scratch *scratch) {
     system->block_count = find_blocks(system->d, linked, system->blocks);
     system->mass_block_count = find_blocks(system->n, joined, system->mass_blocks);
     find_last(system, joined, system->last);
-    scratch->used = mark;
 }
 
 /* Copy the arrays that the equations of motion read often, in the order of reading. */
@@ -297,7 +286,7 @@ static void add_moments_of(System *system, double mass, const Complex *A) {
     }
 }
 
-static void add_moments(System *system, Scratch *scratch) {
+static void add_moments(System *system, Scratch scratch) {
     size_t d = (size_t)system->d;
     memset(system->H, 0, d * d * sizeof *system->H);
     memset(system->S, 0, d * sizeof *system->S);
@@ -312,12 +301,11 @@ static void add_moments(System *system, Scratch *scratch) {
 /* Return the size of the drawn mechanism [m]: the largest distance between points of the ground and
  * centres of mass, but at least the length of the longest flexure.  Without flexures, hit points
  * count, too; if all points coincide, the size is 1 m. */
-static double size_of(const System *system, Scratch *scratch) {
+static double size_of(const System *system, Scratch scratch) {
     const Mechanism *m = system->mechanism;
-    size_t mark = scratch->used;
     int others = m->ground_count + m->body_count;
     int count = others + (m->flexure_count > 0 ? 0 : m->stop_count);
-    Complex *points = take_complex(scratch, count, 1);
+    Complex *points = take_complex(&scratch, count, 1);
     double longest = 0.0;
     for (int i = 0; i < m->flexure_count; i++) {
         const Connection *c = &m->flexures[i].between;
@@ -332,7 +320,6 @@ static double size_of(const System *system, Scratch *scratch) {
             longest = greater(modulus(minus(points[i], points[k])), longest);
         }
     }
-    scratch->used = mark;
     return longest > 0.0 ? longest : 1.0;
 }
 
@@ -396,13 +383,13 @@ static bool check_ratio(const System *system, const double *M, Problem *problem)
 /* Return whether no pivot of M = Re(U^* G U), G = H + diag(J), is round-off in any configuration U,
  * a diagonal matrix of unit vectors.  The pivots of M are at least those of G: both are minima of
  * the same quadratic form, for M over fewer vectors. */
-static bool definite_everywhere(const System *system, Scratch *scratch) {
-    size_t mark = scratch->used;
+static bool definite_everywhere(const System *system, Scratch scratch) {
     const Complex *H = system->coupling;
     bool definite = !system->mapped;
     for (int block = 0; definite && block < system->block_count; block++) {
         int start = system->blocks[block].start, size = system->blocks[block].size;
-        Complex *G = take_complex(scratch, size, size);
+        Scratch inner = scratch;
+        Complex *G = take_complex(&inner, size, size);
         memcpy(G, H, (size_t)(size * size) * sizeof *G);
         for (int k = 0; definite && k < size; k++) {
             double diagonal = system->own[start + k];
@@ -417,19 +404,17 @@ static bool definite_everywhere(const System *system, Scratch *scratch) {
             }
         }
         H += size * size;
-        scratch->used = mark;
     }
     return definite;
 }
 
 /* Check the mass matrix, and derive the least mobility of a row from it. */
-static bool check_masses(System *system, const Complex *e0, Scratch *scratch, Problem *problem) {
-    size_t mark = scratch->used, n = (size_t)system->n;
-    double *M = take(scratch, n * n), *w = take(scratch, n);
-    double *scale = take(scratch, n);
+static bool check_masses(System *system, const Complex *e0, Scratch scratch, Problem *problem) {
+    size_t n = (size_t)system->n;
+    double *M = take(&scratch, n * n), *w = take(&scratch, n);
+    double *scale = take(&scratch, n);
     mass_matrix(system, e0, M, scratch);
     if (!check_ratio(system, M, problem)) {
-        scratch->used = mark;
         return false;
     }
     double row = ROW_RTOL * system->length;
@@ -446,12 +431,10 @@ static bool check_masses(System *system, const Complex *e0, Scratch *scratch, Pr
     }
     if (regular) {
         if (!symmetric_eigen(system->n, M, w, NULL, problem)) {
-            scratch->used = mark;
             return false;
         }
         regular = w[0] > SINGULAR_RTOL;
     }
-    scratch->used = mark;
     if (!regular) {
         return fail(problem,
                     "a part that can move has no mass: give the flexures a density and the bodies "
@@ -461,22 +444,20 @@ static bool check_masses(System *system, const Complex *e0, Scratch *scratch, Pr
 }
 
 /* Compute gamma0, the relative length of the stub, of each type with several pivots. */
-static bool stubs(System *system, Scratch *scratch, Problem *problem) {
+static bool stubs(System *system, Scratch scratch, Problem *problem) {
     const Mechanism *m = system->mechanism;
     int count = 0;
     for (int i = 0; i < m->type_count; i++) {
-        size_t mark = scratch->used;
         int pivots = m->types[i].pivots;
         if (pivots < 2) {
             continue;
         }
-        double *gamma = take(scratch, (size_t)pivots), gamma0;
+        Scratch inner = scratch;
+        double *gamma = take(&inner, (size_t)pivots), gamma0;
         for (int k = 0; k < pivots; k++) {
             gamma[k] = evaluate(m->types[i].gamma[k], system->values);
         }
-        bool ok = stub(pivots, gamma, &gamma0, problem);
-        scratch->used = mark;
-        if (!ok) {
+        if (!stub(pivots, gamma, &gamma0, problem)) {
             return false;
         }
         system->calculated[count++] = gamma0;
@@ -507,11 +488,11 @@ static void clear(System *system) {
 }
 
 /* Set the vector along a coil spring and its law. */
-static bool add_coil(System *system, int k, Scratch *scratch, Problem *problem) {
+static bool add_coil(System *system, int k, Scratch scratch, Problem *problem) {
     const Coil *coil = &system->mechanism->coils[k];
     const Connection *c = &coil->between;
     const double *values = system->values;
-    Place start = new_place(system, scratch), end = new_place(system, scratch);
+    Place start = new_place(system, &scratch), end = new_place(system, &scratch);
     Complex from = at_point(system, c->start_point), to = at_point(system, c->end_point);
     double apart = modulus(minus(to, from));
     if (!(apart > SPRING_APART_RTOL * system->length)) {
@@ -560,13 +541,11 @@ static void add_torsions(System *system) {
 }
 
 /* Add torsion and coil springs, and compute the stiffness of the drawn shape. */
-static bool add_elements(System *system, Scratch *scratch, Problem *problem) {
+static bool add_elements(System *system, Scratch scratch, Problem *problem) {
     bool ok = true;
     add_torsions(system);
     for (int k = 0; ok && k < system->coil_count; k++) {
-        size_t mark = scratch->used;
         ok = add_coil(system, k, scratch, problem);
-        scratch->used = mark;
     }
     if (ok && system->stiffness != system->K) {
         element_stiffness(system, system->e0, system->stiffness, scratch);
@@ -574,7 +553,7 @@ static bool add_elements(System *system, Scratch *scratch, Problem *problem) {
     return ok;
 }
 
-static void add_arrays(System *system, Scratch *scratch) {
+static void add_arrays(System *system, Scratch scratch) {
     const Release *release = &system->mechanism->release;
     Complex *e0 = system->e0;
     for (int j = 0; j < system->n; j++) {
@@ -594,9 +573,8 @@ static void add_arrays(System *system, Scratch *scratch) {
     system->anchor = first_ground_end(system);
 }
 
-PRBM bool assemble(System *system, const double *values, Scratch *scratch, Problem *problem) {
+PRBM bool assemble(System *system, const double *values, Scratch scratch, Problem *problem) {
     const Mechanism *m = system->mechanism;
-    size_t mark = scratch->used;
     system->values = values;
     system->assembly += 1;
     system->gravity = complex_of(values[m->gravity[0]], values[m->gravity[1]]);
@@ -609,6 +587,5 @@ PRBM bool assemble(System *system, const double *values, Scratch *scratch, Probl
              check_loops(system, system->e0, scratch, problem) &&
              check_masses(system, system->e0, scratch, problem);
     }
-    scratch->used = mark;
     return ok;
 }

@@ -4,6 +4,6 @@
 
 #include "core/system.h"
 
-PRBM bool assemble(System *system, const double *values, Scratch *scratch, Problem *problem);
+PRBM bool assemble(System *system, const double *values, Scratch scratch, Problem *problem);
 
 #endif

@@ -56,9 +56,8 @@ PRBM void interpolation(int nodes, double x, double *result) {
 
 /* The recurrence u p_k = b_(k+1) p_(k+1) + a_k p_k + b_k p_(k-1) is that of Stieltjes. */
 PRBM void orthogonal(int m, int order, const double *u, const double *weights, double *P,
-                     Scratch *scratch) {
-    size_t mark = scratch->used;
-    double *before = take(scratch, (size_t)m), *p = take(scratch, (size_t)m), b = 0.0;
+                     Scratch scratch) {
+    double *before = take(&scratch, (size_t)m), *p = take(&scratch, (size_t)m), b = 0.0;
     for (int i = 0; i < m; i++) {
         before[i] = 0.0;
         p[i] = 1.0;
@@ -80,7 +79,6 @@ PRBM void orthogonal(int m, int order, const double *u, const double *weights, d
             p[i] = following;
         }
     }
-    scratch->used = mark;
 }
 
 /* --- sections --------------------------------------------------------------------------------- */
@@ -169,10 +167,10 @@ static void set_integrals(const Beam *beam, const Fine *fine, const double *shar
  * the integrals over the beam, moments (MOMENTS,).  The cuts follow the fine points, with the
  * weight 0. */
 static void set_bending(Beam *beam, const Fine *fine, const Section *cuts, Complex *moments,
-                        Scratch *scratch) {
+                        Scratch scratch) {
     int n = beam->order + 1, Q = fine->count, all = Q + beam->cut_count, node = 0, interval = 0;
-    double *u = take(scratch, (size_t)all), *shares = take(scratch, (size_t)all), total = 0.0;
-    double *P = take_matrix(scratch, all, n), *sums = take(scratch, (size_t)n);
+    double *u = take(&scratch, (size_t)all), *shares = take(&scratch, (size_t)all), total = 0.0;
+    double *P = take_matrix(&scratch, all, n), *sums = take(&scratch, (size_t)n);
     for (int i = 0; i < Q; i++) {
         const Section *s = &fine->sections[i];
         u[i] = 2.0 * s->v / line_length(beam->line) - 1.0;
@@ -254,10 +252,10 @@ static void correct_steps(const Beam *beam, const double *weights, Complex *mome
 
 /* Set the masses, the radii of gyration, and the lengths for the end and for the nodes. */
 static void set_nodes(Beam *beam, const Section *sections, const double *x, const double *weights,
-                      Complex *moments, Scratch *scratch) {
+                      Complex *moments, Scratch scratch) {
     int N = beam->nodes, first = 0;
-    Complex *steps = take_complex(scratch, N, 1), factor = direction_factor(beam->line);
-    double *lengths = take(scratch, (size_t)N);
+    Complex *steps = take_complex(&scratch, N, 1), factor = direction_factor(beam->line);
+    double *lengths = take(&scratch, (size_t)N);
     for (int i = 0; i < N; i++) {
         double area = area_of(sections[i]);
         beam->masses[i] = beam->density * area * (weights[i] * arc(beam, sections[i]));
@@ -337,8 +335,8 @@ static double arc_lengths(const Beam *beam, const Fine *fine, double *places) {
 }
 
 /* Set the cuts.  A beam with waists is straight: v is the arc length. */
-static void set_cuts(Beam *beam, const Fine *fine, const Section *sections, Scratch *scratch) {
-    double *places = take(scratch, (size_t)beam->nodes);
+static void set_cuts(Beam *beam, const Fine *fine, const Section *sections, Scratch scratch) {
+    double *places = take(&scratch, (size_t)beam->nodes);
     Complex factor = direction_factor(beam->line);
     double length = arc_lengths(beam, fine, places);
     for (int k = 0; k < beam->cut_count; k++) {
@@ -370,23 +368,22 @@ static void take_arrays(Beam *beam, Scratch *scratch) {
 
 PRBM void set_beam(Beam *beam, Scratch *scratch) {
     take_arrays(beam, scratch);
-    size_t mark = scratch->used;
+    Scratch inner = *scratch;
     int N = beam->nodes, i = 0;
-    double *x = take(scratch, (size_t)N), *weights = take(scratch, (size_t)N);
-    Section *sections = take_sections(scratch, N);
+    double *x = take(&inner, (size_t)N), *weights = take(&inner, (size_t)N);
+    Section *sections = take_sections(&inner, N);
     for (int p = 0; p < beam->panel_count; p++) {
         gauss(beam->panels[p].nodes, x + i, weights + i);
         for (int k = 0; k < beam->panels[p].nodes; k++, i++) {
             sections[i] = section_at(&beam->panels[p], x[i]);
         }
     }
-    Fine fine = fine_points(beam, scratch);
-    Section *cuts = take_sections(scratch, N + CUTS_BESIDE_NODES);
-    Complex *moments = take_complex(scratch, MOMENTS, 1);
+    Fine fine = fine_points(beam, &inner);
+    Section *cuts = take_sections(&inner, N + CUTS_BESIDE_NODES);
+    Complex *moments = take_complex(&inner, MOMENTS, 1);
     collect_cuts(beam, x, cuts);
-    set_cuts(beam, &fine, cuts, scratch);
-    set_bending(beam, &fine, cuts, moments, scratch);
-    set_nodes(beam, sections, x, weights, moments, scratch);
+    set_cuts(beam, &fine, cuts, inner);
+    set_bending(beam, &fine, cuts, moments, inner);
+    set_nodes(beam, sections, x, weights, moments, inner);
     set_stretch(beam, &fine, sections);
-    scratch->used = mark;
 }

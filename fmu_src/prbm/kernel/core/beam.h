@@ -44,7 +44,7 @@ PRBM void integrals(int order, double x, double *S);
 PRBM void interpolation(int nodes, double x, double *result);
 /* Compute polynomials P (m, order + 1) that are orthogonal under weights (m,) at points u (m,). */
 PRBM void orthogonal(int m, int order, const double *u, const double *weights, double *P,
-                     Scratch *scratch);
+                     Scratch scratch);
 /* The number of doubles that a beam needs. */
 PRBM size_t beam_size(int order, int nodes, int panels);
 /* Set the arrays of a beam, of which the other members are given. */

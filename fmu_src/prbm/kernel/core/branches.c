@@ -133,10 +133,10 @@ static int index_in(int count, const int *list, int number) {
 }
 
 /* Set the coordinates that the directions of a branch depend on, and their changes. */
-static void set_changes(System *system, Branch *branch, Scratch *scratch) {
+static void set_changes(System *system, Branch *branch, Scratch scratch) {
     const DirectionMap *map = &system->mechanism->map;
     const int first = map->first[branch->start], end = map->first[branch->start + branch->size];
-    bool *used = (bool *)take(scratch, (size_t)system->n);
+    bool *used = (bool *)take(&scratch, (size_t)system->n);
     memset(used, 0, (size_t)system->n * sizeof *used);
     branch->count = 0;
     for (int k = first; k < end; k++) {
@@ -326,7 +326,7 @@ static BranchCode code_of(const System *system, const Branch *branch) {
     }
 }
 
-PRBM void set_branches(System *system, Scratch *scratch) {
+PRBM void set_branches(System *system, Scratch scratch) {
     int roots = 0;
     system->mass_size = 0;
     for (int k = 0; k < system->mass_block_count; k++) {
@@ -336,9 +336,7 @@ PRBM void set_branches(System *system, Scratch *scratch) {
     zeros(system->mapped ? system->n * system->n : 0, system->constant_mass);
     for (int k = 0; k < system->branch_count; k++) {
         Branch *branch = &system->branches[k];
-        size_t mark = scratch->used;
         set_changes(system, branch, scratch);
-        scratch->used = mark;
         set_coupling(system, branch);
         branch->S = place_parts(&system->branch_memory, (size_t)branch->even);
         set_parts(system, branch, system->S, branch->S);

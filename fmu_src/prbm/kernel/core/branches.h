@@ -13,6 +13,6 @@ PRBM void clear_branches(System *system);
  * have no branches. */
 PRBM void begin_branch(System *system, int step);
 /* Set the constants of all branches from the factors and masses of the system. */
-PRBM void set_branches(System *system, Scratch *scratch);
+PRBM void set_branches(System *system, Scratch scratch);
 
 #endif

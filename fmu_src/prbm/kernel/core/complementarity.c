@@ -132,8 +132,7 @@ static bool follow_pivots(Pivots *pivots, int row, int *rows) {
 }
 
 PRBM bool lemke(int m, const double *M, const double *q, const double *cover, double *z,
-                Scratch *scratch) {
-    size_t used = scratch->used;
+                Scratch scratch) {
     int last = 0, exponent;
     zeros(m, z);
     for (int i = 0; i < m; i++) {
@@ -144,12 +143,11 @@ PRBM bool lemke(int m, const double *M, const double *q, const double *cover, do
     }
     (void)frexp(largest(m, q), &exponent);
     double size = ldexp(1.0, exponent);
-    Pivots pivots = first_pivots(m, M, q, cover, size, scratch);
-    bool solved = follow_pivots(&pivots, last, take_integers(scratch, m));
+    Pivots pivots = first_pivots(m, M, q, cover, size, &scratch);
+    bool solved = follow_pivots(&pivots, last, take_integers(&scratch, m));
     if (solved) {
         values_of(&pivots, size, z);
     }
-    scratch->used = used;
     return solved;
 }
 
@@ -254,9 +252,8 @@ static void leave_out(int k, int size, const double *u, double tolerance, double
 
 /* Follow the path of one covering vector to forces P; false if it ends in a ray. */
 static bool follow_path(int k, int m, int size, const double *M, const double *q, int heavy,
-                        const double *scale, double *P, Scratch *scratch) {
-    size_t used = scratch->used;
-    double *z = take(scratch, (size_t)size), *cover = take(scratch, (size_t)size);
+                        const double *scale, double *P, Scratch scratch) {
+    double *z = take(&scratch, (size_t)size), *cover = take(&scratch, (size_t)size);
     for (int i = 0; i < size; i++) {
         cover[i] = i == heavy ? COVER_FACTOR : 1.0;
     }
@@ -264,17 +261,15 @@ static bool follow_path(int k, int m, int size, const double *M, const double *q
     for (int i = 0; solved && i < k + m; i++) {
         P[i] = scale[i] * (i < k ? z[i] : z[i] - z[i + m]);
     }
-    scratch->used = used;
     return solved;
 }
 
 PRBM bool coulomb(int k, int m, const double *W, const double *u, const CoulombLaws *laws,
-                  double tolerance, double *P, Scratch *scratch) {
-    size_t used = scratch->used;
+                  double tolerance, double *P, Scratch scratch) {
     int size = k + 3 * m + laws->sides;
-    double *scale = take(scratch, (size_t)(k + m)), *M = take_matrix(scratch, size, size);
-    double *q = take(scratch, (size_t)size), *limit = take(scratch, (size_t)m);
-    double *rates = take(scratch, (size_t)(k + m)); /* without round-off */
+    double *scale = take(&scratch, (size_t)(k + m)), *M = take_matrix(&scratch, size, size);
+    double *q = take(&scratch, (size_t)size), *limit = take(&scratch, (size_t)m);
+    double *rates = take(&scratch, (size_t)(k + m)); /* without round-off */
     bool solved = false;
     int first = 1; /* The first attempt leaves contacts out, if there are any. */
     for (int i = 0; i < k; i++) {
@@ -302,17 +297,15 @@ PRBM bool coulomb(int k, int m, const double *W, const double *u, const CoulombL
             solved = solved && violation(k, m, W, u, P, limit) <= tolerance;
         }
     }
-    scratch->used = used;
     return solved;
 }
 
 /* --- impacts ---------------------------------------------------------------------------------- */
 
 PRBM bool impulses(int k, int m, const double *W, const double *u, const double *friction,
-                   const double *least, double tolerance, double *P, Scratch *scratch) {
-    size_t used = scratch->used;
-    double *given = take(scratch, (size_t)(k + m)), *fixed = take(scratch, (size_t)m);
-    int *normal = take_integers(scratch, m);
+                   const double *least, double tolerance, double *P, Scratch scratch) {
+    double *given = take(&scratch, (size_t)(k + m)), *fixed = take(&scratch, (size_t)m);
+    int *normal = take_integers(&scratch, m);
     for (int i = 0; i < k + m; i++) {
         given[i] = u[i] + dot(k, W + i * (k + m), least);
     }
@@ -325,6 +318,5 @@ PRBM bool impulses(int k, int m, const double *W, const double *u, const double 
     for (int i = 0; solved && i < k; i++) {
         P[i] += least[i];
     }
-    scratch->used = used;
     return solved;
 }

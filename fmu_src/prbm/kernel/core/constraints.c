@@ -264,39 +264,35 @@ PRBM void solve_saddle(const ScaledFactors *factors, double *right) {
     }
 }
 
-PRBM bool solve(int n, int r, double *kkt, double *right, double length, Scratch *scratch,
+PRBM bool solve(int n, int r, double *kkt, double *right, double length, Scratch scratch,
                 Problem *problem) {
-    size_t mark = scratch->used;
-    ScaledFactors factors = take_factors(scratch, n + r, kkt);
+    ScaledFactors factors = take_factors(&scratch, n + r, kkt);
     bool regular = factor_saddle(n, r, length, &factors, problem);
     if (regular) {
         solve_saddle(&factors, right);
     }
-    scratch->used = mark;
     return regular;
 }
 
-PRBM int determinant_sign(int n, int r, double *kkt, double length, Scratch *scratch) {
-    size_t mark = scratch->used;
-    ScaledFactors factors = take_factors(scratch, n + r, kkt);
+PRBM int determinant_sign(int n, int r, double *kkt, double length, Scratch scratch) {
+    ScaledFactors factors = take_factors(&scratch, n + r, kkt);
     Problem ignored;
     bool regular = factor_saddle(n, r, length, &factors, &ignored), odd = false;
     for (int i = 0; regular && i < factors.size; i++) {
         odd ^= factors.pivots[i] != i;
         odd ^= factors.lu[i * factors.size + i] < 0.0;
     }
-    scratch->used = mark;
     return regular ? (odd ? -1 : 1) : 0;
 }
 
 /* --- projection ------------------------------------------------------------------------------- */
 
 PRBM bool project_positions(const System *system, const Rows *rows, double *q, const double *c,
-                            Complex *e, Scratch *scratch, Problem *problem) {
-    size_t mark = scratch->used, n = (size_t)system->n, r = (size_t)rows->count, size = n + r;
-    double *s = take(scratch, r), *G = take(scratch, r * n);
-    double *M = take(scratch, n * n);
-    double *kkt = take(scratch, size * size), *right = take(scratch, size);
+                            Complex *e, Scratch scratch, Problem *problem) {
+    size_t n = (size_t)system->n, r = (size_t)rows->count, size = n + r;
+    double *s = take(&scratch, r), *G = take(&scratch, r * n);
+    double *M = take(&scratch, n * n);
+    double *kkt = take(&scratch, size * size), *right = take(&scratch, size);
     double best = INFINITY;
     bool ok = true, closed = false;
     Rows now = *rows;
@@ -322,7 +318,6 @@ PRBM bool project_positions(const System *system, const Rows *rows, double *q, c
             }
         }
     }
-    scratch->used = mark;
     if (ok && !closed) {
         return fail(problem,
                     "the loops of the mechanism could not be closed near this shape: connected "
@@ -335,9 +330,9 @@ PRBM bool project_positions(const System *system, const Rows *rows, double *q, c
 
 PRBM bool project_velocities(int n, int r, const double *M, const double *rows,
                              const double *rates, double *v, double *impulses, double length,
-                             Scratch *scratch, Problem *problem) {
-    size_t mark = scratch->used, size = (size_t)(n + r);
-    double *kkt = take(scratch, size * size), *right = take(scratch, size);
+                             Scratch scratch, Problem *problem) {
+    size_t size = (size_t)(n + r);
+    double *kkt = take(&scratch, size * size), *right = take(&scratch, size);
     memset(right, 0, (size_t)n * sizeof *right);
     for (int k = 0; k < r; k++) {
         right[n + k] = -(dot(n, rows + k * n, v) + rates[k]);
@@ -353,6 +348,5 @@ PRBM bool project_velocities(int n, int r, const double *M, const double *rows,
     for (int k = 0; regular && impulses && k < r; k++) {
         impulses[k] = -right[n + k];
     }
-    scratch->used = mark;
     return regular;
 }

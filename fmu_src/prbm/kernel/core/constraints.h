@@ -66,19 +66,19 @@ PRBM void solve_saddle(const ScaledFactors *factors, double *right);
 
 /* Return the sign of the determinant of a saddle-point matrix, which is overwritten; 0 if it is
  * singular.  Along a path of equilibria it changes where an odd number of motions become unstable. */
-PRBM int determinant_sign(int n, int r, double *kkt, double length, Scratch *scratch);
+PRBM int determinant_sign(int n, int r, double *kkt, double length, Scratch scratch);
 /* Solve a saddle-point system; kkt is overwritten, right (n + r,) replaced by the solution. */
-PRBM bool solve(int n, int r, double *kkt, double *right, double length, Scratch *scratch,
+PRBM bool solve(int n, int r, double *kkt, double *right, double length, Scratch scratch,
                 Problem *problem);
 /* Project q (n,) onto the rows with the constants c (count,), and set e to the directions of q. */
 PRBM bool project_positions(const System *system, const Rows *rows, double *q, const double *c,
-                            Complex *e, Scratch *scratch, Problem *problem);
+                            Complex *e, Scratch scratch, Problem *problem);
 /* Move v (n,) onto rows v + rates = 0 by impulses along the rows.  The array impulses (r,) may be
  * NULL.  On entry it has the mobilities [1/kg] of the walls: an impulse P changes the rate of its
  * row by mobility times P.  On return it has the impulses [N s]. */
 PRBM bool project_velocities(int n, int r, const double *M, const double *rows,
                              const double *rates, double *v, double *impulses, double length,
-                             Scratch *scratch, Problem *problem);
+                             Scratch scratch, Problem *problem);
 PRBM int seen_from(const Rows *rows, int i);
 PRBM Complex seen_value(const Rows *rows, int i, const Complex *e);
 PRBM Complex row_swing(const Rows *rows, int i, const Complex *e, const double *v);

@@ -10,9 +10,8 @@
 #include "core/matrix.h"
 
 PRBM void factored_response(const ScaledFactors *factors, int n, int k, const double *rows,
-                            double *X, Scratch *scratch) {
-    size_t mark = scratch->used;
-    double *right = take(scratch, (size_t)factors->size);
+                            double *X, Scratch scratch) {
+    double *right = take(&scratch, (size_t)factors->size);
     for (int j = 0; j < k; j++) {
         copy(n, rows + j * n, right);
         zeros(factors->size - n, right + n);
@@ -21,20 +20,17 @@ PRBM void factored_response(const ScaledFactors *factors, int n, int k, const do
             X[i * k + j] = right[i];
         }
     }
-    scratch->used = mark;
 }
 
 PRBM bool response(int n, int r, int k, const double *M, const double *held, const double *rows,
-                   double length, double *X, Scratch *scratch, Problem *problem) {
-    size_t mark = scratch->used;
+                   double length, double *X, Scratch scratch, Problem *problem) {
     int size = n + r;
-    ScaledFactors factors = take_factors(scratch, size, take_matrix(scratch, size, size));
+    ScaledFactors factors = take_factors(&scratch, size, take_matrix(&scratch, size, size));
     saddle(n, r, M, held, held, factors.lu);
     bool regular = factor_saddle(n, r, length, &factors, problem);
     if (regular) {
         factored_response(&factors, n, k, rows, X, scratch);
     }
-    scratch->used = mark;
     return regular;
 }
 
@@ -76,11 +72,10 @@ static bool closing_in(Problem *problem) {
  * impulses are zero.  A stop with a negative impulse would pull: its impulse is set to zero, and it
  * is removed from members.  *pulling: whether a stop is removed. */
 static bool least_norm_impulses(int k, int *size, int *members, const double *W, const double *b,
-                           double *P, bool *pulling, Scratch *scratch, Problem *problem) {
-    size_t used = scratch->used;
+                           double *P, bool *pulling, Scratch scratch, Problem *problem) {
     int count = *size, pushing = 0;
-    double *part = take_matrix(scratch, count, count), *right = take(scratch, (size_t)count);
-    double *found = take(scratch, (size_t)count);
+    double *part = take_matrix(&scratch, count, count), *right = take(&scratch, (size_t)count);
+    double *found = take(&scratch, (size_t)count);
     for (int i = 0; i < count; i++) {
         right[i] = -b[members[i]];
         for (int j = 0; j < count; j++) {
@@ -98,17 +93,15 @@ static bool least_norm_impulses(int k, int *size, int *members, const double *W,
     }
     *size = pushing;
     *pulling = pushing < count;
-    scratch->used = used;
     return solved;
 }
 
 /* Distribute the impulses P (k,) as evenly as possible between the stops that open at the rate of
  * restitution.  P does not change if the result would violate the laws. */
 static bool share_evenly(int k, const double *W, const double *b, double tolerance, double *P,
-                         Scratch *scratch, Problem *problem) {
-    size_t used = scratch->used;
-    double *shared = take(scratch, (size_t)k);
-    int *members = take_integers(scratch, k), size = 0;
+                         Scratch scratch, Problem *problem) {
+    double *shared = take(&scratch, (size_t)k);
+    int *members = take_integers(&scratch, k), size = 0;
     for (int i = 0; i < k; i++) {
         if (fabs(dot(k, W + i * k, P) + b[i]) <= tolerance) {
             members[size++] = i;
@@ -122,14 +115,12 @@ static bool share_evenly(int k, const double *W, const double *b, double toleran
     if (solved && violation(k, 0, W, b, shared, NULL) <= tolerance) {
         copy(k, shared, P);
     }
-    scratch->used = used;
     return solved;
 }
 
 PRBM bool newton(int k, const double *W, const double *u, const double *restitution, double speed,
-                 double *P, Scratch *scratch, Problem *problem) {
-    size_t used = scratch->used;
-    double *b = take(scratch, (size_t)k), *least = take(scratch, (size_t)k);
+                 double *P, Scratch scratch, Problem *problem) {
+    double *b = take(&scratch, (size_t)k), *least = take(&scratch, (size_t)k);
     double tolerance = COMPLEMENTARITY_RTOL * greater(largest(k, u), speed);
     zeros(k, least);
     for (int i = 0; i < k; i++) {
@@ -137,7 +128,6 @@ PRBM bool newton(int k, const double *W, const double *u, const double *restitut
     }
     bool solved = impulses(k, 0, W, b, NULL, least, tolerance, P, scratch);
     solved = solved ? share_evenly(k, W, b, tolerance, P, scratch, problem) : closing_in(problem);
-    scratch->used = used;
     return solved;
 }
 
@@ -267,9 +257,8 @@ typedef struct {
  * whether their work is within the limits.  Return false if there are no such impulses. */
 static bool rebound(int k, const double *W, const double *after, const double *friction,
                     const double *wanted, double s, const WorkLimits *limits, double tolerance,
-                    double *R, bool *allowed, Scratch *scratch) {
-    size_t used = scratch->used;
-    double *least = take(scratch, (size_t)k);
+                    double *R, bool *allowed, Scratch scratch) {
+    double *least = take(&scratch, (size_t)k);
     for (int i = 0; i < k; i++) {
         least[i] = s * wanted[i];
     }
@@ -281,7 +270,6 @@ static bool rebound(int k, const double *W, const double *after, const double *f
         all += work;
     }
     *allowed = normal <= limits->normal && all <= limits->all;
-    scratch->used = used;
     return solved;
 }
 
@@ -290,7 +278,7 @@ static bool rebound(int k, const double *W, const double *after, const double *f
 static bool restitution_of_several(int k, const double *W, const double *after,
                                    const double *friction, const double *wanted,
                                    const WorkLimits *limits, double tolerance, double *R,
-                                   Scratch *scratch) {
+                                   Scratch scratch) {
     double low = 0.0, high = 1.0;
     bool allowed, trial;
     if (!rebound(k, W, after, friction, wanted, 1.0, limits, tolerance, R, &allowed, scratch)) {
@@ -318,30 +306,26 @@ static bool friction_locks(Problem *problem) {
 /* Report why no impulses of compression exist: friction is the cause if impulses without it would
  * open all gaps. */
 static bool unsolved_compression(int k, const double *W, const double *u, double tolerance,
-                                 Scratch *scratch, Problem *problem) {
-    size_t used = scratch->used;
-    double *normals = take_matrix(scratch, k, k), *least = take(scratch, (size_t)k);
-    double *P = take(scratch, (size_t)k);
+                                 Scratch scratch, Problem *problem) {
+    double *normals = take_matrix(&scratch, k, k), *least = take(&scratch, (size_t)k);
+    double *P = take(&scratch, (size_t)k);
     zeros(k, least);
     for (int i = 0; i < k; i++) {
         copy(k, W + i * 2 * k, normals + i * k);
     }
     bool opens = impulses(k, 0, normals, u, NULL, least, tolerance, P, scratch);
-    scratch->used = used;
     return opens ? friction_locks(problem) : closing_in(problem);
 }
 
 PRBM bool several(int k, const double *W, const double *u, const double *friction,
-                  const double *restitution, double speed, double *P, Scratch *scratch,
+                  const double *restitution, double speed, double *P, Scratch scratch,
                   Problem *problem) {
-    size_t used = scratch->used;
-    double *after = take(scratch, 2 * (size_t)k), *R = take(scratch, 2 * (size_t)k);
-    double *wanted = take(scratch, (size_t)k);
+    double *after = take(&scratch, 2 * (size_t)k), *R = take(&scratch, 2 * (size_t)k);
+    double *wanted = take(&scratch, (size_t)k);
     WorkLimits limits = {0.0, 0.0};
     double tolerance = COMPLEMENTARITY_RTOL * greater(largest(2 * k, u), speed);
     zeros(k, wanted);
     if (!impulses(k, k, W, u, friction, wanted, tolerance, P, scratch)) {
-        scratch->used = used;
         return unsolved_compression(k, W, u, tolerance, scratch, problem);
     }
     for (int i = 0; i < 2 * k; i++) {
@@ -360,6 +344,5 @@ PRBM bool several(int k, const double *W, const double *u, const double *frictio
     for (int i = 0; solved && i < 2 * k; i++) {
         P[i] += R[i];
     }
-    scratch->used = used;
     return solved || friction_locks(problem);
 }

@@ -18,7 +18,7 @@ PRBM void contact_problem_place(ContactProblem *at, const System *system, Memory
     at->factors.pivots = place(memory, size, sizeof(int));
 }
 
-PRBM void set_position(ContactProblem *at, const double *q, Scratch *scratch) {
+PRBM void set_position(ContactProblem *at, const double *q, Scratch scratch) {
     const System *system = at->system;
     size_t bytes = (size_t)system->n * sizeof *q;
     if (at->assembly == system->assembly && memcmp(at->q, q, bytes) == 0) {
@@ -44,7 +44,7 @@ PRBM bool factor_contacts(ContactProblem *at, Problem *problem) {
 }
 
 PRBM bool loop_response(ContactProblem *at, int k, const double *rows, double *X,
-                        Scratch *scratch, Problem *problem) {
+                        Scratch scratch, Problem *problem) {
     if (!factor_contacts(at, problem)) {
         return false;
     }
@@ -52,17 +52,15 @@ PRBM bool loop_response(ContactProblem *at, int k, const double *rows, double *X
     return true;
 }
 
-PRBM bool mobility(ContactProblem *at, const double *row, double *result, Scratch *scratch,
+PRBM bool mobility(ContactProblem *at, const double *row, double *result, Scratch scratch,
                    Problem *problem) {
-    size_t mark = scratch->used;
-    double *X = take(scratch, (size_t)at->system->n);
+    double *X = take(&scratch, (size_t)at->system->n);
     bool ok = loop_response(at, 1, row, X, scratch, problem);
     *result = ok ? dot(at->system->n, row, X) : 0.0;
-    scratch->used = mark;
     return ok;
 }
 
-PRBM bool moves(ContactProblem *at, const double *row, bool *result, Scratch *scratch,
+PRBM bool moves(ContactProblem *at, const double *row, bool *result, Scratch scratch,
                 Problem *problem) {
     double own = 0.0;
     bool ok = mobility(at, row, &own, scratch, problem);
@@ -71,17 +69,15 @@ PRBM bool moves(ContactProblem *at, const double *row, bool *result, Scratch *sc
 }
 
 PRBM bool independent(ContactProblem *at, int r, const double *held, const double *row,
-                      bool *result, Scratch *scratch, Problem *problem) {
-    size_t mark = scratch->used;
+                      bool *result, Scratch scratch, Problem *problem) {
     const System *system = at->system;
     int n = system->n;
-    double own = 0.0, *X = take(scratch, (size_t)n);
+    double own = 0.0, *X = take(&scratch, (size_t)n);
     bool ok = moves(at, row, result, scratch, problem);
     if (ok && *result) {
         ok = mobility(at, row, &own, scratch, problem) &&
              response(n, r, 1, at->M, held, row, system->length, X, scratch, problem);
         *result = ok && dot(n, row, X) > DEPENDENT_FRICTION_RTOL * own;
     }
-    scratch->used = mark;
     return ok;
 }

@@ -122,10 +122,9 @@ PRBM bool rate(const Equations *equations, double t, const double *y, const Refe
 /* Compute the second derivatives E (i w' - w^2) of the arms.  The acceleration of a point is its
  * row A times these derivatives. */
 PRBM void arm_accelerations(const System *system, const Complex *e, const double *v,
-                            const double *a, Complex *result, Scratch *scratch) {
-    size_t mark = scratch->used;
+                            const double *a, Complex *result, Scratch scratch) {
     int d = system->d;
-    Complex *w = take_complex(scratch, d, 1), *dw = take_complex(scratch, d, 1);
+    Complex *w = take_complex(&scratch, d, 1), *dw = take_complex(&scratch, d, 1);
     turning(system, v, w);
     turning(system, a, dw);
     for (int j = 0; j < d; j++) {
@@ -133,7 +132,6 @@ PRBM void arm_accelerations(const System *system, const Complex *e, const double
         result[j] = product(e[j], change);
     }
     float_velocities(system, a, result);
-    scratch->used = mark;
 }
 
 /* Return the product A E of a row of A. */
@@ -156,12 +154,11 @@ PRBM void guide_loads(const System *system, const double *lam, double *out) {
 }
 
 PRBM void base_reaction(const Equations *equations, const Complex *e, const double *v,
-                        const double *a, Complex *force, double *moment, Scratch *scratch) {
+                        const double *a, Complex *force, double *moment, Scratch scratch) {
     const System *system = equations->system;
-    size_t mark = scratch->used;
     int d = system->d;
     Complex field = minus(system->gravity, equations->inputs.base);
-    Complex *bend = take_complex(scratch, d, 1);
+    Complex *bend = take_complex(&scratch, d, 1);
     arm_accelerations(system, e, v, a, bend, scratch);
     *force = complex_of(0.0, 0.0);
     *moment = 0.0;
@@ -183,5 +180,4 @@ PRBM void base_reaction(const Equations *equations, const Complex *e, const doub
         *force = plus(*force, f);
         *moment += product(conjugate(z), f).im + given[2];
     }
-    scratch->used = mark;
 }

@@ -15,10 +15,10 @@ PRBM bool rate_at_time(const Equations *equations, const double *y, const Refere
 /* Copy the forces and moments of guides from lam, or their changes, to out. */
 PRBM void guide_loads(const System *system, const double *lam, double *out);
 PRBM void base_reaction(const Equations *equations, const Complex *e, const double *v,
-                        const double *a, Complex *force, double *moment, Scratch *scratch);
+                        const double *a, Complex *force, double *moment, Scratch scratch);
 /* Compute the second derivatives (d,) of the arms. */
 PRBM void arm_accelerations(const System *system, const Complex *e, const double *v,
-                            const double *a, Complex *result, Scratch *scratch);
+                            const double *a, Complex *result, Scratch scratch);
 PRBM Complex along_arms(int n, const Complex *A, const Complex *e);
 
 #endif

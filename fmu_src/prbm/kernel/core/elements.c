@@ -234,9 +234,8 @@ static void deflections(const System *system, const double *q, double share, dou
 }
 
 PRBM void element_forces(const System *system, const double *q, const Complex *e, double share,
-                         double *force, Scratch *scratch) {
-    size_t mark = scratch->used;
-    double *row = take(scratch, (size_t)system->n);
+                         double *force, Scratch scratch) {
+    double *row = take(&scratch, (size_t)system->n);
     deflections(system, q, share, row);
     springs(system->n, system->K, row, force);
     for (int k = 0; k < system->torsion_count; k++) {
@@ -249,15 +248,13 @@ PRBM void element_forces(const System *system, const double *q, const Complex *e
         span_gradient(system, k, scaled(1.0 / now.length, now.along), e, row);
         add_scaled(system->n, -now.tension, row, force);
     }
-    scratch->used = mark;
 }
 
 PRBM void element_tangent(const System *system, const Complex *e, double share, double *K_t,
-                          Scratch *scratch) {
-    size_t mark = scratch->used;
+                          Scratch scratch) {
     int d = system->d;
-    double *row = take(scratch, (size_t)system->n);
-    Complex *pulled = take_complex(scratch, d, 1);
+    double *row = take(&scratch, (size_t)system->n);
+    Complex *pulled = take_complex(&scratch, d, 1);
     copy(system->n * system->n, system->K, K_t);
     add_torsion_stiffness(system, K_t);
     for (int k = 0; k < system->coil_count; k++) {
@@ -270,13 +267,11 @@ PRBM void element_tangent(const System *system, const Complex *e, double share, 
         }
         add_geometric_stiffness(system, pulled, K_t);
     }
-    scratch->used = mark;
 }
 
 PRBM double element_energy(const System *system, const double *q, const Complex *e,
-                           Scratch *scratch) {
-    size_t mark = scratch->used;
-    double *turned = take(scratch, (size_t)system->n);
+                           Scratch scratch) {
+    double *turned = take(&scratch, (size_t)system->n);
     deflections(system, q, 1.0, turned);
     double energy = elastic_energy(system->n, system->K, turned);
     for (int k = 0; k < system->torsion_count; k++) {
@@ -286,13 +281,11 @@ PRBM double element_energy(const System *system, const double *q, const Complex 
     for (int k = 0; k < system->coil_count; k++) {
         energy += spring_energy(&system->laws[k], spring_state(system, k, e, 1.0).elongation);
     }
-    scratch->used = mark;
     return energy;
 }
 
-PRBM void element_stiffness(const System *system, const Complex *e, double *K, Scratch *scratch) {
-    size_t mark = scratch->used;
-    double *row = take(scratch, (size_t)system->n);
+PRBM void element_stiffness(const System *system, const Complex *e, double *K, Scratch scratch) {
+    double *row = take(&scratch, (size_t)system->n);
     copy(system->n * system->n, system->K, K);
     add_torsion_stiffness(system, K);
     for (int k = 0; k < system->coil_count; k++) {
@@ -300,7 +293,6 @@ PRBM void element_stiffness(const System *system, const Complex *e, double *K, S
         Stiffnesses own = positive_stiffnesses(&system->laws[k], &now);
         add_stiffnesses(system, k, &now, own, e, K, row);
     }
-    scratch->used = mark;
 }
 
 PRBM void element_torques(const System *system, const Complex *e, const double *w, double *torques,

@@ -44,14 +44,14 @@ PRBM bool element_strained(const System *system);
 /* Compute the elastic forces (n,) of all elements along the coordinates.  share: that of the initial
  * strains, of the free angles and of the pretension of springs. */
 PRBM void element_forces(const System *system, const double *q, const Complex *e, double share,
-                         double *force, Scratch *scratch);
+                         double *force, Scratch scratch);
 /* Set K_t (n, n) to minus the derivatives of these forces. */
 PRBM void element_tangent(const System *system, const Complex *e, double share, double *K_t,
-                          Scratch *scratch);
+                          Scratch scratch);
 PRBM double element_energy(const System *system, const double *q, const Complex *e,
-                           Scratch *scratch);
+                           Scratch scratch);
 /* Set K (n, n) to the stiffness without negative parts. */
-PRBM void element_stiffness(const System *system, const Complex *e, double *K, Scratch *scratch);
+PRBM void element_stiffness(const System *system, const Complex *e, double *K, Scratch scratch);
 /* Set torques (n,) to the product of this stiffness and w (n,); row (n,) is working memory. */
 PRBM void element_torques(const System *system, const Complex *e, const double *w, double *torques,
                           double *row);

@@ -83,9 +83,9 @@ static bool is_stretch(const System *system, int j) {
     return j < system->d && arm_of(system, j) != j;
 }
 
-static bool walk_links(System *system, const Step *step, Scratch *scratch, Problem *problem) {
+static bool walk_links(System *system, const Step *step, Scratch scratch, Problem *problem) {
     Segments pieces = {0, NULL, NULL, NULL, NULL, NULL};
-    if (!cut_flexure(system, step->flexure, &pieces, scratch, problem)) {
+    if (!cut_flexure(system, step->flexure, &pieces, &scratch, problem)) {
         return false;
     }
     if (step->backwards) {
@@ -94,10 +94,10 @@ static bool walk_links(System *system, const Step *step, Scratch *scratch, Probl
     Span span = span_of(system, step);
     Complex along_it = minus(span.z_end, span.z_start);
     Complex direction = scaled(1.0 / modulus(along_it), along_it);
-    Place spot = new_place(system, scratch), spare = new_place(system, scratch);
+    Place spot = new_place(system, &scratch), spare = new_place(system, &scratch);
     on_body(system, span.root, span.z_start, &spot);
     add_corner(system, &spot);
-    int *owners = take_integers(scratch, pieces.n + 2), next = step->first_direction;
+    int *owners = take_integers(&scratch, pieces.n + 2), next = step->first_direction;
     FreeBody *free_body = begin_free_body(system, step);
     owners[0] = system->origins[span.root].j;
     const FlexureType *kind = kind_of(system->mechanism, step->flexure);
@@ -211,10 +211,10 @@ static void add_section(System *system, const Place *spot, int arm, double mass,
 
 /* Place the masses and the far end of a beam; return its direction as drawn. */
 static Complex place_beam(System *system, const Step *step, const Beam *beam,
-                          const FlexureType *kind, Scratch *scratch) {
+                          const FlexureType *kind, Scratch scratch) {
     FreeBody *free_body = begin_free_body(system, step);
-    Place root = new_place(system, scratch), spot = new_place(system, scratch);
-    Place spare = new_place(system, scratch);
+    Place root = new_place(system, &scratch), spot = new_place(system, &scratch);
+    Place spare = new_place(system, &scratch);
     Span span = span_of(system, step);
     int stride = kind->axial ? 2 : 1, nodes = beam->nodes;
     Complex along_it = minus(span.z_end, span.z_start);
@@ -231,7 +231,7 @@ static Complex place_beam(System *system, const Step *step, const Beam *beam,
         rank_points(free_body, system, i);
         add_corner(system, &spot);
     }
-    Complex *none = take_complex(scratch, nodes, 1);
+    Complex *none = take_complex(&scratch, nodes, 1);
     zeros(2 * nodes, (double *)none);
     beam_place(system, step, beam, stride, &root, direction,
                step->backwards ? none : beam->whole, &spot);
@@ -292,7 +292,7 @@ static bool set_panels(const System *system, const Flexure *flexure, const Flexu
     return true;
 }
 
-static bool walk_beam(System *system, const Step *step, Scratch *scratch, Problem *problem) {
+static bool walk_beam(System *system, const Step *step, Scratch scratch, Problem *problem) {
     const Flexure *flexure = step->flexure;
     const FlexureType *kind = kind_of(system->mechanism, flexure);
     Panel panels[PANELS_MAX];
@@ -306,7 +306,7 @@ static bool walk_beam(System *system, const Step *step, Scratch *scratch, Proble
         !set_panels(system, flexure, kind, line_length(beam.line), panels, problem)) {
         return false;
     }
-    set_beam(&beam, scratch);
+    set_beam(&beam, &scratch);
     BeamCoordinates at = beam_coordinates(system, step);
     turn_nodes(system, step, &beam, &at, kind->axial);
     Complex direction = place_beam(system, step, &beam, kind, scratch);
@@ -345,7 +345,7 @@ static bool check_slender(const System *system, const Flexure *flexure, const Fl
     return true;
 }
 
-PRBM bool walk_flexure(System *system, const Step *step, Scratch *scratch, Problem *problem) {
+PRBM bool walk_flexure(System *system, const Step *step, Scratch scratch, Problem *problem) {
     const FlexureType *kind = kind_of(system->mechanism, step->flexure);
     if (!check_slender(system, step->flexure, kind, problem)) {
         return false;

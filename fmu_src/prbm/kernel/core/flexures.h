@@ -5,6 +5,6 @@
 #include "core/collection.h"
 
 /* Add a flexure of which at least one body has been reached. */
-PRBM bool walk_flexure(System *system, const Step *step, Scratch *scratch, Problem *problem);
+PRBM bool walk_flexure(System *system, const Step *step, Scratch scratch, Problem *problem);
 
 #endif

@@ -34,10 +34,9 @@ PRBM void force_row(int n, const Complex *A, Complex force, Complex *w) {
 }
 
 PRBM void load_rows(const System *system, const BodyFrame *frame, const Complex *e, double *rows,
-                    Scratch *scratch) {
-    size_t mark = scratch->used;
+                    Scratch scratch) {
     int n = system->n, d = system->d;
-    Complex *w = take_complex(scratch, d, 1);
+    Complex *w = take_complex(&scratch, d, 1);
     zeros(3 * n, rows);
     for (int k = 0; k < 2; k++) {
         force_row(d, frame->A, complex_of(k == 0, k == 1), w);
@@ -45,7 +44,6 @@ PRBM void load_rows(const System *system, const BodyFrame *frame, const Complex 
         add_loads(system, w, e, rows + k * n);
     }
     rows[2 * n + frame->j] = 1.0;
-    scratch->used = mark;
 }
 
 PRBM void generalised(int n, const Complex *w, const Complex *e, double *Q) {

@@ -10,7 +10,7 @@ PRBM void field_row(int n, const Complex *S, Complex acceleration, Complex *w);
 PRBM void force_row(int n, const Complex *A, Complex force, Complex *w);
 /* Set the generalised forces (3, n) of a unit force along x, along y and of a unit moment. */
 PRBM void load_rows(const System *system, const BodyFrame *frame, const Complex *e, double *rows,
-                    Scratch *scratch);
+                    Scratch scratch);
 PRBM void generalised(int n, const Complex *w, const Complex *e, double *Q);
 /* Add the generalised forces Phi^T Re(w e) of a row w (d,), spread, to Q (n,). */
 PRBM void add_loads(const System *system, const Complex *w, const Complex *e, double *Q);

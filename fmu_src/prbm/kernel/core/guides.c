@@ -26,13 +26,13 @@ static void set_guide_row(System *system, int k, int carrier, Complex normal, co
 }
 
 /* Add the rows of a guide from row k, and return the number of the rows. */
-static int add_guide(System *system, const Guide *guide, int k, GuideRows *rows, Scratch *scratch) {
+static int add_guide(System *system, const Guide *guide, int k, GuideRows *rows, Scratch scratch) {
     const Connection *c = &guide->between;
     const Place *origin = &system->origins[c->end];
     Complex at = at_point(system, c->start_point), start = at_point(system, c->end_point);
     Complex line = minus(at_point(system, guide->along), start);
     Complex along = scaled(1.0 / modulus(line), line);
-    Place apart = new_place(system, scratch);
+    Place apart = new_place(system, &scratch);
     on_body(system, c->start, at, &apart);
     for (int j = 0; j < system->d; j++) {
         apart.A[j] = minus(apart.A[j], origin->A[j]);
@@ -113,7 +113,7 @@ static bool floats_alone(const Mechanism *m, int body) {
     return found;
 }
 
-PRBM bool add_guides(System *system, Scratch *scratch, Problem *problem) {
+PRBM bool add_guides(System *system, Scratch scratch, Problem *problem) {
     const Mechanism *m = system->mechanism;
     int k = system->r - m->guided_count;
     for (int floating = 0; floating < 2; floating++) {
@@ -125,9 +125,7 @@ PRBM bool add_guides(System *system, Scratch *scratch, Problem *problem) {
                 return false;
             }
             if (alone == (floating == 1)) {
-                size_t mark = scratch->used;
                 k += add_guide(system, guide, k, &system->guided[i], scratch);
-                scratch->used = mark;
             }
         }
         system->tied = floating == 0 ? k : system->tied;
@@ -207,15 +205,14 @@ static void name_loops(int count, const char *const *names, bool *repeated, char
     }
 }
 
-PRBM bool check_loops(const System *system, const Complex *e0, Scratch *scratch,
+PRBM bool check_loops(const System *system, const Complex *e0, Scratch scratch,
                         Problem *problem) {
-    size_t mark = scratch->used;
     const Mechanism *m = system->mechanism;
     int r = system->r, n = system->n, closures = (r - m->guided_count) / 2;
-    double *rows = take_matrix(scratch, r, n), *shares = take_matrix(scratch, r, r);
-    int *loop = take_integers(scratch, r);
-    bool *repeated = (bool *)take_integers(scratch, r);
-    const char **every = (const char **)take_matrix(scratch, r, 1);
+    double *rows = take_matrix(&scratch, r, n), *shares = take_matrix(&scratch, r, r);
+    int *loop = take_integers(&scratch, r);
+    bool *repeated = (bool *)take_integers(&scratch, r);
+    const char **every = (const char **)take_matrix(&scratch, r, 1);
     char names[PROBLEM_LENGTH / 2];
     for (int i = 0; i < r; i++) {
         loop[i] = i / 2;
@@ -239,7 +236,6 @@ PRBM bool check_loops(const System *system, const Complex *e0, Scratch *scratch,
     double tolerance = DEPENDENT_LOOP_RTOL * scale;
     bool any = repeated_loops(r, n, rows, shares, loop, tolerance, repeated);
     name_loops(closures + m->guide_count, every, repeated, names, sizeof names);
-    scratch->used = mark;
     return !any || fail(problem,
                         "the constraints of %s depend on each other at the straight shape: rigid "
                         "links are over-constrained there; remove a part, move it out of line, or "

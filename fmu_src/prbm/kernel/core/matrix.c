@@ -230,11 +230,10 @@ static bool singular_values(int m, int n, const double *a, double *s, double *g,
 /* x is the sum of (left_i . b) right_i/s_i^2 over the singular values s_i above the limit.  One of
  * left_i and right_i has the norm s_i, the other the norm 1. */
 PRBM bool least_squares(int m, int n, const double *a, const double *b, double rcond, double *x,
-                        Scratch *scratch, Problem *problem) {
-    size_t used = scratch->used;
+                        Scratch scratch, Problem *problem) {
     int k = m < n ? m : n;
-    double *s = take(scratch, (size_t)k), *v = take_matrix(scratch, k, k);
-    double *g = take_matrix(scratch, m, n);
+    double *s = take(&scratch, (size_t)k), *v = take_matrix(&scratch, k, k);
+    double *g = take_matrix(&scratch, m, n);
     bool found = singular_values(m, n, a, s, g, v);
     const double *left = m <= n ? v : g, *right = m <= n ? g : v;
     double least = rcond * largest(k, s);
@@ -247,7 +246,6 @@ PRBM bool least_squares(int m, int n, const double *a, const double *b, double r
             }
         }
     }
-    scratch->used = used;
     return found || fail(problem, "a least-squares solution did not converge: a mass, a length or "
                                   "an input is too large or too small; check the parameters");
 }
@@ -345,9 +343,8 @@ static void reflect(int n, const double *u, double *x) {
 }
 
 /* The basis is the last columns of the orthogonal factor of rows^T. */
-PRBM void null_space(int r, int n, const double *rows, double *z, Scratch *scratch) {
-    size_t used = scratch->used;
-    double *u = take_matrix(scratch, r, n), *column = take(scratch, (size_t)n);
+PRBM void null_space(int r, int n, const double *rows, double *z, Scratch scratch) {
+    double *u = take_matrix(&scratch, r, n), *column = take(&scratch, (size_t)n);
     copy(r * n, rows, u);
     for (int i = 0; i < r; i++) {
         householder(n - i, u + i * n + i);
@@ -366,5 +363,4 @@ PRBM void null_space(int r, int n, const double *rows, double *z, Scratch *scrat
             z[i * (n - r) + j - r] = column[i];
         }
     }
-    scratch->used = used;
 }

@@ -21,12 +21,12 @@ PRBM void backward(int n, const double *a, double *b); /* b := L^-T b */
 /* Compute the x of least norm that minimises |a x - b|, as np.linalg.lstsq.  a is (m, n); singular
  * values below rcond times the largest count as zero. */
 PRBM bool least_squares(int m, int n, const double *a, const double *b, double rcond, double *x,
-                        Scratch *scratch, Problem *problem);
+                        Scratch scratch, Problem *problem);
 /* Compute the eigenvalues w of a symmetric matrix in ascending order and, unless z is NULL, its
  * orthonormal eigenvectors, the columns of z, by cyclic Jacobi rotations; a is overwritten. */
 PRBM bool symmetric_eigen(int n, double *a, double *w, double *z, Problem *problem);
 /* Compute an orthonormal basis z (n, n - r) of the null space of rows (r, n) of full rank. */
-PRBM void null_space(int r, int n, const double *rows, double *z, Scratch *scratch);
+PRBM void null_space(int r, int n, const double *rows, double *z, Scratch scratch);
 PRBM double even_dot(int even, const double *a, const double *b);
 PRBM void exchange(int n, double *a, double *b);
 

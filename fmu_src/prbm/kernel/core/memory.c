@@ -28,15 +28,16 @@ PRBM void *place(Memory *memory, size_t count, size_t size) {
 
 /* Requests beyond the size are counted, too: most becomes a size that is sufficient. */
 PRBM double *take(Scratch *scratch, size_t count) {
-    double *taken = scratch->base + scratch->used;
-    bool enough = scratch->used <= scratch->size && count <= scratch->size - scratch->used;
+    ScratchBlock *block = scratch->block;
+    double *taken = block->base + scratch->used;
+    bool enough = scratch->used <= block->size && count <= block->size - scratch->used;
     if (!enough) {
-        taken = scratch->spare;
-        scratch->exceeded = true;
+        taken = block->spare;
+        block->exceeded = true;
     }
     scratch->used += count;
-    if (scratch->used > scratch->most) {
-        scratch->most = scratch->used;
+    if (scratch->used > block->most) {
+        block->most = scratch->used;
     }
     return taken;
 }

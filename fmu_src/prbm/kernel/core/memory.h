@@ -28,13 +28,20 @@ enum { ALIGNMENT = 16 };
 
 PRBM void *place(Memory *memory, size_t count, size_t size);
 
-/* Working memory for one call, taken in order and released by restoring the value of used.  A
- * request that exceeds the rest gets the spare block, which is as large as any single request, and
- * exceeded is set.  The results are then invalid, but no other memory is overwritten. */
+/* A block of working memory.  A request that exceeds the rest gets the spare block, which is as
+ * large as any single request, and exceeded is set.  The results are then invalid, but no other
+ * memory is overwritten. */
 typedef struct {
     double *base, *spare;
-    size_t used, size, most;
+    size_t size, most;
     bool exceeded;
+} ScratchBlock;
+
+/* The rest of a block of working memory, which is taken in order.  A function gets a copy: what it
+ * takes is free again when it returns.  It gets a pointer if what it takes is for its caller. */
+typedef struct {
+    ScratchBlock *block;
+    size_t used;
 } Scratch;
 
 PRBM double *take(Scratch *scratch, size_t count);

@@ -11,9 +11,8 @@
 #define FULL_TURN 6.283185307179586 /* rad */
 
 /* Compute c = a^T b a for a (n, k), b (n, n). */
-static void congruent(int n, int k, const double *a, const double *b, double *c, Scratch *scratch) {
-    size_t used = scratch->used;
-    double *ba = take(scratch, (size_t)n);
+static void congruent(int n, int k, const double *a, const double *b, double *c, Scratch scratch) {
+    double *ba = take(&scratch, (size_t)n);
     for (int j = 0; j < k; j++) {
         for (int i = 0; i < n; i++) {
             ba[i] = 0.0;
@@ -28,7 +27,6 @@ static void congruent(int n, int k, const double *a, const double *b, double *c,
             }
         }
     }
-    scratch->used = used;
 }
 
 /* Compute A := L^-1 A L^-T for symmetric A; column (n,) is work space. */
@@ -54,17 +52,14 @@ static void divide_twice(int n, const double *L, double *A, double *column) {
 
 /* Solve K y = w M y with y^T M y = 1.  The eigenvalues w are in ascending order, the y are the
  * columns of Y.  K and M are overwritten. */
-static bool generalised_eigen(int n, double *K, double *M, double *w, double *Y, Scratch *scratch,
+static bool generalised_eigen(int n, double *K, double *M, double *w, double *Y, Scratch scratch,
                               Problem *problem) {
-    size_t used = scratch->used;
-    double *column = take(scratch, (size_t)n);
+    double *column = take(&scratch, (size_t)n);
     if (!cholesky(n, M)) {
-        scratch->used = used;
         return fail(problem, "the modes cannot be computed: a part that can move has no mass");
     }
     divide_twice(n, M, K, column);
     if (!symmetric_eigen(n, K, w, Y, problem)) {
-        scratch->used = used;
         return false;
     }
     for (int j = 0; j < n; j++) {
@@ -76,7 +71,6 @@ static bool generalised_eigen(int n, double *K, double *M, double *w, double *Y,
             Y[i * n + j] = column[i];
         }
     }
-    scratch->used = used;
     return true;
 }
 
@@ -93,10 +87,9 @@ PRBM int mode_count(const System *system) {
 /* Compute a basis Z (n, k) of the motions that the loops allow, without those of free bodies.  It is orthonormal in coordinates of
  * unit inertia, so that it does not depend on how the inertias differ. */
 static void tangent_space(const System *system, const Complex *e, const double *M, double *Z,
-                          Scratch *scratch) {
-    size_t used = scratch->used;
+                          Scratch scratch) {
     int n = system->n, k = mode_count(system), r = n - k;
-    double *rows = take_matrix(scratch, r, n);
+    double *rows = take_matrix(&scratch, r, n);
     Rows loops = loop_rows(system);
     jacobian(&loops, e, rows);
     zeros(system->placed_count * n, rows + system->r * n);
@@ -116,21 +109,19 @@ static void tangent_space(const System *system, const Complex *e, const double *
             Z[j * k + i] *= scale;
         }
     }
-    scratch->used = used;
 }
 
 /* Solve K_t phi = omega^2 M phi on the tangent space of the loops for the frequencies [Hz] (k,) and
  * the modes phi (n, k).  K_t includes the loads of the multipliers lam (r,) along the rows, which
  * may be one more than the loops.  e and M: the directions and the mass matrix. */
 static bool modes_about(const Rows *rows, const Complex *e, const double *M, const double *lam,
-                        double *frequency, double *phi, Scratch *scratch, Problem *problem) {
-    size_t used = scratch->used;
+                        double *frequency, double *phi, Scratch scratch, Problem *problem) {
     const System *system = rows->system;
     int n = system->n, k = mode_count(system);
-    Complex *w = take_complex(scratch, 1, system->d);
-    double *K_t = take_matrix(scratch, n, n), *Z = take_matrix(scratch, n, k);
-    double *K_z = take_matrix(scratch, k, k), *M_z = take_matrix(scratch, k, k);
-    double *reduced = take_matrix(scratch, k, k);
+    Complex *w = take_complex(&scratch, 1, system->d);
+    double *K_t = take_matrix(&scratch, n, n), *Z = take_matrix(&scratch, n, k);
+    double *K_z = take_matrix(&scratch, k, k), *M_z = take_matrix(&scratch, k, k);
+    double *reduced = take_matrix(&scratch, k, k);
     gravity_row(system, w);
     tangent_stiffness(rows, 1.0, w, lam, e, K_t, scratch);
     tangent_space(system, e, M, Z, scratch);
@@ -147,28 +138,24 @@ static bool modes_about(const Rows *rows, const Complex *e, const double *M, con
             }
         }
     }
-    scratch->used = used;
     return found;
 }
 
 /* The holding force of the shape is a dead load: its direction and size are constant. */
 PRBM bool modes(const System *system, const Equilibrium *shape, double *frequency, double *phi,
-                Scratch *scratch, Problem *problem) {
-    size_t used = scratch->used;
+                Scratch scratch, Problem *problem) {
     int n = system->n, r = system->r;
-    Complex *B = take_complex(scratch, r + 1, system->d);
-    Complex *e = take_complex(scratch, 1, system->d);
-    double *lam = take(scratch, (size_t)r + 1), *M = take_matrix(scratch, n, n);
+    Complex *B = take_complex(&scratch, r + 1, system->d);
+    Complex *e = take_complex(&scratch, 1, system->d);
+    double *lam = take(&scratch, (size_t)r + 1), *M = take_matrix(&scratch, n, n);
     directions(system, shape->q, e);
     mass_matrix(system, e, M, scratch);
     stack_holding_at(system, shape->q, B, lam);
     copy(r, shape->lam, lam);
     lam[r] = shape->force;
     r += shape->force != 0.0;
-    Rows rows = rows_beside_loops(system, r, B, NULL, scratch);
-    bool found = modes_about(&rows, e, M, lam, frequency, phi, scratch, problem);
-    scratch->used = used;
-    return found;
+    Rows rows = rows_beside_loops(system, r, B, NULL, &scratch);
+    return modes_about(&rows, e, M, lam, frequency, phi, scratch, problem);
 }
 
 PRBM int unstable_directions(int k, const double *frequency, const double *along) {
@@ -188,12 +175,11 @@ PRBM int unstable_directions(int k, const double *frequency, const double *along
 }
 
 PRBM void moved_by(const System *system, const double *q, const double *phi, double *moved,
-                   Scratch *scratch) {
-    size_t used = scratch->used;
+                   Scratch scratch) {
     int n = system->n, r = system->r, k = mode_count(system);
-    Complex *B = take_complex(scratch, r + 1, system->d);
-    Complex *e = take_complex(scratch, 1, system->d);
-    double *c = take(scratch, (size_t)r + 1), *row = take(scratch, (size_t)n);
+    Complex *B = take_complex(&scratch, r + 1, system->d);
+    Complex *e = take_complex(&scratch, 1, system->d);
+    double *c = take(&scratch, (size_t)r + 1), *row = take(&scratch, (size_t)n);
     directions(system, q, e);
     stack_holding_at(system, q, B, c);
     Rows held = plain_rows(system, r + 1, B, c);
@@ -208,7 +194,6 @@ PRBM void moved_by(const System *system, const double *q, const double *phi, dou
             moved[i] = 0.0;
         }
     }
-    scratch->used = used;
 }
 
 /* Return the index of the fundamental mode: if bodies that only springs connect to the ground have
@@ -227,40 +212,34 @@ static int first_acting(const System *system, const double *frequencies) {
 
 /* Compute the frequencies (k,) about the shape under gravity, which may not be balanced. */
 static bool resting_frequencies(const System *system, double *frequencies, bool *balanced,
-                                Scratch *scratch, Problem *problem) {
-    size_t used = scratch->used;
+                                Scratch scratch, Problem *problem) {
     int n = system->n, r = system->r;
-    Equilibrium shape = {take(scratch, (size_t)n), take(scratch, (size_t)r), 0.0};
-    double *phi = take_matrix(scratch, n, mode_count(system));
-    bool found = resting(system, &shape, balanced, scratch, problem) &&
-                 modes(system, &shape, frequencies, phi, scratch, problem);
-    scratch->used = used;
-    return found;
+    Equilibrium shape = {take(&scratch, (size_t)n), take(&scratch, (size_t)r), 0.0};
+    double *phi = take_matrix(&scratch, n, mode_count(system));
+    return resting(system, &shape, balanced, scratch, problem) &&
+           modes(system, &shape, frequencies, phi, scratch, problem);
 }
 
 /* The frequency is 0 if the equilibrium under gravity is unstable. */
-PRBM bool fundamental_frequency(const System *system, double *frequency, Scratch *scratch,
+PRBM bool fundamental_frequency(const System *system, double *frequency, Scratch scratch,
                                 Problem *problem) {
-    size_t used = scratch->used;
     int k = mode_count(system);
-    double *frequencies = take(scratch, (size_t)k);
+    double *frequencies = take(&scratch, (size_t)k);
     bool balanced, found = resting_frequencies(system, frequencies, &balanced, scratch, problem);
     if (found) {
         double lowest = balanced && k > 0 ? frequencies[first_acting(system, frequencies)] : 0.0;
         *frequency = lowest > ZERO_FREQUENCY_RTOL * largest(k, frequencies) ? lowest : 0.0;
     }
-    scratch->used = used;
     return found;
 }
 
 /* The scale of velocities is the rate of the most unstable mode; otherwise, if a motion deforms no
  * spring and lifts no weight, that of a fall or of the motion at the release, or the lowest angular
  * frequency above 0.  The scale of times is the same, or that frequency if it is larger. */
-PRBM bool slow_rates(const System *system, double *rate, double *fast, Scratch *scratch,
+PRBM bool slow_rates(const System *system, double *rate, double *fast, Scratch scratch,
                      Problem *problem) {
-    size_t used = scratch->used;
     int k = mode_count(system), j = 0;
-    double *frequencies = take(scratch, (size_t)k);
+    double *frequencies = take(&scratch, (size_t)k);
     bool balanced, found = resting_frequencies(system, frequencies, &balanced, scratch, problem);
     if (found) {
         double least = ZERO_FREQUENCY_RTOL * largest(k, frequencies);
@@ -277,7 +256,6 @@ PRBM bool slow_rates(const System *system, double *rate, double *fast, Scratch *
             *rate = *fast = -FULL_TURN * frequencies[0];
         }
     }
-    scratch->used = used;
     return found;
 }
 
@@ -285,13 +263,12 @@ PRBM bool slow_rates(const System *system, double *rate, double *fast, Scratch *
  * [M, rows^T; rows, 0] (a, -lam) = (Q, 0) for the loads Q, so that the accelerations a that remain
  * are as small as possible. */
 static bool resting_multipliers(const Rows *held, const double *q, const Complex *e,
-                                const double *M, double *lam, Scratch *scratch, Problem *problem) {
-    size_t used = scratch->used;
+                                const double *M, double *lam, Scratch scratch, Problem *problem) {
     const System *system = held->system;
     int n = system->n, r = held->count, size = n + r;
-    Complex *w = take_complex(scratch, 1, system->d);
-    double *rows = take_matrix(scratch, r, n), *kkt = take_matrix(scratch, size, size);
-    double *right = take(scratch, (size_t)size);
+    Complex *w = take_complex(&scratch, 1, system->d);
+    double *rows = take_matrix(&scratch, r, n), *kkt = take_matrix(&scratch, size, size);
+    double *right = take(&scratch, (size_t)size);
     jacobian(held, e, rows);
     gravity_row(system, w);
     element_forces(system, q, e, 1.0, right, scratch);
@@ -302,28 +279,25 @@ static bool resting_multipliers(const Rows *held, const double *q, const Complex
     for (int i = 0; i < r; i++) {
         lam[i] = -right[n + i];
     }
-    scratch->used = used;
     return found;
 }
 
 PRBM bool fundamental_at(const System *system, const double *q, double *phi, double *M,
-                         Scratch *scratch, Problem *problem) {
-    size_t used = scratch->used;
+                         Scratch scratch, Problem *problem) {
     int n = system->n, r = system->r + 1, k = mode_count(system);
-    Complex *B = take_complex(scratch, r, system->d);
-    double *lam = take(scratch, (size_t)r), *frequency = take(scratch, (size_t)k);
-    double *all = take_matrix(scratch, n, k);
-    Complex *e = take_complex(scratch, 1, system->d);
+    Complex *B = take_complex(&scratch, r, system->d);
+    double *lam = take(&scratch, (size_t)r), *frequency = take(&scratch, (size_t)k);
+    double *all = take_matrix(&scratch, n, k);
+    Complex *e = take_complex(&scratch, 1, system->d);
     directions(system, q, e);
     mass_matrix(system, e, M, scratch);
     stack_holding_at(system, q, B, lam);
-    Rows held = rows_beside_loops(system, r, B, NULL, scratch);
+    Rows held = rows_beside_loops(system, r, B, NULL, &scratch);
     bool found = resting_multipliers(&held, q, e, M, lam, scratch, problem) &&
                  modes_about(&held, e, M, lam, frequency, all, scratch, problem);
     for (int i = 0; found && i < n; i++) {
         phi[i] = k > 0 ? all[i * k + first_acting(system, frequency)] : 0.0;
     }
-    scratch->used = used;
     return found;
 }
 

@@ -25,12 +25,12 @@ PRBM double prescribed(const Equations *eq, int k, double t) {
 }
 
 PRBM bool project_with_impulses(const Equations *equations, double t, double *y, double *impulses,
-                                Scratch *scratch, Problem *problem) {
+                                Scratch scratch, Problem *problem) {
     const Equations *eq = equations;
-    size_t mark = scratch->used, n = (size_t)eq->system->n, r = (size_t)eq->r;
-    double *c = take(scratch, r), *rates = take(scratch, r), *rows = take(scratch, r * n);
-    double *M = take(scratch, n * n);
-    Complex *e = take_complex(scratch, eq->system->d, 1);
+    size_t n = (size_t)eq->system->n, r = (size_t)eq->r;
+    double *c = take(&scratch, r), *rates = take(&scratch, r), *rows = take(&scratch, r * n);
+    double *M = take(&scratch, n * n);
+    Complex *e = take_complex(&scratch, eq->system->d, 1);
     for (int k = 0; k < eq->r; k++) {
         c[k] = offset(eq, k, t);
         rates[k] = prescribed(eq, k, t);
@@ -48,11 +48,10 @@ PRBM bool project_with_impulses(const Equations *equations, double t, double *y,
         ok = project_velocities((int)n, eq->r, M, rows, rates, y + n, impulses, eq->system->length,
                                 scratch, problem);
     }
-    scratch->used = mark;
     return ok;
 }
 
-PRBM bool project(const Equations *equations, double t, double *y, Scratch *scratch,
+PRBM bool project(const Equations *equations, double t, double *y, Scratch scratch,
                   Problem *problem) {
     return project_with_impulses(equations, t, y, NULL, scratch, problem);
 }
@@ -167,13 +166,11 @@ static bool corrected(const Equations *eq, const Evaluation *evaluation, const R
 
 PRBM bool project_near(const Equations *equations, const Evaluation *evaluation,
                        const Reference *near, double t, double *y, Correction *correction,
-                       Scratch *scratch, Problem *problem) {
+                       Scratch scratch, Problem *problem) {
     const Equations *eq = equations;
     int n = eq->system->n;
-    size_t mark = scratch->used;
-    double *kept = take(scratch, (size_t)n);
+    double *kept = take(&scratch, (size_t)n);
     copy(n, y, kept);
-    scratch->used = mark;
     if (eq->slipping_rows == 0 && corrected(eq, evaluation, near, t, y, correction)) {
         return true;
     }

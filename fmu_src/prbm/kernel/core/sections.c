@@ -13,12 +13,11 @@
 
 /* Compute gravity, inertia and mass-proportional damping of all mass points. */
 static void point_loads_at(const Equations *eq, const Complex *e, const double *v, const double *a,
-                           Complex *loads, Scratch *scratch) {
+                           Complex *loads, Scratch scratch) {
     const System *system = eq->system;
-    size_t mark = scratch->used;
     int d = system->d;
     Complex field = minus(system->gravity, eq->inputs.base);
-    Complex *bend = take_complex(scratch, d, 1), *p = take_complex(scratch, d, 1);
+    Complex *bend = take_complex(&scratch, d, 1), *p = take_complex(&scratch, d, 1);
     arm_accelerations(system, e, v, a, bend, scratch);
     if (eq->mass_damping != 0.0) {
         swings(system, e, v, p);
@@ -30,7 +29,6 @@ static void point_loads_at(const Equations *eq, const Complex *e, const double *
         Complex change = minus(field, along_arms(d, system->A + i * d, bend));
         loads[i] = scaled(system->m[i], change);
     }
-    scratch->used = mark;
 }
 
 static void pull_body(Complex *on, int body, Complex force) {
@@ -80,9 +78,8 @@ PRBM void add_contact_pulls(const Equations *eq, const Complex *e, const Evaluat
 
 /* Let springs pull their bodies and the ground. */
 static void add_spring_pulls(const System *system, const Complex *e, const double *v, Complex *on,
-                             Scratch *scratch) {
-    size_t mark = scratch->used;
-    double *row = take(scratch, (size_t)system->n);
+                             Scratch scratch) {
+    double *row = take(&scratch, (size_t)system->n);
     for (int k = 0; k < system->coil_count; k++) {
         const Connection *c = &system->mechanism->coils[k].between;
         SpringState now = spring_state(system, k, e, 1.0);
@@ -92,7 +89,6 @@ static void add_spring_pulls(const System *system, const Complex *e, const doubl
         pull_body(on, c->start, pull);
         pull_body(on, c->end, scaled(-1.0, pull));
     }
-    scratch->used = mark;
 }
 
 /* Let guides push and rub their bodies. */
@@ -171,7 +167,7 @@ PRBM SectionState section_state(const Equations *eq, const Complex *e, const dou
     for (int j = 0; j < system->n; j++) {
         strained[j] = angle[j] - system->rest[j] + eq->beta * v[j];
     }
-    point_loads_at(eq, e, v, found->a, at.loads, scratch);
+    point_loads_at(eq, e, v, found->a, at.loads, *scratch);
     at.on[GROUND] = complex_of(0.0, 0.0);
     for (int body = 1; body <= system->b; body++) {
         at.on[body] = at.loads[system->body_masses[body - 1]];
@@ -181,7 +177,7 @@ PRBM SectionState section_state(const Equations *eq, const Complex *e, const dou
         pull_body(at.on, m->forces[i].body, complex_of(given[0], given[1]));
     }
     add_contact_pulls(eq, e, found, at.on);
-    add_spring_pulls(system, e, v, at.on, scratch);
+    add_spring_pulls(system, e, v, at.on, *scratch);
     add_guide_pulls(eq, e, found, at.on);
     transmit(system, found->lam, &at);
     return at;
@@ -418,22 +414,20 @@ PRBM Stress *take_stresses(Scratch *scratch, int count) {
 }
 
 PRBM void stresses(const Equations *eq, const Complex *e, const double *angle, const double *v,
-                   const Evaluation *evaluation, Stress *found, Scratch *scratch) {
+                   const Evaluation *evaluation, Stress *found, Scratch scratch) {
     const System *system = eq->system;
     const Mechanism *m = system->mechanism;
-    size_t mark = scratch->used;
-    SectionState at = section_state(eq, e, angle, v, evaluation, scratch);
+    SectionState at = section_state(eq, e, angle, v, evaluation, &scratch);
     for (int i = 0, k = 0; i < m->flexure_count; i++) {
         if (has_stress(m, i)) {
             const FreeBody *body = &system->free_bodies[i];
-            size_t inner = scratch->used, count = (size_t)body->sections;
-            double *left = take(scratch, count), *right = take(scratch, count);
+            Scratch inner = scratch;
+            size_t count = (size_t)body->sections;
+            double *left = take(&inner, count), *right = take(&inner, count);
             face_stresses(system, body, &at, left, right);
             found[k++] = stress_in(body, left, right);
-            scratch->used = inner;
         }
     }
-    scratch->used = mark;
 }
 
 /* --- changes ---------------------------------------------------------------------------------- */

@@ -58,6 +58,6 @@ PRBM double stress_at(const FreeBody *body, const double *left, const double *ri
 PRBM Stress *take_stresses(Scratch *scratch, int count);
 /* Compute the stress of all flexures whose stress is an output. */
 PRBM void stresses(const Equations *eq, const Complex *e, const double *angle, const double *v,
-                   const Evaluation *evaluation, Stress *found, Scratch *scratch);
+                   const Evaluation *evaluation, Stress *found, Scratch scratch);
 
 #endif

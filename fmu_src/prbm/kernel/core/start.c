@@ -8,14 +8,13 @@
 /* Displace the rest shape q along a mode, column k of phi (n, count), by which the released point
  * moves by moved.  Then close the loops with the displacement amplitude of this point. */
 static bool displace(const System *system, const double *phi, int k, double moved,
-                     double amplitude, double *q, Scratch *scratch, Problem *problem) {
-    size_t used = scratch->used;
+                     double amplitude, double *q, Scratch scratch, Problem *problem) {
     int n = system->n, r = system->r, count = mode_count(system);
-    Complex *B = take_complex(scratch, r + 1, system->d);
-    Complex *e = take_complex(scratch, 1, system->d);
-    double *c = take(scratch, (size_t)r + 1);
+    Complex *B = take_complex(&scratch, r + 1, system->d);
+    Complex *e = take_complex(&scratch, 1, system->d);
+    double *c = take(&scratch, (size_t)r + 1);
     stack_release(system, B, c);
-    Rows rows = rows_beside_loops(system, r + 1, B, c, scratch);
+    Rows rows = rows_beside_loops(system, r + 1, B, c, &scratch);
     directions(system, q, e);
     c[r] = -row_value(&rows, r, e) - amplitude;
     for (int j = 0; j < n; j++) {
@@ -23,7 +22,6 @@ static bool displace(const System *system, const double *phi, int k, double move
     }
     Problem ignored;
     bool closed = project_positions(system, &rows, q, c, e, scratch, &ignored);
-    scratch->used = used;
     return closed || fail(problem,
                           "release.amplitude = %g m: no shape along mode %d has this amplitude; "
                           "reduce it, or choose another mode, release.point or direction",
@@ -31,13 +29,12 @@ static bool displace(const System *system, const double *phi, int k, double move
 }
 
 /* Displace the rest shape under gravity along the mode of the release. */
-static bool mode_shape(const System *system, double amplitude, double *q, Scratch *scratch,
+static bool mode_shape(const System *system, double amplitude, double *q, Scratch scratch,
                        Problem *problem) {
-    size_t used = scratch->used;
     int n = system->n, count = mode_count(system), mode = system->mechanism->release.mode;
-    Equilibrium rest = {q, take(scratch, (size_t)system->r + 1), 0.0};
-    double *frequency = take(scratch, (size_t)count), *phi = take_matrix(scratch, n, count);
-    double *moved = take(scratch, (size_t)count);
+    Equilibrium rest = {q, take(&scratch, (size_t)system->r + 1), 0.0};
+    double *frequency = take(&scratch, (size_t)count), *phi = take_matrix(&scratch, n, count);
+    double *moved = take(&scratch, (size_t)count);
     bool found = equilibrium(system, false, 0.0, &rest, scratch, problem) &&
                  modes(system, &rest, frequency, phi, scratch, problem);
     if (found && mode > count) {
@@ -60,26 +57,23 @@ static bool mode_shape(const System *system, double amplitude, double *q, Scratc
             found = displace(system, phi, mode - 1, by, amplitude, q, scratch, problem);
         }
     }
-    scratch->used = used;
     return found;
 }
 
 /* Move bodies that were placed beside the lines of their guides onto them, with the amount of the
  * release. */
-static bool place_on_guides(const System *system, double amount, double *q, Scratch *scratch,
+static bool place_on_guides(const System *system, double amount, double *q, Scratch scratch,
                             Problem *problem) {
-    size_t used = scratch->used;
     int r = system->r + 1;
-    Complex *B = take_complex(scratch, r, system->d), *e = take_complex(scratch, 1, system->d);
-    double *c = take(scratch, (size_t)r), *open_by = take(scratch, (size_t)r);
+    Complex *B = take_complex(&scratch, r, system->d), *e = take_complex(&scratch, 1, system->d);
+    double *c = take(&scratch, (size_t)r), *open_by = take(&scratch, (size_t)r);
     stack_holding(system, amount, B, c);
-    Rows rows = rows_beside_loops(system, r, B, c, scratch), loops = loop_rows(system);
+    Rows rows = rows_beside_loops(system, r, B, c, &scratch), loops = loop_rows(system);
     directions(system, q, e);
     scalars(&loops, e, open_by);
     Problem ignored;
     bool closed = largest(system->r, open_by) <= STATICS_CONSTRAINT_RTOL * system->length ||
                   project_positions(system, &rows, q, c, e, scratch, &ignored);
-    scratch->used = used;
     bool turns = system->mechanism->release.start == START_ANGLE;
     return closed || fail(problem,
                           "release.%s = %g %s: the guides do not let the body %s move there; reduce "
@@ -88,31 +82,27 @@ static bool place_on_guides(const System *system, double amount, double *q, Scra
                           system->mechanism->bodies[system->mechanism->release.body - 1].name);
 }
 
-PRBM bool start_shape(const System *system, const double *values, double *q, Scratch *scratch,
+PRBM bool start_shape(const System *system, const double *values, double *q, Scratch scratch,
                       Problem *problem) {
     const Release *release = &system->mechanism->release;
     double amount = evaluate(release->amount, values);
     if (release->start == START_AMPLITUDE) {
         return mode_shape(system, amount, q, scratch, problem);
     }
-    size_t used = scratch->used;
-    Equilibrium shape = {q, take(scratch, (size_t)system->r + 1), 0.0};
+    Equilibrium shape = {q, take(&scratch, (size_t)system->r + 1), 0.0};
     System placed = with_bodies_placed(system);
-    bool found = equilibrium(&placed, true, amount, &shape, scratch, problem) &&
-                 place_on_guides(system, amount, q, scratch, problem);
-    scratch->used = used;
-    return found;
+    return equilibrium(&placed, true, amount, &shape, scratch, problem) &&
+           place_on_guides(system, amount, q, scratch, problem);
 }
 
 /* Count the unstable directions of the shape under gravity that is held at an amount, or free.  There
  * are none if the shape is not balanced. */
 static bool unstable_shape(const System *system, bool held, double amount, int *count,
-                           Scratch *scratch, Problem *problem) {
-    size_t used = scratch->used;
+                           Scratch scratch, Problem *problem) {
     int n = system->n, k = mode_count(system);
-    Equilibrium shape = {take(scratch, (size_t)n), take(scratch, (size_t)system->r + 1), 0.0};
-    double *frequency = take(scratch, (size_t)k), *phi = take_matrix(scratch, n, k);
-    double *moved = take(scratch, (size_t)k);
+    Equilibrium shape = {take(&scratch, (size_t)n), take(&scratch, (size_t)system->r + 1), 0.0};
+    double *frequency = take(&scratch, (size_t)k), *phi = take_matrix(&scratch, n, k);
+    double *moved = take(&scratch, (size_t)k);
     bool balanced = true;
     bool found = (held ? equilibrium(system, true, amount, &shape, scratch, problem)
                        : resting(system, &shape, &balanced, scratch, problem)) &&
@@ -121,12 +111,11 @@ static bool unstable_shape(const System *system, bool held, double amount, int *
         moved_by(system, shape.q, phi, moved, scratch);
         *count = balanced ? unstable_directions(k, frequency, held ? moved : NULL) : 0;
     }
-    scratch->used = used;
     return found;
 }
 
 PRBM bool instability(const System *system, const double *values, int *rest, int *release,
-                      Scratch *scratch, Problem *problem) {
+                      Scratch scratch, Problem *problem) {
     const Release *given = &system->mechanism->release;
     bool held = given->start != START_AMPLITUDE;
     System placed = with_bodies_placed(system);

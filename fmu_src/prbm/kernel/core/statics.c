@@ -126,11 +126,10 @@ static void add_carrier_stiffness(const Rows *rows, int i, double lam, const Com
 /* K_t is that of the elements plus Phi^T diag(Re(p)) Phi, with the pull p = (lam^T f B - i w) e of each
  * arm, plus that of the bodies that carry rows. */
 PRBM void tangent_stiffness(const Rows *rows, double share, const Complex *w, const double *lam,
-                            const Complex *e, double *K_t, Scratch *scratch) {
-    size_t mark = scratch->used;
+                            const Complex *e, double *K_t, Scratch scratch) {
     const System *system = rows->system;
     int d = system->d;
-    Complex *pulled = take_complex(scratch, d, 1);
+    Complex *pulled = take_complex(&scratch, d, 1);
     element_tangent(system, e, share, K_t, scratch);
     for (int j = 0; j < d; j++) {
         pulled[j] = complex_of(w[j].im, -w[j].re);
@@ -148,7 +147,6 @@ PRBM void tangent_stiffness(const Rows *rows, double share, const Complex *w, co
         pulled[j] = product(pulled[j], e[j]);
     }
     add_geometric_stiffness(system, pulled, K_t);
-    scratch->used = mark;
 }
 
 static double largest_modulus(int count, const Complex *x) {
@@ -169,7 +167,7 @@ typedef struct {
 
 /* Compute the residual torques and constraints at (q, lam), and the constraint rows. */
 static void unbalanced(const Balance *balance, const double *state, const Complex *e,
-                       double *torque, double *open_by, double *rows, Scratch *scratch) {
+                       double *torque, double *open_by, double *rows, Scratch scratch) {
     const System *system = balance->system;
     int n = system->n, r = balance->rows.count;
     element_forces(system, state, e, balance->fraction, torque, scratch);
@@ -200,12 +198,11 @@ static void hold_idle(const System *system, const Complex *w, double *K_t) {
 
 /* Make one Newton step, limited to STATICS_TURN_MAX [rad]; false if the system is singular. */
 static bool newton_step(const Balance *balance, const Complex *e, double *torque, double *open_by,
-                        const double *rows, double *state, double *turned, Scratch *scratch) {
-    size_t used = scratch->used;
+                        const double *rows, double *state, double *turned, Scratch scratch) {
     const System *system = balance->system;
     int n = system->n, r = balance->rows.count, size = n + r;
-    double *K_t = take_matrix(scratch, n, n), *kkt = take_matrix(scratch, size, size);
-    double *change = take(scratch, (size_t)size);
+    double *K_t = take_matrix(&scratch, n, n), *kkt = take_matrix(&scratch, size, size);
+    double *change = take(&scratch, (size_t)size);
     Problem ignored;
     tangent_stiffness(&balance->rows, balance->fraction, balance->w, state + n, e, K_t, scratch);
     hold_idle(system, balance->w, K_t);
@@ -221,7 +218,6 @@ static bool newton_step(const Balance *balance, const Complex *e, double *torque
     for (int i = 0; solved && i < size; i++) {
         state[i] += (i < n ? share : -share) * change[i];
     }
-    scratch->used = used;
     *turned = turn;
     return finite_number(turn);
 }
@@ -237,13 +233,12 @@ static double added_torques(const Balance *balance, const double *lam) {
 }
 
 /* Solve the balance from a state (q, lam), which is overwritten; false if it does not converge. */
-static bool balance_out(const Balance *balance, double *state, Scratch *scratch) {
+static bool balance_out(const Balance *balance, double *state, Scratch scratch) {
     const System *system = balance->system;
-    size_t used = scratch->used;
     int n = system->n, r = balance->rows.count;
-    Complex *e = take_complex(scratch, 1, system->d);
-    double *torque = take(scratch, (size_t)n), *open_by = take(scratch, (size_t)r);
-    double *rows = take_matrix(scratch, r, n);
+    Complex *e = take_complex(&scratch, 1, system->d);
+    double *torque = take(&scratch, (size_t)n), *open_by = take(&scratch, (size_t)r);
+    double *rows = take_matrix(&scratch, r, n);
     double springs_scale = STATICS_FORCE_RTOL * largest(n * n, system->stiffness);
     double turn = HUGE_VAL;
     bool going = true, balanced = false, done = false;
@@ -256,7 +251,6 @@ static bool balance_out(const Balance *balance, double *state, Scratch *scratch)
         done = balanced && turn <= STATICS_STEP_ATOL;
         going = done || newton_step(balance, e, torque, open_by, rows, state, &turn, scratch);
     }
-    scratch->used = used;
     return done || (balanced && !going);
 }
 
@@ -276,31 +270,26 @@ static Balance balance_at(const System *system, bool held, double displacement, 
 
 /* Find the equilibrium at a fraction of the load, from a state that is overwritten. */
 static bool loaded(const System *system, bool held, double displacement, double fraction,
-                   double *state, Scratch *scratch) {
-    size_t used = scratch->used;
-    Balance balance = balance_at(system, held, displacement, fraction, scratch);
+                   double *state, Scratch scratch) {
+    Balance balance = balance_at(system, held, displacement, fraction, &scratch);
     place_bodies(system, fraction * displacement, state);
-    bool balanced = balance_out(&balance, state, scratch);
-    scratch->used = used;
-    return balanced;
+    return balance_out(&balance, state, scratch);
 }
 
 /* Return the sign of the determinant at an equilibrium at a fraction of the load; 0 if singular. */
 static int sign_at(const System *system, bool held, double displacement, double fraction,
-                   const double *state, Scratch *scratch) {
-    size_t used = scratch->used;
-    Balance balance = balance_at(system, held, displacement, fraction, scratch);
+                   const double *state, Scratch scratch) {
+    Balance balance = balance_at(system, held, displacement, fraction, &scratch);
     int n = system->n, r = balance.rows.count, size = n + r;
-    Complex *e = take_complex(scratch, 1, system->d);
-    double *K_t = take_matrix(scratch, n, n), *kkt = take_matrix(scratch, size, size);
-    double *rows = take_matrix(scratch, r, n);
+    Complex *e = take_complex(&scratch, 1, system->d);
+    double *K_t = take_matrix(&scratch, n, n), *kkt = take_matrix(&scratch, size, size);
+    double *rows = take_matrix(&scratch, r, n);
     directions(system, state, e);
     jacobian(&balance.rows, e, rows);
     tangent_stiffness(&balance.rows, fraction, balance.w, state + n, e, K_t, scratch);
     saddle(n, r, K_t, rows, rows, kkt);
     remove_placed(system, size, kkt);
     int sign = determinant_sign(n, r, kkt, system->length, scratch);
-    scratch->used = used;
     return sign;
 }
 
@@ -318,14 +307,13 @@ static double jump(const System *system, const double *from, const double *to) {
 }
 
 /* Return whether a small force on the released point, as drawn, turns the body about it. */
-static bool turns_about_point(const System *system, Scratch *scratch) {
-    size_t used = scratch->used;
+static bool turns_about_point(const System *system, Scratch scratch) {
     int n = system->n, r = system->r, size = n + r;
-    Complex *B = take_complex(scratch, r + 1, system->d);
-    double *rows = take_matrix(scratch, r + 1, n), *kkt = take_matrix(scratch, size, size);
-    double *response = take(scratch, (size_t)size + 1);
+    Complex *B = take_complex(&scratch, r + 1, system->d);
+    double *rows = take_matrix(&scratch, r + 1, n), *kkt = take_matrix(&scratch, size, size);
+    double *response = take(&scratch, (size_t)size + 1);
     stack_release(system, B, response);
-    Rows held = rows_beside_loops(system, r + 1, B, NULL, scratch);
+    Rows held = rows_beside_loops(system, r + 1, B, NULL, &scratch);
     jacobian(&held, system->e0, rows);
     saddle(n, r, system->stiffness, rows, rows, kkt);
     remove_placed(system, size, kkt);
@@ -335,13 +323,11 @@ static bool turns_about_point(const System *system, Scratch *scratch) {
     Problem ignored; /* A body without a spring, for instance on a pin. */
     bool solved = solve(n, r, kkt, response, system->length, scratch, &ignored);
     double lever = RELEASE_LEVER_RTOL * system->length * fabs(response[system->released.j]);
-    bool about = solved && fabs(dot(n, rows + r * n, response)) < lever;
-    scratch->used = used;
-    return about;
+    return solved && fabs(dot(n, rows + r * n, response)) < lever;
 }
 
 /* Reject a displacement of a point that a body turns about. */
-static bool displaceable(const System *system, double displacement, Scratch *scratch,
+static bool displaceable(const System *system, double displacement, Scratch scratch,
                          Problem *problem) {
     if (turns(system) || displacement == 0.0 || !turns_about_point(system, scratch)) {
         return true;
@@ -408,11 +394,10 @@ static void straighten(const System *system, bool held, double *state) {
  * beside the path.  Closely, the steps turn little, and only the smallest of them may change the sign
  * of the determinant.  Returns the share of the load that is reached, with its state. */
 static double load_slowly(const System *system, bool held, double displacement, bool closely,
-                          double *state, Scratch *scratch) {
-    size_t used = scratch->used;
+                          double *state, Scratch scratch) {
     int size = system->n + system->r + held;
     double part = closely ? STATICS_CLOSE_SHARE : 1.0;
-    double *trial = take(scratch, (size_t)size), done = 0.0, step = 1.0;
+    double *trial = take(&scratch, (size_t)size), done = 0.0, step = 1.0;
     double growth = STATICS_GROWTH_MAX;
     bool going = true;
     straighten(system, held, state);
@@ -445,21 +430,19 @@ static double load_slowly(const System *system, bool held, double displacement, 
         }
         step = greater(STATICS_LOAD_STEP_MIN, ratio * step);
     }
-    scratch->used = used;
     return done;
 }
 
 /* Load the mechanism slowly.  If a direction has become unstable, the search may have jumped, and the
  * path is followed closely; if that does not reach the load, the mechanism snaps. */
 static bool load_fully(const System *system, bool held, double displacement, double *state,
-                       Scratch *scratch, Problem *problem) {
+                       Scratch scratch, Problem *problem) {
     double done = load_slowly(system, held, displacement, false, state, scratch);
     if (!(done >= 1.0)) {
         return unreachable(system, held, displacement, done, problem);
     }
-    size_t used = scratch->used;
     int size = system->n + system->r + held;
-    double *close = take(scratch, (size_t)size);
+    double *close = take(&scratch, (size_t)size);
     straighten(system, held, close);
     int before = sign_at(system, held, displacement, 0.0, close, scratch);
     int after = sign_at(system, held, displacement, 1.0, state, scratch);
@@ -467,26 +450,21 @@ static bool load_fully(const System *system, bool held, double displacement, dou
         load_slowly(system, held, displacement, true, close, scratch) >= 1.0) {
         copy(size, close, state);
     }
-    scratch->used = used;
     return true;
 }
 
 /* Return whether the loops are closed in the shape as drawn. */
-static bool drawn_closed(const System *system, Scratch *scratch) {
-    size_t used = scratch->used;
-    double *open_by = take(scratch, (size_t)system->r);
+static bool drawn_closed(const System *system, Scratch scratch) {
+    double *open_by = take(&scratch, (size_t)system->r);
     Rows loops = loop_rows(system);
     scalars(&loops, system->e0, open_by);
-    bool closed = largest(system->r, open_by) <= STATICS_CONSTRAINT_RTOL * system->length;
-    scratch->used = used;
-    return closed;
+    return largest(system->r, open_by) <= STATICS_CONSTRAINT_RTOL * system->length;
 }
 
 PRBM bool equilibrium(const System *system, bool held, double displacement, Equilibrium *shape,
-                      Scratch *scratch, Problem *problem) {
-    size_t used = scratch->used;
+                      Scratch scratch, Problem *problem) {
     int n = system->n, r = system->r;
-    double *state = take(scratch, (size_t)n + (size_t)r + 1);
+    double *state = take(&scratch, (size_t)n + (size_t)r + 1);
     bool straight = !heavy(system) && !element_strained(system) && !(held && displacement != 0.0) &&
                     drawn_closed(system, scratch);
     held = held && !released_free(system);
@@ -497,11 +475,10 @@ PRBM bool equilibrium(const System *system, bool held, double displacement, Equi
     copy(r, state + n, shape->lam);
     /* The constraint of an angle is the rotation times the size. */
     shape->force = turns(system) ? system->length * state[n + r] : state[n + r];
-    scratch->used = used;
     return found;
 }
 
-PRBM bool resting(const System *system, Equilibrium *shape, bool *balanced, Scratch *scratch,
+PRBM bool resting(const System *system, Equilibrium *shape, bool *balanced, Scratch scratch,
                   Problem *problem) {
     bool sprung = system->placed_count < system->mechanism->floating_count;
     Problem ignored;
@@ -515,27 +492,25 @@ PRBM bool resting(const System *system, Equilibrium *shape, bool *balanced, Scra
 }
 
 PRBM bool release_velocity(const System *system, const double *q, double speed, double *v,
-                           Scratch *scratch, Problem *problem) {
-    size_t used = scratch->used;
+                           Scratch scratch, Problem *problem) {
     int n = system->n, r = system->r + 1;
     zeros(n, v);
     if (speed == 0.0) {
         return true;
     }
-    Complex *e = take_complex(scratch, 1, system->d), *B = take_complex(scratch, r, system->d);
-    double *M = take_matrix(scratch, n, n);
-    double *rows = take_matrix(scratch, r, n), *rates = take(scratch, (size_t)r);
+    Complex *e = take_complex(&scratch, 1, system->d), *B = take_complex(&scratch, r, system->d);
+    double *M = take_matrix(&scratch, n, n);
+    double *rows = take_matrix(&scratch, r, n), *rates = take(&scratch, (size_t)r);
     directions(system, q, e);
     mass_matrix(system, e, M, scratch);
     stack_release(system, B, rates);
-    Rows held = rows_beside_loops(system, r, B, NULL, scratch);
+    Rows held = rows_beside_loops(system, r, B, NULL, &scratch);
     jacobian(&held, e, rows);
     zeros(r, rates);
     rates[r - 1] = -speed;
     Problem singular; /* The loops do not allow the released body to move. */
     bool found = project_velocities(n, r, M, rows, rates, v, NULL, system->length, scratch,
                                     &singular);
-    scratch->used = used;
     return found || fail(problem,
                          "release.velocity = %g m/s: the body %s cannot move along the direction "
                          "of the release; choose another direction or body, or let flexures "

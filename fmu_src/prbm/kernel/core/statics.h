@@ -27,15 +27,15 @@ PRBM void place_bodies(const System *system, double amount, double *q);
 /* Compute the tangent stiffness K_t (n, n) with a share of initial strains and pretension, under dead
  * loads w (d,), with columns for stretches, and forces lam (r,) along the rows. */
 PRBM void tangent_stiffness(const Rows *rows, double share, const Complex *w, const double *lam,
-                            const Complex *e, double *K_t, Scratch *scratch);
+                            const Complex *e, double *K_t, Scratch scratch);
 /* Compute the equilibrium; held: whether the released body is held at the displacement or angle. */
 PRBM bool equilibrium(const System *system, bool held, double displacement, Equilibrium *shape,
-                      Scratch *scratch, Problem *problem);
+                      Scratch scratch, Problem *problem);
 /* Compute the shape under gravity.  If slow loading reaches no equilibrium, bodies that only springs
  * connect to the ground are as drawn, and balanced is false. */
-PRBM bool resting(const System *system, Equilibrium *shape, bool *balanced, Scratch *scratch,
+PRBM bool resting(const System *system, Equilibrium *shape, bool *balanced, Scratch scratch,
                   Problem *problem);
 PRBM bool release_velocity(const System *system, const double *q, double speed, double *v,
-                           Scratch *scratch, Problem *problem);
+                           Scratch scratch, Problem *problem);
 
 #endif

@@ -185,14 +185,13 @@ PRBM void spread(const System *system, int r, const Complex *B, Complex *rows) {
 
 /* --- mass ------------------------------------------------------------------------------------- */
 
-PRBM void mass_matrix(const System *system, const Complex *e, double *M, Scratch *scratch) {
-    size_t mark = scratch->used;
+PRBM void mass_matrix(const System *system, const Complex *e, double *M, Scratch scratch) {
     int n = system->n, d = system->d;
-    double *C = take_matrix(scratch, d, d);
+    double *C = take_matrix(&scratch, d, d);
     if (!system->mapped) {
         inertia(d, system->H, system->J, e, M, C);
     } else {
-        double *own = take_matrix(scratch, d, d);
+        double *own = take_matrix(&scratch, d, d);
         inertia(d, system->H, system->J, e, own, C);
         zeros(n * n, M);
         for (int i = 0; i < d * d; i++) {
@@ -201,5 +200,4 @@ PRBM void mass_matrix(const System *system, const Complex *e, double *M, Scratch
             }
         }
     }
-    scratch->used = mark;
 }

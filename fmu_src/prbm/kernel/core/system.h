@@ -232,6 +232,6 @@ PRBM void spread(const System *system, int r, const Complex *B, Complex *rows);
  * directions.  theta (d,) are the directions. */
 PRBM void stretch(const System *system, const double *theta, Complex *e);
 /* Compute the mass matrix M (n, n). */
-PRBM void mass_matrix(const System *system, const Complex *e, double *M, Scratch *scratch);
+PRBM void mass_matrix(const System *system, const Complex *e, double *M, Scratch scratch);
 
 #endif

@@ -22,13 +22,13 @@ PRBM int contact_count(const Simulation *sim) {
     return m->stop_count + m->rubbing_count;
 }
 
-PRBM ContactProblem *contact_problem_at(Simulation *sim, const double *q) {
-    set_position(&sim->contact_problem, q, &sim->scratch);
+PRBM ContactProblem *contact_problem_at(Simulation *sim, const double *q, Scratch scratch) {
+    set_position(&sim->contact_problem, q, scratch);
     return &sim->contact_problem;
 }
 
-PRBM Complex *directions_at(Simulation *sim, const double *q) {
-    Complex *e = take_complex(&sim->scratch, system_of(sim)->d, 1);
+PRBM Complex *directions_at(const Simulation *sim, const double *q, Scratch *scratch) {
+    Complex *e = take_complex(scratch, system_of(sim)->d, 1);
     directions(system_of(sim), q, e);
     return e;
 }
@@ -74,15 +74,14 @@ PRBM void forget_outputs(Simulation *sim) {
 }
 
 PRBM void gaps_and_rates(Simulation *sim, double *gaps, double *rates) {
-    size_t mark = sim->scratch.used;
+    Scratch scratch = sim->scratch;
     double *front = sim->state.front, t = sim->state.front_time;
     const double *extra = extra_states(sim, front);
-    Complex *e = directions_at(sim, front);
+    Complex *e = directions_at(sim, front, &scratch);
     for (int i = 0; i < system_of(sim)->s; i++) {
         gaps[i] = gap(&sim->equations, i, t, e, extra);
         rates[i] = gap_rate(&sim->equations, i, t, e, front + system_of(sim)->n, extra);
     }
-    sim->scratch.used = mark;
 }
 
 PRBM const Stop *stop_of(const Simulation *sim, int stop) {

@@ -10,8 +10,8 @@ PRBM int state_size(const Simulation *sim); /* ny = 2 n + 2 + 4 c */
 PRBM const double *extra_states(const Simulation *sim, const double *y);
 PRBM int contact_count(const Simulation *sim);
 /* Return the contact problem at the angles q, valid until it is set up for others. */
-PRBM ContactProblem *contact_problem_at(Simulation *sim, const double *q);
-PRBM Complex *directions_at(Simulation *sim, const double *q); /* in working memory */
+PRBM ContactProblem *contact_problem_at(Simulation *sim, const double *q, Scratch scratch);
+PRBM Complex *directions_at(const Simulation *sim, const double *q, Scratch *scratch);
 PRBM void set_inputs(Simulation *sim); /* and the equations of the contacts */
 PRBM void set_contacts(Simulation *sim, const ContactMode *modes);
 PRBM void set_mode(Simulation *sim, int contact, ContactMode mode);

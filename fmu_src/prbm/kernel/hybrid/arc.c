@@ -78,7 +78,8 @@ static void through(Simulation *sim, const Node *third, double t, double *y) {
  * of the dense output, whose error is below that of the embedded solution: it is used if that is
  * small.  If the polynomial differs too much from the dense output, a step to the time replaces
  * it. */
-static bool interpolated(Simulation *sim, double t, double *y, Problem *problem) {
+static bool interpolated(Simulation *sim, double t, double *y, Scratch scratch,
+                         Problem *problem) {
     const Arc *arc = &sim->state.arc;
     Located *located = &sim->stepping.located;
     int ny = state_size(sim);
@@ -91,17 +92,15 @@ static bool interpolated(Simulation *sim, double t, double *y, Problem *problem)
     if (!before && !sim->stepping.has_middle && !find_middle(sim, problem)) {
         return false;
     }
-    size_t mark = sim->scratch.used;
-    double *dense = take(&sim->scratch, (size_t)ny);
+    double *dense = take(&scratch, (size_t)ny);
     copy(ny, y, dense);
     through(sim, before ? &arc->before : &sim->stepping.middle, t, y);
-    bool close = difference(sim, dense, y) <= INTERPOLATION_FACTOR * sim->state.tolerance;
-    sim->scratch.used = mark;
+    bool close = difference(sim, dense, y, scratch) <= INTERPOLATION_FACTOR * sim->state.tolerance;
     return close || arc_cut(sim, t, located->k, y, problem);
 }
 
 PRBM bool arc_state(Simulation *sim, double *y, Complex *e, Reference *near, Evaluation *evaluation,
-                    Problem *problem) {
+                    Scratch scratch, Problem *problem) {
     const State *state = &sim->state;
     const System *system = system_of(sim);
     size_t bytes = (size_t)system->d * sizeof *e;
@@ -111,18 +110,16 @@ PRBM bool arc_state(Simulation *sim, double *y, Complex *e, Reference *near, Eva
         memcpy(e, near->e, bytes);
         return true;
     }
-    if (!interpolated(sim, state->time, y, problem)) {
+    if (!interpolated(sim, state->time, y, scratch, problem)) {
         return false;
     }
     set_reference(near, system, y);
-    size_t mark = sim->scratch.used;
-    double *interpolated = take(&sim->scratch, (size_t)state_size(sim));
+    double *interpolated = take(&scratch, (size_t)state_size(sim));
     copy(state_size(sim), y, interpolated);
     bool ok = factor_equations(&sim->equations, y, y + system->n, near, evaluation, problem) &&
               project_near(&sim->equations, evaluation, near, state->time, y, &sim->correction,
-                           &sim->scratch, problem) &&
-              check_projection(sim, state->time, interpolated, y, problem);
+                           scratch, problem) &&
+              check_projection(sim, state->time, interpolated, y, scratch, problem);
     memcpy(e, sim->correction.at.e, bytes);
-    sim->scratch.used = mark;
     return ok;
 }

@@ -15,6 +15,6 @@ PRBM bool arc_cut(Simulation *sim, double t, double *k, double *y, Problem *prob
 /* Compute the state y at the present time, projected onto the constraints, its arms e (d,), and a
  * reference near it.  The evaluation is working memory. */
 PRBM bool arc_state(Simulation *sim, double *y, Complex *e, Reference *near, Evaluation *evaluation,
-                    Problem *problem);
+                    Scratch scratch, Problem *problem);
 
 #endif

@@ -28,7 +28,7 @@ static double rest_speed_of(const Simulation *sim, int stop) {
 /* Begin a contact with a closing speed. */
 static bool begin_contact(Simulation *sim, int stop, double speed, bool counted,
                           Problem *problem) {
-    size_t mark = sim->scratch.used;
+    Scratch scratch = sim->scratch;
     const System *system = system_of(sim);
     int n = system->n;
     const double *front = sim->state.front, *extra = extra_of(sim, sim->state.front, stop);
@@ -41,13 +41,12 @@ static bool begin_contact(Simulation *sim, int stop, double speed, bool counted,
     copy(2 * n, front, first);
     zeros(n, first + 2 * n);
     if (counted) {
-        double *phi = take(&sim->scratch, (size_t)n), *M = take_matrix(&sim->scratch, n, n);
-        ok = fundamental_at(system, front, phi, M, &sim->scratch, problem);
+        double *phi = take(&scratch, (size_t)n), *M = take_matrix(&scratch, n, n);
+        ok = fundamental_at(system, front, phi, M, scratch, problem);
         for (int j = 0; ok && j < n; j++) {
             first[2 * n + j] = dot(n, M + j * n, phi);
         }
     }
-    sim->scratch.used = mark;
     set_phase(sim, stop, PHASE_PRESSED, greater(speed, least), 0.0);
     return ok;
 }
@@ -191,15 +190,14 @@ PRBM bool separate(Simulation *sim, int stop, Problem *problem) {
 
 /* Compute the inverse effective mass of a hit point at the front, with that of its wall. */
 static bool point_mobility(Simulation *sim, int stop, double *result, Problem *problem) {
-    size_t mark = sim->scratch.used;
+    Scratch scratch = sim->scratch;
     const System *system = system_of(sim);
-    double *G = take(&sim->scratch, (size_t)system->n);
-    ContactProblem *at = contact_problem_at(sim, sim->state.front);
+    double *G = take(&scratch, (size_t)system->n);
+    ContactProblem *at = contact_problem_at(sim, sim->state.front, scratch);
     Rows gaps = gap_rows(system);
     row_jacobian(&gaps, stop, at->e, G);
-    bool ok = mobility(at, G, result, &sim->scratch, problem);
+    bool ok = mobility(at, G, result, scratch, problem);
     *result += sim->equations.inputs.mobilities[stop];
-    sim->scratch.used = mark;
     return ok;
 }
 
@@ -225,50 +223,46 @@ static void shorten_step(Simulation *sim, int stop, double inverse_mass) {
     sim->state.step_size = lesser(h, sim->state.step_size);
 }
 
-PRBM double kinetic_energy(Simulation *sim, const double *v) {
-    size_t mark = sim->scratch.used;
+PRBM double kinetic_energy(Simulation *sim, const double *v, Scratch scratch) {
     int n = system_of(sim)->n;
-    ContactProblem *at = contact_problem_at(sim, sim->state.front);
+    ContactProblem *at = contact_problem_at(sim, sim->state.front, scratch);
     double sum = 0.0;
     for (int j = 0; j < n; j++) {
         sum += 0.5 * v[j] * dot(n, at->M + j * n, v);
     }
-    sim->scratch.used = mark;
     return sum;
 }
 
 /* Project the front onto the constraint of a stop that freezes, and book the loss. */
 static bool stop_motion(Simulation *sim, int stop, Problem *problem) {
-    size_t mark = sim->scratch.used;
+    Scratch scratch = sim->scratch;
     int n = system_of(sim)->n;
-    double *front = sim->state.front, *before = take(&sim->scratch, (size_t)n);
+    double *front = sim->state.front, *before = take(&scratch, (size_t)n);
     copy(n, front + n, before);
-    double loss = kinetic_energy(sim, before);
-    bool ok = project(&sim->equations, sim->state.front_time, front, &sim->scratch, problem);
-    loss -= kinetic_energy(sim, front + n);
+    double loss = kinetic_energy(sim, before, scratch);
+    bool ok = project(&sim->equations, sim->state.front_time, front, scratch, problem);
+    loss -= kinetic_energy(sim, front + n, scratch);
     front[2 * n] += loss;
     extra_of(sim, front, stop)[EXTRA_LOSS] += loss;
-    sim->scratch.used = mark;
     return ok;
 }
 
 /* Whether other constraints, such as its own friction, hold a hit point at rest. */
 static bool is_stuck(Simulation *sim, int stop, bool *result, Problem *problem) {
-    size_t mark = sim->scratch.used;
+    Scratch scratch = sim->scratch;
     const Equations *eq = &sim->equations;
     int n = eq->system->n;
     *result = false;
     if (eq->r == eq->system->r) {
         return true; /* There are no constraints but the loops. */
     }
-    double *G = take(&sim->scratch, (size_t)n), *held = take_matrix(&sim->scratch, eq->r, n);
-    ContactProblem *at = contact_problem_at(sim, sim->state.front);
+    double *G = take(&scratch, (size_t)n), *held = take_matrix(&scratch, eq->r, n);
+    ContactProblem *at = contact_problem_at(sim, sim->state.front, scratch);
     Rows gaps = gap_rows(eq->system);
     row_jacobian(&gaps, stop, at->e, G);
     jacobian(&eq->active, at->e, held);
-    bool moves = true, ok = independent(at, eq->r, held, G, &moves, &sim->scratch, problem);
+    bool moves = true, ok = independent(at, eq->r, held, G, &moves, scratch, problem);
     *result = !moves;
-    sim->scratch.used = mark;
     return ok;
 }
 

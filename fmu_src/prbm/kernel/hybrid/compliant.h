@@ -19,7 +19,7 @@ PRBM bool freezes_here(Simulation *sim, bool *result, Problem *problem);
 PRBM void fold_give(Wall *wall, double t, double *extra);
 PRBM void fold_gives(Simulation *sim); /* of all compliant stops at the front */
 /* The kinetic energy at the front with the rates v [J]. */
-PRBM double kinetic_energy(Simulation *sim, const double *v);
+PRBM double kinetic_energy(Simulation *sim, const double *v, Scratch scratch);
 /* Compute the rate at which the damping of a pressed contact changes its speed [1/s]. */
 PRBM bool damping_rate(Simulation *sim, int stop, double depth, double *rate, Problem *problem);
 

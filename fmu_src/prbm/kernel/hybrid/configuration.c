@@ -36,7 +36,7 @@ static double arm_length(const System *system, int j) {
     return is_float(system, j) || is_shift(system, j) ? system->length : 1.0;
 }
 
-PRBM bool set_scales(Configuration *configuration, double frequency, Scratch *scratch,
+PRBM bool set_scales(Configuration *configuration, double frequency, Scratch scratch,
                      Problem *problem) {
     const System *system = &configuration->system;
     Scales *scales = &configuration->scales;
@@ -80,7 +80,7 @@ PRBM bool take_values(Simulation *sim, Problem *problem) {
     copy(m->input_count, state->given, state->acting_given);
     configuration->assembled = check_values(m, state->acting_values, problem) &&
                                assemble(&configuration->system, state->acting_values,
-                                        &sim->scratch, problem);
+                                        sim->scratch, problem);
     return configuration->assembled;
 }
 

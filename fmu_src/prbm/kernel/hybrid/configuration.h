@@ -4,7 +4,7 @@
 
 #include "hybrid/state.h"
 
-PRBM bool set_scales(Configuration *configuration, double frequency, Scratch *scratch,
+PRBM bool set_scales(Configuration *configuration, double frequency, Scratch scratch,
                      Problem *problem);
 /* Let the values that were set act: copy, check and assemble them. */
 PRBM bool take_values(Simulation *sim, Problem *problem);

@@ -53,9 +53,9 @@ static bool presses(const Simulation *sim, int contact) {
  * if they have a velocity and friction. */
 static void modes_holding(Simulation *sim, const HoldingSet *holding, const double *q,
                           const double *v, ContactMode *modes) {
-    size_t mark = sim->scratch.used;
+    Scratch scratch = sim->scratch;
     const System *system = system_of(sim);
-    Complex *e = directions_at(sim, q);
+    Complex *e = directions_at(sim, q, &scratch);
     for (int contact = 0; contact < contact_count(sim); contact++) {
         bool open = is_stop(system, contact) && !presses(sim, contact) &&
                     !has_contact(holding->count, holding->stops, contact);
@@ -64,7 +64,6 @@ static void modes_holding(Simulation *sim, const HoldingSet *holding, const doub
             modes[contact] = slip_mode(sim, sliding_velocity(system, contact, e, v));
         }
     }
-    sim->scratch.used = mark;
 }
 
 PRBM const Equations *equations_holding(Simulation *sim, const HoldingSet *holding,
@@ -97,12 +96,12 @@ static bool obeys_coulomb(Simulation *sim, int contact, double slack, const Comp
 static bool modes_agree(Simulation *sim, const double *q, const double *v,
                         const HoldingSet *touching, const RestContacts *rest,
                         const RestForces *found, bool *result, Problem *problem) {
-    size_t mark = sim->scratch.used;
+    Scratch scratch = sim->scratch;
     const Equations *equations = &sim->trial.equations;
     const Evaluation *tried = &sim->trial.evaluation;
-    double *row = take(&sim->scratch, (size_t)system_of(sim)->n);
+    double *row = take(&scratch, (size_t)system_of(sim)->n);
     double zero = zero_acceleration(&sim->configuration);
-    Complex *e = directions_at(sim, q);
+    Complex *e = directions_at(sim, q, &scratch);
     bool ok = evaluate_equations(equations, sim->state.front_time, q, v,
                                  extra_states(sim, sim->state.front), NULL,
                                  &sim->trial.evaluation, problem);
@@ -117,7 +116,6 @@ static bool modes_agree(Simulation *sim, const double *q, const double *v,
     for (int j = 0; *result && j < rest->count; j++) {
         *result = obeys_coulomb(sim, rest->contacts[j], zero / found->mobility[j], e, v, row);
     }
-    sim->scratch.used = mark;
     return ok;
 }
 
@@ -126,11 +124,10 @@ static bool modes_agree(Simulation *sim, const double *q, const double *v,
 /* Return the acceleration of a gap by its normal force above which a stop holds [m/s^2].  A stop
  * that was released because its force was round-off, and then penetrated, was pressed. */
 static double least_pressing(Simulation *sim, int stop, const double *q) {
-    size_t mark = sim->scratch.used;
-    double distance = gap(&sim->equations, stop, sim->state.front_time, directions_at(sim, q),
-                          extra_states(sim, sim->state.front));
+    Scratch scratch = sim->scratch;
+    double distance = gap(&sim->equations, stop, sim->state.front_time,
+                          directions_at(sim, q, &scratch), extra_states(sim, sim->state.front));
     const Configuration *configuration = &sim->configuration;
-    sim->scratch.used = mark;
     const ContactPhase *touching = &sim->state.touching[stop];
     distance += touching->phase == PHASE_FROZEN ? touching->depth : 0.0;
     return distance > -closing_depth(configuration) / 2.0 ? zero_acceleration(configuration) : 0.0;
@@ -152,7 +149,6 @@ static HoldingSet in_order(const Simulation *sim, int count, const int *candidat
  * only together, a subset with independent rows holds. */
 PRBM bool find_holding_stops(Simulation *sim, int count, const int *candidates, const double *q,
                              const double *v, HoldingSet *holding, Problem *problem) {
-    size_t mark = sim->scratch.used;
     HoldingSet every = in_order(sim, count, candidates, false), none = {0, {0}, true};
     ContactMode modes[CONTACTS_MAX];
     RestContacts rest;
@@ -169,9 +165,7 @@ PRBM bool find_holding_stops(Simulation *sim, int count, const int *candidates, 
         rest.slips[k] = slip_sign(modes[every.stops[k]]);
     }
     equations_holding(sim, &none, q, v);
-    bool ok = rest_forces(sim, q, v, &rest, &found, problem);
-    sim->scratch.used = mark;
-    if (!ok) {
+    if (!rest_forces(sim, q, v, &rest, &found, problem)) {
         return false;
     }
     for (int k = 0; found.solved && k < every.count; k++) {
@@ -207,33 +201,31 @@ typedef struct {
 /* Whether a contact can slide while all other held and sticking contacts rest. */
 static bool is_mobile(Simulation *sim, int contact, const ContactMode *modes, bool *result,
                       Problem *problem) {
-    size_t mark = sim->scratch.used, bytes = (size_t)contact_count(sim) * sizeof *modes;
+    Scratch scratch = sim->scratch;
+    size_t bytes = (size_t)contact_count(sim) * sizeof *modes;
     const System *system = system_of(sim);
     const Equations *eq = &sim->trial.equations;
-    double *row = take(&sim->scratch, (size_t)system->n);
+    double *row = take(&scratch, (size_t)system->n);
     ContactMode others[CONTACTS_MAX];
-    ContactProblem *at = contact_problem_at(sim, sim->state.front);
+    ContactProblem *at = contact_problem_at(sim, sim->state.front, scratch);
     memcpy(others, modes, bytes);
     if (others[contact] != CONTACT_OPEN) {
         others[contact] = CONTACT_FRICTIONLESS;
     }
     try_contacts(sim, others);
     tangential_row(system, contact, at->e, row);
-    double *held = take_matrix(&sim->scratch, eq->r, system->n);
+    double *held = take_matrix(&scratch, eq->r, system->n);
     jacobian(&eq->active, at->e, held);
-    bool ok = independent(at, eq->r, held, row, result, &sim->scratch, problem);
-    sim->scratch.used = mark;
-    return ok;
+    return independent(at, eq->r, held, row, result, scratch, problem);
 }
 
 /* Return the slip mode of a contact.  Return CONTACT_FRICTIONLESS if its speed is zero within the
  * round-off of the event. */
 static ContactMode sliding_mode(Simulation *sim, int contact, const FrictionEvent *event) {
-    size_t mark = sim->scratch.used;
+    Scratch scratch = sim->scratch;
     const double *q = sim->state.front, *v = q + system_of(sim)->n;
-    double speed = sliding_velocity(system_of(sim), contact, directions_at(sim, q), v);
+    double speed = sliding_velocity(system_of(sim), contact, directions_at(sim, q, &scratch), v);
     double slow = event->contact == contact ? event->slow : 0.0;
-    sim->scratch.used = mark;
     return fabs(speed) > slow ? slip_mode(sim, speed) : CONTACT_FRICTIONLESS;
 }
 
@@ -278,7 +270,7 @@ static void stick_or_slip(Simulation *sim, const RestContacts *rest, RestForces 
         leaves[j] = yielding || (event->slips && event->contact == rest->contacts[j]);
     }
     int count = order_resting(rest, found, zero, leaves, modes, order);
-    choose_sticking(rest, found, holds, count, order, leaves, zero, sticks, &sim->scratch);
+    choose_sticking(rest, found, holds, count, order, leaves, zero, sticks, sim->scratch);
     for (int j = 0; j < rest->count; j++) {
         ContactMode *mode = &modes[rest->contacts[j]];
         ContactMode kept = at_limit(found, j, zero) ? slipping_mode(-found->friction[j])
@@ -397,7 +389,6 @@ static bool forces_at_rest(Simulation *sim, const RestContacts *rest, ContactMod
 static bool modes_by_forces(Simulation *sim, const HoldingSet *stops, const HoldingSet *touching,
                             const FrictionEvent *event, bool yielding, ContactMode *modes,
                             bool *agree, Problem *problem) {
-    size_t mark = sim->scratch.used;
     const double *q = sim->state.front, *v = q + system_of(sim)->n;
     ContactMode sliding[CONTACTS_MAX];
     bool holds[STOPS_MAX];
@@ -419,7 +410,6 @@ static bool modes_by_forces(Simulation *sim, const HoldingSet *stops, const Hold
         try_contacts(sim, modes);
         ok = modes_agree(sim, q, v, touching, &rest, &found, agree, problem);
     }
-    sim->scratch.used = mark;
     return ok;
 }
 
@@ -454,7 +444,7 @@ static double time_resolution(const Simulation *sim, double time) {
 
 /* Compute the sliding acceleration of a contact in its present mode [m/s^2]. */
 static bool slide_acceleration(Simulation *sim, int contact, double *result, Problem *problem) {
-    size_t mark = sim->scratch.used;
+    Scratch scratch = sim->scratch;
     const System *system = system_of(sim);
     Evaluation *evaluation = &sim->at_front;
     const double *q = sim->state.front, *v = q + system->n;
@@ -462,11 +452,10 @@ static bool slide_acceleration(Simulation *sim, int contact, double *result, Pro
                             NULL, evaluation, problem)) {
         return false;
     }
-    double *row = take(&sim->scratch, (size_t)system->n);
-    Complex *e = directions_at(sim, q);
+    double *row = take(&scratch, (size_t)system->n);
+    Complex *e = directions_at(sim, q, &scratch);
     tangential_row(system, contact, e, row);
     *result = dot(system->n, row, evaluation->a) - tangential_convective(system, contact, e, v);
-    sim->scratch.used = mark;
     return true;
 }
 
@@ -488,13 +477,13 @@ static bool friction_event(Simulation *sim, const Event *event, FrictionEvent *r
 /* List the closed stops, and the open stops in touching whose gaps are zero and do not open. */
 static int resting_candidates(Simulation *sim, const int *touching, int touching_count,
                               int *candidates) {
-    size_t mark = sim->scratch.used;
+    Scratch scratch = sim->scratch;
     const System *system = system_of(sim);
     const double *v = sim->state.front + system->n;
     double near = TOUCHING_RTOL * system->length + release_penetration(&sim->configuration);
     double bound = zero_speed(&sim->configuration), t = sim->state.front_time;
     int count = 0;
-    Complex *e = directions_at(sim, sim->state.front);
+    Complex *e = directions_at(sim, sim->state.front, &scratch);
     for (int i = 0; i < system->s; i++) {
         if (held_stop(&sim->equations, i)) {
             candidates[count++] = i;
@@ -507,7 +496,6 @@ static int resting_candidates(Simulation *sim, const int *touching, int touching
             candidates[count++] = i;
         }
     }
-    sim->scratch.used = mark;
     return count;
 }
 
@@ -613,7 +601,7 @@ PRBM bool choose_modes(Simulation *sim, const int *touching, int touching_count,
         if (same || sim->equations.held_count == 0) {
             return true;
         }
-        if (!project(&sim->equations, sim->state.front_time, sim->state.front, &sim->scratch,
+        if (!project(&sim->equations, sim->state.front_time, sim->state.front, sim->scratch,
                      problem)) {
             return false;
         }

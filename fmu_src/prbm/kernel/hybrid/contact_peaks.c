@@ -122,7 +122,7 @@ PRBM void store_dent(Simulation *sim, int stop, const Dent *dent) {
 
 static Dent dent_now(Simulation *sim, int stop, double gap_now, double rate,
                      const Evaluation *at) {
-    size_t mark = sim->scratch.used;
+    Scratch scratch = sim->scratch;
     const Equations *eq = &sim->equations;
     const ComplianceLaw *law = &eq->laws[stop];
     const ContactPhase *touching = &eq->contacts.touching[stop];
@@ -131,13 +131,12 @@ static Dent dent_now(Simulation *sim, int stop, double gap_now, double rate,
     Dent last = latest_dent(sim, stop);
     Dent dent = {1.0, t, -gap_now, rate, at->pressure[stop], 0.0, last.deepens, last.grows};
     if (touching->phase != PHASE_FREE) {
-        double bend = -gap_acceleration(eq, stop, t, directions_at(sim, front),
+        double bend = -gap_acceleration(eq, stop, t, directions_at(sim, front, &scratch),
                                         front + system_of(sim)->n, at);
         dent.force_rate = contact_stiffness(law, dent.depth) * rate *
                               damping_ratio(law, touching, rate) +
                           elastic_force(law, dent.depth) * damping_slope(law, touching) * bend;
     }
-    sim->scratch.used = mark;
     return dent;
 }
 

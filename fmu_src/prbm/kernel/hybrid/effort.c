@@ -48,7 +48,7 @@ static bool reject(Simulation *sim, const Effort *effort, int steps, Problem *pr
                 "is %.3g J: reduce impulses, forces and speeds, check units, or make shorter "
                 "communication steps",
                 steps, effort->since, state->front_time,
-                kinetic_energy(sim, state->front + system_of(sim)->n));
+                kinetic_energy(sim, state->front + system_of(sim)->n, sim->scratch));
 }
 
 PRBM bool count_step(Simulation *sim, double time, Effort *effort, Problem *problem) {

@@ -38,21 +38,19 @@ PRBM double embedded_error(Simulation *sim) {
     return stepping->embedded_error;
 }
 
-PRBM double difference(Simulation *sim, const double *y, const double *z) {
-    size_t mark = sim->scratch.used;
+PRBM double difference(Simulation *sim, const double *y, const double *z, Scratch scratch) {
     int ny = state_size(sim);
-    double *change = take(&sim->scratch, (size_t)ny);
+    double *change = take(&scratch, (size_t)ny);
     for (int j = 0; j < ny; j += LANES) {
         set_lanes(change + j, lanes_at(z + j) - lanes_at(y + j));
     }
     double size = error_norm(sim, change, y, z);
-    sim->scratch.used = mark;
     return size;
 }
 
 PRBM bool check_projection(Simulation *sim, double t, const double *y, const double *projected,
-                           Problem *problem) {
-    double size = difference(sim, y, projected);
+                           Scratch scratch, Problem *problem) {
+    double size = difference(sim, y, projected, scratch);
     double most = PROJECTION_FACTOR * square_root(sim->state.tolerance);
     if (!(size <= most)) {
         return fail(problem,
@@ -66,14 +64,14 @@ PRBM bool check_projection(Simulation *sim, double t, const double *y, const dou
 }
 
 PRBM double contact_error(Simulation *sim, double h) {
-    size_t mark = sim->scratch.used;
+    Scratch scratch = sim->scratch;
     const System *system = system_of(sim);
     const Stepping *stepping = &sim->stepping;
     const double *y = sim->state.arc.y, *y1 = stepping->end;
     int n = system->n;
-    double worst = 0.0, *row = take(&sim->scratch, (size_t)n);
-    double *change = take(&sim->scratch, (size_t)n);
-    Complex *e = directions_at(sim, y);
+    double worst = 0.0, *row = take(&scratch, (size_t)n);
+    double *change = take(&scratch, (size_t)n);
+    Complex *e = directions_at(sim, y, &scratch);
     Rows gaps = gap_rows(system);
     for (int j = 0; j < n; j++) {
         change[j] = y1[j] - y[j];
@@ -95,6 +93,5 @@ PRBM double contact_error(Simulation *sim, double h) {
         double size = square_root(squares[0] + squares[1]);
         worst = greater(worst, size > 0.0 ? squares[0] / size : size);
     }
-    sim->scratch.used = mark;
     return worst;
 }

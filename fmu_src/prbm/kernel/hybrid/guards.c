@@ -375,7 +375,7 @@ static bool polish_impact(const Search *search, double apex, double *time) {
     }
     for (int step = 0; step < EVENT_CORRECTIONS_MAX; step++) {
         arc_located(sim, t, y);
-        if (!project(&sim->equations, t, y, &sim->scratch, search->problem)) {
+        if (!project(&sim->equations, t, y, sim->scratch, search->problem)) {
             return false;
         }
         directions(system_of(sim), y, e);

@@ -54,12 +54,13 @@ static double motion_speed(const Simulation *sim) {
 
 static bool impulses_without_friction(Simulation *sim, const Approach *approach, Hits *hits,
                                       Problem *problem) {
+    Scratch scratch = sim->scratch;
     const System *system = system_of(sim);
     ContactProblem *at = approach->at;
     int n = system->n, k = hits->struck_count + hits->held_count;
-    double *G = take_matrix(&sim->scratch, k, n), *X = take_matrix(&sim->scratch, n, k);
-    double *W = take_matrix(&sim->scratch, k, k), *rates = take(&sim->scratch, (size_t)k);
-    double *eps = take(&sim->scratch, (size_t)k), *P = take(&sim->scratch, (size_t)k);
+    double *G = take_matrix(&scratch, k, n), *X = take_matrix(&scratch, n, k);
+    double *W = take_matrix(&scratch, k, k), *rates = take(&scratch, (size_t)k);
+    double *eps = take(&scratch, (size_t)k), *P = take(&scratch, (size_t)k);
     Rows gaps = gap_rows(system);
     for (int a = 0; a < k; a++) {
         int i = partner(hits, a);
@@ -67,14 +68,14 @@ static bool impulses_without_friction(Simulation *sim, const Approach *approach,
         rates[a] = lesser(approach->rates[i], 0.0);
         eps[a] = a < hits->struck_count ? hits->restitution[a] : 0.0;
     }
-    if (!loop_response(at, k, G, X, &sim->scratch, problem)) {
+    if (!loop_response(at, k, G, X, scratch, problem)) {
         return false;
     }
     contact_mobility(n, k, at->M, G, X, system->length, W);
     for (int a = 0; a < k; a++) {
         W[a * k + a] += sim->equations.inputs.mobilities[partner(hits, a)];
     }
-    if (!newton(k, W, rates, eps, motion_speed(sim), P, &sim->scratch, problem)) {
+    if (!newton(k, W, rates, eps, motion_speed(sim), P, scratch, problem)) {
         return false;
     }
     add_impulses(k, n, approach->v, X, P, hits->after);
@@ -90,12 +91,12 @@ static bool impulses_without_friction(Simulation *sim, const Approach *approach,
  * the impulses P (k,) along the rows GT (k, n). */
 static bool reaction_impulses(Simulation *sim, const Approach *approach, const double *after,
                               int k, const double *GT, const double *P, int r,
-                              const double *rows, double *reaction, Problem *problem) {
-    size_t mark = sim->scratch.used;
+                              const double *rows, double *reaction, Scratch scratch,
+                              Problem *problem) {
     int n = system_of(sim)->n;
     const double *M = approach->at->M;
-    double *left = take(&sim->scratch, (size_t)n);
-    double *columns = take_matrix(&sim->scratch, n, r);
+    double *left = take(&scratch, (size_t)n);
+    double *columns = take_matrix(&scratch, n, r);
     for (int j = 0; j < n; j++) {
         left[j] = 0.0;
         for (int i = 0; i < n; i++) {
@@ -108,10 +109,8 @@ static bool reaction_impulses(Simulation *sim, const Approach *approach, const d
             columns[j * r + a] = rows[a * n + j];
         }
     }
-    bool ok = r == 0 || least_squares(n, r, columns, left, REACTION_RANK_RTOL, reaction,
-                                      &sim->scratch, problem);
-    sim->scratch.used = mark;
-    return ok;
+    return r == 0 || least_squares(n, r, columns, left, REACTION_RANK_RTOL, reaction, scratch,
+                                   problem);
 }
 
 /* Set the normal and tangential rows GT (2 k, n) of the stops struck, their rates before the
@@ -168,16 +167,17 @@ static void set_impulses(Hits *hits, const double *P, int kept_count, const int 
  * are removed.  *pulling: whether there were any, so that the impulses must be computed again. */
 static bool impulses_with_friction(Simulation *sim, const Approach *approach, Hits *hits,
                                    int *kept_count, int *kept, bool *pulling, Problem *problem) {
+    Scratch scratch = sim->scratch;
     const System *system = system_of(sim);
     ContactProblem *at = approach->at;
     int n = system->n, k = hits->struck_count, r = system->r + *kept_count;
-    double *rows = take_matrix(&sim->scratch, r, n), *GT = take_matrix(&sim->scratch, 2 * k, n);
-    double *X = take_matrix(&sim->scratch, n, 2 * k);
-    double *W = take_matrix(&sim->scratch, 2 * k, 2 * k);
-    double *rates = take(&sim->scratch, 2 * (size_t)k), *P = take(&sim->scratch, 2 * (size_t)k);
-    double *reaction = take(&sim->scratch, (size_t)r);
+    double *rows = take_matrix(&scratch, r, n), *GT = take_matrix(&scratch, 2 * k, n);
+    double *X = take_matrix(&scratch, n, 2 * k);
+    double *W = take_matrix(&scratch, 2 * k, 2 * k);
+    double *rates = take(&scratch, 2 * (size_t)k), *P = take(&scratch, 2 * (size_t)k);
+    double *reaction = take(&scratch, (size_t)r);
     impact_rows(sim, approach, hits, *kept_count, kept, rows, GT, rates);
-    if (!response(n, r, 2 * k, at->M, rows, GT, system->length, X, &sim->scratch, problem)) {
+    if (!response(n, r, 2 * k, at->M, rows, GT, system->length, X, scratch, problem)) {
         return false;
     }
     contact_mobility(n, 2 * k, at->M, GT, X, system->length, W);
@@ -188,11 +188,12 @@ static bool impulses_with_friction(Simulation *sim, const Approach *approach, Hi
     if (k == 1 ? !stronge(W, rates, approach->friction[0], hits->restitution[0], speed, &P[0],
                           &P[1], problem)
                : !several(k, W, rates, approach->friction, hits->restitution, speed, P,
-                          &sim->scratch, problem)) {
+                          scratch, problem)) {
         return false;
     }
     add_impulses(2 * k, n, approach->v, X, P, hits->after);
-    if (!reaction_impulses(sim, approach, hits->after, 2 * k, GT, P, r, rows, reaction, problem)) {
+    if (!reaction_impulses(sim, approach, hits->after, 2 * k, GT, P, r, rows, reaction, scratch,
+                           problem)) {
         return false;
     }
     *pulling = remove_pulling(kept_count, kept, reaction + system->r);
@@ -209,9 +210,7 @@ static bool rounds_with_friction(Simulation *sim, const Approach *approach, Hits
     *kept_count = hits->held_count;
     memcpy(kept, hits->held, (size_t)hits->held_count * sizeof(int));
     while (ok && pulling) {
-        size_t mark = sim->scratch.used;
         ok = impulses_with_friction(sim, approach, hits, kept_count, kept, &pulling, problem);
-        sim->scratch.used = mark;
     }
     return ok;
 }
@@ -270,9 +269,8 @@ static bool name_partners(const Simulation *sim, const Hits *hits, Problem *prob
  * pull.  The friction of held stops and of friction points is finite and has no impulse. */
 static bool impact_impulses(Simulation *sim, const double *q, const double *v, Hits *hits,
                             Problem *problem) {
-    size_t mark = sim->scratch.used;
     bool rough = false;
-    ContactProblem *at = contact_problem_at(sim, q);
+    ContactProblem *at = contact_problem_at(sim, q, sim->scratch);
     Approach approach = {at, v, {0.0}, {0.0}};
     for (int i = 0; i < system_of(sim)->s; i++) {
         approach.rates[i] = gap_rate(&sim->equations, i, sim->state.front_time, at->e, v,
@@ -287,7 +285,6 @@ static bool impact_impulses(Simulation *sim, const double *q, const double *v, H
     }
     bool ok = rough ? with_released_stops(sim, &approach, hits, problem)
                     : impulses_without_friction(sim, &approach, hits, problem);
-    sim->scratch.used = mark;
     return ok || name_partners(sim, hits, problem);
 }
 
@@ -300,16 +297,18 @@ static bool bounce_vanishes(Simulation *sim, int stop, const HoldingSet *resting
                             const double *v, double speed, bool *result, Problem *problem) {
     const System *system = system_of(sim);
     Evaluation *tried = &sim->trial.evaluation;
-    double *G = take(&sim->scratch, (size_t)system->n), free;
+    double free;
     Rows gaps = gap_rows(system);
     const Equations *holding = equations_holding(sim, resting, q, v);
     if (!evaluate_equations(holding, sim->state.front_time, q, v,
                             extra_states(sim, sim->state.front), NULL, tried, problem)) {
         return false;
     }
-    ContactProblem *at = contact_problem_at(sim, q);
+    Scratch scratch = sim->scratch;
+    double *G = take(&scratch, (size_t)system->n);
+    ContactProblem *at = contact_problem_at(sim, q, scratch);
     row_jacobian(&gaps, stop, at->e, G);
-    if (!mobility(at, G, &free, &sim->scratch, problem)) {
+    if (!mobility(at, G, &free, scratch, problem)) {
         return false;
     }
     double pressing = stop_force(holding, tried->lam, stop) * free;
@@ -323,14 +322,13 @@ static bool bounce_vanishes(Simulation *sim, int stop, const HoldingSet *resting
  * always ends in rest. */
 static bool captured(Simulation *sim, int stop, const Hits *hits, const double *q,
                      const double *v, double speed, bool *result, Problem *problem) {
-    size_t mark = sim->scratch.used;
     int candidates[1 + STOPS_MAX];
     *result = speed <= zero_speed(&sim->configuration);
     if (*result) {
         return true;
     }
     Hits soft;
-    soft.after = take(&sim->scratch, (size_t)system_of(sim)->n);
+    soft.after = sim->struck.soft;
     soft.struck_count = 1;
     soft.struck[0] = stop;
     soft.restitution[0] = 0.0;
@@ -351,7 +349,6 @@ static bool captured(Simulation *sim, int stop, const Hits *hits, const double *
         ok = *result || bounce_vanishes(sim, stop, &resting, q, soft.after, speed, result,
                                         problem);
     }
-    sim->scratch.used = mark;
     return ok;
 }
 
@@ -368,11 +365,11 @@ typedef struct {
  * w+)/2; its velocity w changes by its mobility times P. */
 static void book_energies(Simulation *sim, const Hits *hits, const double *q, const double *v,
                           Account *account) {
-    size_t mark = sim->scratch.used;
+    Scratch scratch = sim->scratch;
     const System *system = system_of(sim);
     Rows walls = slide_rows(system);
     double lost = 0.0, work = 0.0, *front = sim->state.front, t = sim->state.front_time;
-    Complex *e = directions_at(sim, q);
+    Complex *e = directions_at(sim, q, &scratch);
     for (int i = 0; i < system->s; i++) {
         double P = hits->normal[i];
         account->before[i] = gap_rate(&sim->equations, i, t, e, v, NULL);
@@ -386,23 +383,22 @@ static void book_energies(Simulation *sim, const Hits *hits, const double *q, co
     copy(system->n, hits->after, front + system->n);
     front[2 * system->n] += lost;
     front[2 * system->n + 1] += work;
-    sim->scratch.used = mark;
 }
 
 /* Latch the values of the counted impacts and report them. */
 static bool latch_impacts(Simulation *sim, const Hits *hits, const Account *account,
                           const bool *counted, const double *q, const double *v,
                           Problem *problem) {
-    size_t mark = sim->scratch.used;
+    Scratch scratch = sim->scratch;
     const System *system = system_of(sim);
     int n = system->n;
     bool any = false;
-    double *phi = take(&sim->scratch, (size_t)n), *M = take_matrix(&sim->scratch, n, n);
+    double *phi = take(&scratch, (size_t)n), *M = take_matrix(&scratch, n, n);
     double modal = 0.0;
     for (int i = 0; i < system->s; i++) {
         any = any || counted[i];
     }
-    bool ok = !any || fundamental_at(system, q, phi, M, &sim->scratch, problem);
+    bool ok = !any || fundamental_at(system, q, phi, M, scratch, problem);
     if (any && ok) {
         modal = simulated_restitution(n, phi, M, v, hits->after);
     }
@@ -419,7 +415,6 @@ static bool latch_impacts(Simulation *sim, const Hits *hits, const Account *acco
             report_impact(sim, i, q, v, hits->after);
         }
     }
-    sim->scratch.used = mark;
     return ok;
 }
 
@@ -428,24 +423,21 @@ static bool latch_impacts(Simulation *sim, const Hits *hits, const Account *acco
 /* Find whether the gap of a stop can have a rate that is not round-off.  It cannot where the body
  * moves along a wall at rest and no motion across it is possible, as at the dead centre of a guide. */
 static bool can_be_struck(Simulation *sim, int stop, const double *q, bool *result,
-                          Problem *problem) {
-    size_t mark = sim->scratch.used;
-    ContactProblem *at = contact_problem_at(sim, q);
-    double *row = take(&sim->scratch, (size_t)system_of(sim)->n);
+                          Scratch scratch, Problem *problem) {
+    ContactProblem *at = contact_problem_at(sim, q, scratch);
+    double *row = take(&scratch, (size_t)system_of(sim)->n);
     Rows gaps = gap_rows(system_of(sim));
     row_jacobian(&gaps, stop, at->e, row);
     *result = wall_motion(&sim->equations.inputs.walls[stop], sim->state.front_time).v != 0.0;
-    bool ok = *result || moves(at, row, result, &sim->scratch, problem);
-    sim->scratch.used = mark;
-    return ok;
+    return *result || moves(at, row, result, scratch, problem);
 }
 
 /* List the stops that are struck together with the stop hit, and the held stops. */
 static bool find_partners(Simulation *sim, int hit, const double *q, const double *v, Hits *hits,
                           double *rates, Problem *problem) {
-    size_t mark = sim->scratch.used;
+    Scratch scratch = sim->scratch;
     double near = TOUCHING_RTOL * system_of(sim)->length, t = sim->state.front_time;
-    Complex *e = directions_at(sim, q);
+    Complex *e = directions_at(sim, q, &scratch);
     const Stop *stops = sim->configuration.mechanism->stops;
     bool ok = true;
     hits->struck_count = hits->held_count = 0;
@@ -456,12 +448,11 @@ static bool find_partners(Simulation *sim, int hit, const double *q, const doubl
             hits->held[hits->held_count++] = i;
         } else if (!stops[i].compliant && rates[i] < 0.0 && (i == hit || distance <= near)) {
             bool struck = false;
-            ok = can_be_struck(sim, i, q, &struck, problem);
+            ok = can_be_struck(sim, i, q, &struck, scratch, problem);
             hits->struck[hits->struck_count] = i;
             hits->struck_count += struck;
         }
     }
-    sim->scratch.used = mark;
     return ok;
 }
 
@@ -491,12 +482,12 @@ static bool choose_restitutions(Simulation *sim, const double *q, const double *
  * unless the speed is round-off. */
 static bool join_touching(Simulation *sim, const double *q, const double *rates, Hits *hits,
                           Problem *problem) {
-    size_t mark = sim->scratch.used;
+    Scratch scratch = sim->scratch;
     const Stop *stops = sim->configuration.mechanism->stops;
     double near = TOUCHING_RTOL * system_of(sim)->length, zero = zero_speed(&sim->configuration);
     double t = sim->state.front_time;
     bool ok = true, slow = true, elastic = false;
-    Complex *e = directions_at(sim, q);
+    Complex *e = directions_at(sim, q, &scratch);
     for (int k = 0; k < hits->struck_count; k++) {
         slow = slow && rates[hits->struck[k]] >= -zero;
         elastic = elastic || hits->restitution[k] != 0.0;
@@ -506,21 +497,20 @@ static bool join_touching(Simulation *sim, const double *q, const double *rates,
                      !has_contact(hits->struck_count, hits->struck, i) && rates[i] <= zero &&
                      gap(&sim->equations, i, t, e, NULL) <= near &&
                      (slow || field_value(sim, stops[i].restitution) == 0.0);
-        ok = !joins || can_be_struck(sim, i, q, &joins, problem);
+        ok = !joins || can_be_struck(sim, i, q, &joins, scratch, problem);
         if (ok && joins) {
             hits->held[hits->held_count++] = i;
         }
     }
-    sim->scratch.used = mark;
     return ok;
 }
 
 /* Open all held stops.  List those that took part and do not separate; return their number. */
 static int open_all(Simulation *sim, const Hits *hits, int *touching) {
-    size_t mark = sim->scratch.used;
+    Scratch scratch = sim->scratch;
     double bound = zero_speed(&sim->configuration), t = sim->state.front_time;
     int count = 0;
-    Complex *e = directions_at(sim, sim->state.front);
+    Complex *e = directions_at(sim, sim->state.front, &scratch);
     for (int k = 0; k < hits->struck_count + hits->held_count; k++) {
         int i = partner(hits, k);
         if (gap_rate(&sim->equations, i, t, e, hits->after, NULL) <= bound) {
@@ -532,24 +522,21 @@ static int open_all(Simulation *sim, const Hits *hits, int *touching) {
         sim->state.modes[i] = held ? CONTACT_OPEN : sim->state.modes[i];
     }
     set_inputs(sim);
-    sim->scratch.used = mark;
     return count;
 }
 
 /* Resolve the impact of a stop, and of all other stops whose gaps close at the same time. */
 PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
-    size_t mark = sim->scratch.used;
     int n = system_of(sim)->n, touching[STOPS_MAX], touching_count = 0;
     double rates[STOPS_MAX];
     bool counted[STOPS_MAX];
-    double *q = take(&sim->scratch, (size_t)n), *v = take(&sim->scratch, (size_t)n);
+    double *q = sim->struck.q, *v = sim->struck.v;
     Hits hits;
     Account account;
-    hits.after = take(&sim->scratch, (size_t)n);
+    hits.after = sim->struck.after;
     copy(n, sim->state.front, q);
     copy(n, sim->state.front + n, v);
     if (sim->configuration.mechanism->stops[hit].compliant) {
-        sim->scratch.used = mark;
         return touch(sim, hit, problem);
     }
     bool ok = find_partners(sim, hit, q, v, &hits, rates, problem);
@@ -558,7 +545,6 @@ PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
         ok = find_partners(sim, hit, q, v, &hits, rates, problem);
     }
     if (ok && hits.struck_count == 0) {
-        sim->scratch.used = mark;
         return choose_modes(sim, &hit, rates[hit] <= zero_speed(&sim->configuration), NULL,
                             problem);
     }
@@ -572,7 +558,6 @@ PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
     if (ok) {
         touching_count = open_all(sim, &hits, touching);
     }
-    sim->scratch.used = mark;
     return ok && rephase(sim, problem) &&
            choose_modes(sim, touching, touching_count, NULL, problem);
 }
@@ -600,15 +585,15 @@ static void free_sticking(Simulation *sim) {
 /* Apply the impulses (3,) of the i-th force.  The work of a component P is P (u- + u+)/2, with the
  * rate u along it before and after. */
 static bool apply_impulses(Simulation *sim, int i, const double *P, Problem *problem) {
-    size_t mark = sim->scratch.used;
+    Scratch scratch = sim->scratch;
     const System *system = system_of(sim);
     int n = system->n;
     double *front = sim->state.front, *v = front + n;
-    double *rows = take_matrix(&sim->scratch, LOADS, n), *X = take_matrix(&sim->scratch, n, LOADS);
-    double *after = take(&sim->scratch, (size_t)n);
-    ContactProblem *at = contact_problem_at(sim, front);
-    load_rows(system, &system->pushed[i], at->e, rows, &sim->scratch);
-    bool ok = loop_response(at, LOADS, rows, X, &sim->scratch, problem);
+    double *rows = take_matrix(&scratch, LOADS, n), *X = take_matrix(&scratch, n, LOADS);
+    double *after = take(&scratch, (size_t)n);
+    ContactProblem *at = contact_problem_at(sim, front, scratch);
+    load_rows(system, &system->pushed[i], at->e, rows, scratch);
+    bool ok = loop_response(at, LOADS, rows, X, scratch, problem);
     if (ok) {
         add_impulses(LOADS, n, v, X, P, after);
         for (int k = 0; k < LOADS; k++) {
@@ -616,7 +601,6 @@ static bool apply_impulses(Simulation *sim, int i, const double *P, Problem *pro
         }
         copy(n, after, v);
     }
-    sim->scratch.used = mark;
     return ok;
 }
 

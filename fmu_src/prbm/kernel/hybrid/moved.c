@@ -39,31 +39,38 @@ PRBM bool choose_moved_modes(Simulation *sim, Problem *problem) {
     if (struck >= 0) {
         return impact(sim, struck, problem);
     }
-    return project(&sim->equations, sim->state.time, sim->state.front, &sim->scratch, problem) &&
+    return project(&sim->equations, sim->state.time, sim->state.front, sim->scratch, problem) &&
            choose_modes(sim, NULL, 0, NULL, problem);
 }
 
 /* Keep held stops on walls whose velocities have jumped by less than rest_speed; otherwise the
  * stops open or are struck.  Impulses may pull, but not more than the forces lam (r,) press within
  * the given time; NULL: without limit. */
-PRBM bool follow_walls(Simulation *sim, const double *lam, double time, Problem *problem) {
-    size_t mark = sim->scratch.used;
+static bool keep_on_walls(Simulation *sim, const double *lam, double time, bool *follows,
+                          Problem *problem) {
     const Equations *eq = &sim->equations;
     int ny = state_size(sim), n = system_of(sim)->n, h = eq->first_hold;
     double gaps[STOPS_MAX], rates[STOPS_MAX], *y = sim->state.front, t = sim->state.front_time;
-    double *P = take(&sim->scratch, (size_t)eq->r), *after = take(&sim->scratch, (size_t)ny);
-    copy(ny, y, after);
     gaps_and_rates(sim, gaps, rates);
-    bool ok = project_with_impulses(eq, t, after, P, &sim->scratch, problem), follows = ok;
-    for (int k = 0; follows && k < eq->held_count; k++) {
+    Scratch scratch = sim->scratch;
+    double *P = take(&scratch, (size_t)eq->r), *after = take(&scratch, (size_t)ny);
+    copy(ny, y, after);
+    bool ok = project_with_impulses(eq, t, after, P, scratch, problem);
+    *follows = ok;
+    for (int k = 0; *follows && k < eq->held_count; k++) {
         double pull = lam ? greater(lam[h + k], 0.0) * time : HUGE_VAL;
-        follows = fabs(rates[eq->held[k]]) <= jump_allowed(sim, eq->held[k]) && P[h + k] >= -pull;
+        *follows = fabs(rates[eq->held[k]]) <= jump_allowed(sim, eq->held[k]) && P[h + k] >= -pull;
     }
-    for (int k = 0; follows && k < eq->held_count; k++) {
+    for (int k = 0; *follows && k < eq->held_count; k++) {
         after[2 * n] -= P[h + k] * rates[eq->held[k]] / 2;
         after[2 * n + 1] += push_wall(sim, eq->held[k], P[h + k]);
     }
-    copy(follows ? ny : 0, after, y);
-    sim->scratch.used = mark;
-    return ok && (follows || choose_moved_modes(sim, problem));
+    copy(*follows ? ny : 0, after, y);
+    return ok;
+}
+
+PRBM bool follow_walls(Simulation *sim, const double *lam, double time, Problem *problem) {
+    bool follows = false;
+    return keep_on_walls(sim, lam, time, &follows, problem) &&
+           (follows || choose_moved_modes(sim, problem));
 }

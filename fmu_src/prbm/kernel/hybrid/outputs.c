@@ -116,8 +116,8 @@ static void output_links(const Simulation *sim, double *links, double *stretches
 
 static void output_springs(Simulation *sim, double *out) {
     const System *system = system_of(sim);
-    size_t mark = sim->scratch.used;
-    double *row = take(&sim->scratch, (size_t)system->n);
+    Scratch scratch = sim->scratch;
+    double *row = take(&scratch, (size_t)system->n);
     for (int k = 0; k < system->coil_count; k++) {
         double *values = out + PER_SPRING * k;
         SpringState now = spring_state(system, k, sim->present.e, 1.0);
@@ -127,7 +127,6 @@ static void output_springs(Simulation *sim, double *out) {
         values[SPRING_LENGTH] = now.length;
         values[SPRING_LENGTH_RATE] = rate;
     }
-    sim->scratch.used = mark;
 }
 
 static void output_places(Simulation *sim) {
@@ -181,33 +180,32 @@ static void output_base(Simulation *sim) {
     double *out = present->outputs + sim->configuration.mechanism->slots.base;
     Complex force;
     base_reaction(&sim->equations, present->e, present->y + system_of(sim)->n,
-                  present->evaluation.a, &force, out + BASE_MOMENT, &sim->scratch);
+                  present->evaluation.a, &force, out + BASE_MOMENT, sim->scratch);
     out[BASE_FORCE_X] = force.re;
     out[BASE_FORCE_Y] = force.im;
 }
 
 static void output_stresses(Simulation *sim) {
-    size_t mark = sim->scratch.used;
+    Scratch scratch = sim->scratch;
     const Mechanism *m = sim->configuration.mechanism;
     const Present *present = &sim->present;
     double *out = sim->present.outputs + m->slots.stresses;
-    Stress *found = take_stresses(&sim->scratch, m->stressed_count);
+    Stress *found = take_stresses(&scratch, m->stressed_count);
     stresses(&sim->equations, present->e, present->y, present->y + system_of(sim)->n,
-             &present->evaluation, found, &sim->scratch);
+             &present->evaluation, found, scratch);
     for (int i = 0; i < m->stressed_count; i++) {
         out[PER_STRESS * i + STRESS_STRESS_START] = found[i].start;
         out[PER_STRESS * i + STRESS_STRESS_END] = found[i].end;
         out[PER_STRESS * i + STRESS_STRESS] = found[i].largest;
         peak_outputs(sim, i, out + PER_STRESS * i + STRESS_PEAK_STRESS);
     }
-    sim->scratch.used = mark;
 }
 
 static void output_energies(Simulation *sim) {
     const System *system = system_of(sim);
     double *out = sim->present.outputs + system->mechanism->slots.energies;
     out[ENERGY_ELASTIC] =
-        element_energy(system, sim->present.y, sim->present.e, &sim->scratch);
+        element_energy(system, sim->present.y, sim->present.e, sim->scratch);
     for (int i = 0; system->mechanism->compliant_count > 0 && i < system->s; i++) {
         if (sim->state.touching[i].phase != PHASE_NONE) {
             double distance = gap(&sim->equations, i, sim->state.time, sim->present.e,
@@ -219,18 +217,17 @@ static void output_energies(Simulation *sim) {
 }
 
 static bool output_mobilities(Simulation *sim, Problem *problem) {
-    size_t mark = sim->scratch.used;
+    Scratch scratch = sim->scratch;
     const System *system = system_of(sim);
     double *out = sim->present.outputs + system->mechanism->slots.stops;
-    double *G = take(&sim->scratch, (size_t)system->n);
-    ContactProblem *at = contact_problem_at(sim, sim->present.y);
+    double *G = take(&scratch, (size_t)system->n);
+    ContactProblem *at = contact_problem_at(sim, sim->present.y, scratch);
     Rows gaps = gap_rows(system);
     bool ok = true;
     for (int i = 0; ok && i < system->s; i++) {
         row_jacobian(&gaps, i, at->e, G);
-        ok = mobility(at, G, out + PER_STOP * i + STOP_POINT_MOBILITY, &sim->scratch, problem);
+        ok = mobility(at, G, out + PER_STOP * i + STOP_POINT_MOBILITY, scratch, problem);
     }
-    sim->scratch.used = mark;
     return ok;
 }
 

@@ -95,11 +95,11 @@ PRBM void drop_peaks(Simulation *sim) {
 
 /* Store the samples at the front as those ahead. */
 static void sample_front(Simulation *sim, const Evaluation *at) {
-    size_t mark = sim->scratch.used;
+    Scratch scratch = sim->scratch;
     const System *system = system_of(sim);
     const double *front = sim->state.front;
-    Stress *found = take_stresses(&sim->scratch, peak_count(sim));
-    stresses(&sim->equations, at->at.e, front, front + system->n, at, found, &sim->scratch);
+    Stress *found = take_stresses(&scratch, peak_count(sim));
+    stresses(&sim->equations, at->at.e, front, front + system->n, at, found, scratch);
     for (int i = 0; i < peak_count(sim); i++) {
         Peak peak = peak_at(sim, i);
         const Sample sample = {sim->state.front_time, found[i].largest, found[i].place,
@@ -108,7 +108,6 @@ static void sample_front(Simulation *sim, const Evaluation *at) {
         peak.ahead = 1.0;
         store_peak(sim, i, &peak);
     }
-    sim->scratch.used = mark;
 }
 
 PRBM void restart_peaks_from(Simulation *sim, const Evaluation *at) {

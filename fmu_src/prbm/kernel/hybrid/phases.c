@@ -22,15 +22,14 @@ PRBM void set_phase(Simulation *sim, int stop, Phase phase, double speed, double
 
 PRBM bool indentation_acceleration(Simulation *sim, int stop, double *result,
                                      Problem *problem) {
-    size_t mark = sim->scratch.used;
+    Scratch scratch = sim->scratch;
     const double *q = sim->state.front, *v = q + system_of(sim)->n;
     double t = sim->state.front_time;
     bool ok = evaluate_equations(&sim->equations, t, q, v, extra_states(sim, q), NULL,
                                  &sim->at_front, problem);
-    *result = ok ? -gap_acceleration(&sim->equations, stop, t, directions_at(sim, q), v,
+    *result = ok ? -gap_acceleration(&sim->equations, stop, t, directions_at(sim, q, &scratch), v,
                                      &sim->at_front)
                  : 0.0;
-    sim->scratch.used = mark;
     return ok;
 }
 

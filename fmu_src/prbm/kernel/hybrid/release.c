@@ -67,26 +67,25 @@ PRBM double simulation_requested(const Simulation *simulation, double tolerance)
 static bool start_state(Simulation *sim, Problem *problem) {
     const Mechanism *m = sim->configuration.mechanism;
     const System *system = system_of(sim);
-    size_t mark = sim->scratch.used, n = (size_t)system->n;
+    Scratch scratch = sim->scratch;
+    size_t n = (size_t)system->n;
     double *front = sim->state.front;
-    double *q = take(&sim->scratch, n);
+    double *q = take(&scratch, n);
     double speed = evaluate(m->release.velocity, sim->state.acting_values);
-    bool ok = start_shape(system, sim->state.acting_values, q, &sim->scratch, problem);
+    bool ok = start_shape(system, sim->state.acting_values, q, scratch, problem);
     if (ok) {
         zeros(state_size(sim), front);
         copy((int)n, q, front);
-        ok = release_velocity(system, q, speed, front + n, &sim->scratch, problem);
+        ok = release_velocity(system, q, speed, front + n, scratch, problem);
     }
-    sim->scratch.used = mark;
     return ok;
 }
 
 /* Reject a penetrated wall at the start.  Apply the impact if a wall is struck at the start. */
 static bool check_walls(Simulation *sim, Problem *problem) {
-    size_t mark = sim->scratch.used;
     int n = system_of(sim)->n, struck = -1;
     const double *front = sim->state.front, t = sim->state.front_time;
-    Complex *e = directions_at(sim, front);
+    const Complex *e = contact_problem_at(sim, front, sim->scratch)->e;
     for (int i = 0; i < system_of(sim)->s; i++) {
         double distance = gap(&sim->equations, i, t, e, NULL);
         if (sim->configuration.mechanism->stops[i].compliant && distance < 0.0) {
@@ -105,7 +104,6 @@ static bool check_walls(Simulation *sim, Problem *problem) {
             struck = i;
         }
     }
-    sim->scratch.used = mark;
     return preload(sim, problem) && (struck < 0 || impact(sim, struck, problem));
 }
 
@@ -122,7 +120,7 @@ static bool release_mechanism(Simulation *sim, Problem *problem) {
     copy(LOADS * sim->configuration.mechanism->force_count, given_impulses(sim), state->received);
     set_inputs(sim);
     return start_state(sim, problem) &&
-           project(&sim->equations, state->time, state->front, &sim->scratch, problem) &&
+           project(&sim->equations, state->time, state->front, sim->scratch, problem) &&
            check_walls(sim, problem) &&
            rephase(sim, problem) && choose_modes(sim, rigid, count, NULL, problem) &&
            find_fastest(sim, problem);
@@ -137,11 +135,11 @@ PRBM bool start_motion(Simulation *sim, double start_time, double tolerance, Sim
     state->mode = mode;
     state->log_of_error = natural_log(STEP_ERROR_MIN);
     if (!check_tolerance(state->tolerance, problem) || !take_values(sim, problem) ||
-        !fundamental_frequency(&configuration->system, &state->frequency, &sim->scratch,
+        !fundamental_frequency(&configuration->system, &state->frequency, sim->scratch,
                                problem)) {
         return false;
     }
-    if (!set_scales(configuration, state->frequency, &sim->scratch, problem)) {
+    if (!set_scales(configuration, state->frequency, sim->scratch, problem)) {
         return false;
     }
     state->tolerance = lesser(state->tolerance, TOLERANCE_USED_MAX);
@@ -153,5 +151,5 @@ PRBM bool start_motion(Simulation *sim, double start_time, double tolerance, Sim
 PRBM bool simulation_instability(Simulation *simulation, int *rest, int *release,
                                  Problem *problem) {
     return instability(system_of(simulation), simulation->state.acting_values, rest, release,
-                       &simulation->scratch, problem);
+                       simulation->scratch, problem);
 }

@@ -10,13 +10,12 @@
 
 /* The rows of the gaps and of the slides, and the loads of unit forces on them (pushes).  A row and
  * its load differ if a stop slides: the normal force then acts together with its friction. */
-static void rest_rows(Simulation *sim, const RestContacts *rest, const Complex *e, double *rows,
-                      double *pushes) {
-    size_t mark = sim->scratch.used;
+static void rest_rows(const Simulation *sim, const RestContacts *rest, const Complex *e,
+                      double *rows, double *pushes, Scratch scratch) {
     const System *system = system_of(sim);
     Rows gaps = gap_rows(system);
     int n = system->n, k = rest->stop_count;
-    double *slide = take(&sim->scratch, (size_t)n);
+    double *slide = take(&scratch, (size_t)n);
     for (int a = 0; a < k; a++) {
         int i = rest->stops[a];
         row_jacobian(&gaps, i, e, rows + a * n);
@@ -31,7 +30,6 @@ static void rest_rows(Simulation *sim, const RestContacts *rest, const Complex *
         tangential_row(system, rest->contacts[j], e, rows + (k + j) * n);
         copy(n, rows + (k + j) * n, pushes + (k + j) * n);
     }
-    sim->scratch.used = mark;
 }
 
 /* Compute the accelerations u of gaps and sliding without contact forces. */
@@ -52,14 +50,14 @@ static void rest_accelerations(const Simulation *sim, const RestContacts *rest, 
 
 /* Set the laws of friction of the contacts at rest.  The normal forces of guides are multipliers of the
  * trial equations, whose changes by unit forces are multipliers (size, r). */
-static CoulombLaws rest_laws(Simulation *sim, const RestContacts *rest, const Complex *e,
-                             const double *multipliers) {
+static CoulombLaws rest_laws(const Simulation *sim, const RestContacts *rest, const Complex *e,
+                             const double *multipliers, Scratch *scratch) {
     const Equations *eq = &sim->trial.equations;
     const Evaluation *found = &sim->trial.evaluation;
     int k = rest->stop_count, m = rest->count, size = k + m, r = eq->r, sides = 0;
-    double *friction = take(&sim->scratch, (size_t)m), *fixed = take(&sim->scratch, (size_t)m);
-    double *L = take_matrix(&sim->scratch, m, size), *b = take(&sim->scratch, (size_t)m);
-    int *normal = take_integers(&sim->scratch, m);
+    double *friction = take(scratch, (size_t)m), *fixed = take(scratch, (size_t)m);
+    double *L = take_matrix(scratch, m, size), *b = take(scratch, (size_t)m);
+    int *normal = take_integers(scratch, m);
     for (int j = 0; j < m; j++) {
         int contact = rest->contacts[j];
         normal[j] = -1;
@@ -82,12 +80,12 @@ static CoulombLaws rest_laws(Simulation *sim, const RestContacts *rest, const Co
 }
 
 /* Compute the changes X (n, size) of the accelerations, and multipliers (size, r), by unit forces. */
-static void unit_responses(Simulation *sim, int size, const double *pushes, double *X,
-                           double *multipliers) {
+static void unit_responses(const Simulation *sim, int size, const double *pushes, double *X,
+                           double *multipliers, Scratch scratch) {
     const Evaluation *found = &sim->trial.evaluation;
     const System *system = system_of(sim);
     int n = system->n, r = sim->trial.equations.r;
-    double *x = take(&sim->scratch, (size_t)system->even);
+    double *x = take(&scratch, (size_t)system->even);
     zeros(size * r, multipliers);
     for (int a = 0; a < size; a++) {
         pad(n, pushes + a * n, x);
@@ -146,32 +144,31 @@ PRBM bool rest_forces(Simulation *sim, const double *q, const double *v,
                       const RestContacts *rest, RestForces *found, Problem *problem) {
     const System *system = system_of(sim);
     int n = system->n, k = rest->stop_count, m = rest->count, size = k + m;
-    double *W = found->W = take_matrix(&sim->scratch, size, size);
-    size_t mark = sim->scratch.used;
-    ContactProblem *at = contact_problem_at(sim, q);
-    double *rows = take_matrix(&sim->scratch, size, n);
-    double *pushes = take_matrix(&sim->scratch, size, n);
-    double *X = take_matrix(&sim->scratch, n, size);
-    double *multipliers = take_matrix(&sim->scratch, size, sim->trial.equations.r);
-    double *u = take(&sim->scratch, (size_t)size), *P = take(&sim->scratch, (size_t)size);
+    double *W = found->W = sim->trial.mobility;
+    Scratch scratch = sim->scratch;
+    ContactProblem *at = contact_problem_at(sim, q, scratch);
+    double *rows = take_matrix(&scratch, size, n);
+    double *pushes = take_matrix(&scratch, size, n);
+    double *X = take_matrix(&scratch, n, size);
+    double *multipliers = take_matrix(&scratch, size, sim->trial.equations.r);
+    double *u = take(&scratch, (size_t)size), *P = take(&scratch, (size_t)size);
     bool ok = evaluate_equations(&sim->trial.equations, sim->state.front_time, q, v,
                                  extra_states(sim, sim->state.front), NULL,
                                  &sim->trial.evaluation, problem);
-    rest_rows(sim, rest, at->e, rows, pushes);
+    rest_rows(sim, rest, at->e, rows, pushes, scratch);
     found->solved = false;
     if (ok) {
-        unit_responses(sim, size, pushes, X, multipliers);
+        unit_responses(sim, size, pushes, X, multipliers, scratch);
         contact_mobility(n, size, at->M, rows, X, system->length, W);
         rest_accelerations(sim, rest, at->e, v, rows, u);
-        CoulombLaws laws = rest_laws(sim, rest, at->e, multipliers);
+        CoulombLaws laws = rest_laws(sim, rest, at->e, multipliers, &scratch);
         zeros(size, P);
         double tolerance = accepted_violation(sim, k, m, W, u, &laws, P);
-        found->solved = coulomb(k, m, W, u, &laws, tolerance, P, &sim->scratch);
+        found->solved = coulomb(k, m, W, u, &laws, tolerance, P, scratch);
         if (found->solved) {
             set_forces(k, m, W, u, &laws, tolerance, P, found);
         }
     }
-    sim->scratch.used = mark;
     return ok;
 }
 
@@ -221,10 +218,9 @@ static int pass_on(int m, const double *shares, int stride, RestForces *found, i
 
 PRBM void choose_sticking(const RestContacts *rest, RestForces *found, const bool *holds, int count,
                           const int *candidates, const bool *leaves, double zero, bool *sticks,
-                          Scratch *scratch) {
-    size_t mark = scratch->used;
+                          Scratch scratch) {
     int k = rest->stop_count, m = rest->count, size = k + m;
-    double *A = take_matrix(scratch, size, size);
+    double *A = take_matrix(&scratch, size, size);
     bool limited[CONTACTS_MAX];
     copy(size * size, found->W, A);
     for (int i = 0; i < k; i++) {
@@ -251,5 +247,4 @@ PRBM void choose_sticking(const RestContacts *rest, RestForces *found, const boo
             }
         }
     }
-    scratch->used = mark;
 }

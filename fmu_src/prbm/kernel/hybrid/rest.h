@@ -20,12 +20,11 @@ typedef struct {
     double normal[STOPS_MAX];
     double friction[CONTACTS_MAX], limit[CONTACTS_MAX], slide[CONTACTS_MAX];
     double mobility[CONTACTS_MAX], pushing[CONTACTS_MAX];
-    double *W; /* (k + m, k + m) accelerations of gaps and of sliding by unit forces, in scratch */
+    double *W; /* (k + m, k + m) accelerations of gaps and of sliding by unit forces */
 } RestForces;
 
 /* Compute the forces that satisfy the laws of all contacts; solved is false if there are none.  In
- * the trial equations all stops must be open, and friction points at rest without friction.  The
- * caller releases found->W. */
+ * the trial equations all stops must be open, and friction points at rest without friction.  */
 PRBM bool rest_forces(Simulation *sim, const double *q, const double *v,
                       const RestContacts *rest, RestForces *found, Problem *problem);
 
@@ -40,6 +39,6 @@ PRBM bool at_limit(const RestForces *found, int j, double zero);
  * sticks: the result, (m,) */
 PRBM void choose_sticking(const RestContacts *rest, RestForces *found, const bool *holds, int count,
                           const int *candidates, const bool *leaves, double zero, bool *sticks,
-                          Scratch *scratch);
+                          Scratch scratch);
 
 #endif

@@ -55,7 +55,7 @@ static void place_state(State *state, const Mechanism *m, Memory *memory) {
     state->walls = place(memory, s, sizeof(Wall));
 }
 
-static void place_scratch(Scratch *scratch, const Mechanism *m, Memory *memory) {
+static void place_scratch(ScratchBlock *block, const Mechanism *m, Memory *memory) {
     size_t d = (size_t)m->direction_count, s = (size_t)m->stop_count; /* d is at least n. */
     size_t size = d + (size_t)m->loop_count + 2 * s + (size_t)m->rubbing_count + 2;
     size_t drawn = (size_t)m->ground_count + (size_t)m->body_count, pieces = (size_t)m->longest;
@@ -67,12 +67,12 @@ static void place_scratch(Scratch *scratch, const Mechanism *m, Memory *memory) 
     size_t forces = 4 * s + 4 * (size_t)m->rubbing_count, pivots_size = forces * (2 * forces + 2);
     size_t single =
         size * size + 4 * size + 2 * drawn + 4 * pieces + 16 + pivots_size + m->beam_size;
-    scratch->size = 12 * size * size + 60 * size + 2 * drawn + 16 * pieces + 64 + pivots_size +
-                    forces * forces + 16 * forces + m->beam_size;
-    scratch->base = place(memory, scratch->size, sizeof(double));
-    scratch->spare = place(memory, single, sizeof(double));
-    scratch->used = scratch->most = 0;
-    scratch->exceeded = false;
+    block->size = 12 * size * size + 60 * size + 2 * drawn + 16 * pieces + 64 + pivots_size +
+                  forces * forces + 16 * forces + m->beam_size;
+    block->base = place(memory, block->size, sizeof(double));
+    block->spare = place(memory, single, sizeof(double));
+    block->most = 0;
+    block->exceeded = false;
 }
 
 static void place_stepping(Stepping *stepping, const System *system, Memory *memory) {
@@ -131,12 +131,21 @@ static void place_all(Simulation *sim, Memory *memory) {
                                         sizeof(ContactPhase));
     sim->trial.contacts.sides = place(memory, (size_t)system->f, sizeof(int));
     evaluation_place(&sim->trial.evaluation, system, memory);
+    size_t n = (size_t)system->n, at_rest = (size_t)(2 * m->stop_count + m->friction_count);
+    sim->trial.mobility = place(memory, at_rest * at_rest, sizeof(double));
+    sim->struck.q = place(memory, n, sizeof(double));
+    sim->struck.v = place(memory, n, sizeof(double));
+    sim->struck.after = place(memory, n, sizeof(double));
+    sim->struck.soft = place(memory, n, sizeof(double));
+    sim->previous = place(memory, (size_t)m->state_count, sizeof(double));
     place_stepping(&sim->stepping, system, memory);
     place_present(sim, system, memory);
     contact_problem_place(&sim->contact_problem, system, memory);
     evaluation_place(&sim->at_front, system, memory);
     correction_place(&sim->correction, system, memory);
-    place_scratch(&sim->scratch, m, memory);
+    place_scratch(&sim->block, m, memory);
+    sim->scratch.block = &sim->block;
+    sim->scratch.used = 0;
     sim->forces = place(memory, LOADS * (size_t)m->force_count, sizeof(double));
 }
 

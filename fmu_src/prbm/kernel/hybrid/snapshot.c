@@ -223,9 +223,9 @@ static bool rebuild(Simulation *sim, Problem *problem) {
         return true;
     }
     configuration->assembled = assemble(&configuration->system, sim->state.acting_values,
-                                        &sim->scratch, problem);
+                                        sim->scratch, problem);
     bool ok = configuration->assembled &&
-              set_scales(configuration, sim->state.frequency, &sim->scratch, problem);
+              set_scales(configuration, sim->state.frequency, sim->scratch, problem);
     set_inputs(sim);
     return ok;
 }
@@ -235,14 +235,13 @@ PRBM void keep_backup(Simulation *sim) {
 }
 
 PRBM bool attempt(Simulation *sim, bool ok, Problem *problem) {
-    if (sim->scratch.exceeded) {
+    if (sim->block.exceeded) {
         ok = fail(problem, "the working memory of the simulation is too small; report this");
-        sim->scratch.exceeded = false;
+        sim->block.exceeded = false;
     }
     if (!ok) {
         Problem ignored;
         (void)read_state(sim, sim->backup);
-        sim->scratch.used = 0;
         forget_present(sim);
         (void)rebuild(sim, &ignored);
     }

@@ -147,7 +147,13 @@ typedef struct {
     Equations equations;
     ContactState contacts;
     Evaluation evaluation;
+    double *mobility; /* of the contacts at rest, see RestForces */
 } Trial;
+
+/* The motion at an impact.  soft: velocities after an impact without restitution. */
+typedef struct {
+    double *q, *v, *after, *soft; /* (n,) */
+} Struck;
 
 /* The state at which a guard is evaluated while its fall is located. */
 typedef struct {
@@ -206,12 +212,15 @@ struct Simulation {
     Equations equations;
     double *forces; /* (3 per force): acting inputs */
     Trial trial;
+    Struck struck;
+    double *previous; /* the exchanged states before an event */
     Stepping stepping;
     Present present;
     ContactProblem contact_problem; /* at the position that needed it last */
     Evaluation at_front;   /* at the front, while contacts change */
     Correction correction; /* working memory of projections */
-    Scratch scratch;
+    ScratchBlock block;
+    Scratch scratch; /* the whole block; who takes from a copy passes that copy on */
     ImpactListener *on_impact;
     void *listener;
     bool untouched; /* whether nothing has been set since the last communication point */

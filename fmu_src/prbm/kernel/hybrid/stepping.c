@@ -106,8 +106,8 @@ static double projected_error(Simulation *sim, double h, Problem *problem) {
     copy(state_size(sim), stepping->end, state->front);
     double end = state->front_time + h;
     bool closed = project_near(&sim->equations, &stepping->evaluation, &stepping->reference, end,
-                               state->front, &sim->correction, &sim->scratch, problem) &&
-                  check_projection(sim, end, stepping->end, state->front, problem);
+                               state->front, &sim->correction, sim->scratch, problem) &&
+                  check_projection(sim, end, stepping->end, state->front, sim->scratch, problem);
     return closed ? error : HUGE_VAL;
 }
 
@@ -158,8 +158,8 @@ static bool project_end(Simulation *sim, Problem *problem) {
     State *state = &sim->state;
     double *y = sim->stepping.end;
     copy(state_size(sim), state->front, y);
-    return project(&sim->equations, state->front_time, state->front, &sim->scratch, problem) &&
-           check_projection(sim, state->front_time, y, state->front, problem);
+    return project(&sim->equations, state->front_time, state->front, sim->scratch, problem) &&
+           check_projection(sim, state->front_time, y, state->front, sim->scratch, problem);
 }
 
 PRBM bool end_step(Simulation *sim, double t, Problem *problem) {
