@@ -46,7 +46,7 @@ PRBM bool choose_moved_modes(Simulation *sim, Problem *problem) {
 /* Keep held stops on walls whose velocities have jumped by less than rest_speed; otherwise the
  * stops open or are struck.  Impulses may pull, but not more than the forces lam (r,) press within
  * the given time; NULL: without limit. */
-static bool keep_on_walls(Simulation *sim, const double *lam, double time, bool *follows,
+static bool keep_held_closed(Simulation *sim, const double *lam, double time, bool *follows,
                           Problem *problem) {
     const Equations *eq = &sim->equations;
     int ny = state_size(sim), n = system_of(sim)->n, h = eq->first_hold;
@@ -71,6 +71,6 @@ static bool keep_on_walls(Simulation *sim, const double *lam, double time, bool 
 
 PRBM bool follow_walls(Simulation *sim, const double *lam, double time, Problem *problem) {
     bool follows = false;
-    return keep_on_walls(sim, lam, time, &follows, problem) &&
+    return keep_held_closed(sim, lam, time, &follows, problem) &&
            (follows || choose_moved_modes(sim, problem));
 }

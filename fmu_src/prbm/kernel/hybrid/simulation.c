@@ -131,7 +131,7 @@ static void place_all(Simulation *sim, Memory *memory) {
                                         sizeof(ContactPhase));
     sim->trial.contacts.sides = place(memory, (size_t)system->f, sizeof(int));
     evaluation_place(&sim->trial.evaluation, system, memory);
-    size_t n = (size_t)system->n, at_rest = (size_t)(2 * m->stop_count + m->friction_count);
+    size_t n = (size_t)system->n, at_rest = (size_t)(2 * m->stop_count + m->rubbing_count);
     sim->trial.mobility = place(memory, at_rest * at_rest, sizeof(double));
     sim->struck.q = place(memory, n, sizeof(double));
     sim->struck.v = place(memory, n, sizeof(double));
