@@ -51,6 +51,7 @@ from prbm.mechanics import (
     forces,
     kinetics,
     modal,
+    positions,
     profile,
     statics,
     stress,
@@ -1197,7 +1198,7 @@ def test_shapes_under_gravity_of_bodies_on_springs_are_the_same(model):
     ours.close()
 
 
-@twin(release_velocity=statics.release_velocity)
+@twin(release_velocity=positions.release_velocity)
 @each_mechanism
 @pytest.mark.parametrize("speed", [0.0, 0.7, -2.0])
 def test_release_velocities_are_the_same(name, speed):
@@ -1208,7 +1209,7 @@ def test_release_velocities_are_the_same(name, speed):
         e = system.directions(q)
         rows = system.gradient(np.vstack([system.loops, system.release]), e)
         rel = spread(np.linalg.cond(constraints.saddle(system.mass_matrix(e), rows, rows)))
-        assert_same(v, statics.release_velocity(system, q, speed), max(1e-11, rel))
+        assert_same(v, positions.release_velocity(system, q, speed), max(1e-11, rel))
 
 
 def assert_same_modes(frequency, phi, expected, rounding):

@@ -15,7 +15,8 @@ from prbm.mechanics import statics
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.forces import elastic_energy, gravitational_energy
 from prbm.mechanics.modal import modes
-from prbm.mechanics.statics import equilibrium, release_velocity
+from prbm.mechanics.positions import release_velocity
+from prbm.mechanics.statics import equilibrium
 from prbm.mechanics.system import jacobian, values
 from prbm.mechanism.flexure import MODELS
 from support import ROOT, mechanism

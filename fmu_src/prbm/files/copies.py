@@ -13,10 +13,12 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from ..base.errors import MechanismError
-from ..mechanism.expressions import affine
+from ..mechanism.expressions import Affine, affine
 from ..mechanism.parts import (
     FIELDS,
     GROUND,
+    POSITIONS,
+    VELOCITIES,
     Body,
     Flexure,
     FlexureType,
@@ -328,6 +330,36 @@ def _key(chain: Chain) -> str:
     return "mirror" if chain and chain[-1].exchanged else "repeat"
 
 
+def _start_image(body: Body, image: Image) -> dict[str, Any]:
+    """Return the positions and velocities at the start of the image of a body.
+
+    Raises
+    ------
+    MechanismError
+        If a component along an axis depends on one along the other, which is not given.
+    """
+    result: dict[str, Any] = {}
+    for angle, *axes in (POSITIONS, VELOCITIES):
+        turn = getattr(body, angle)
+        if turn is not None:
+            result[angle] = written(affine(turn).scaled(-1.0 if image.exchanged else 1.0))
+        for axis, part in zip(axes, ("real", "imag"), strict=True):
+            shares = [getattr(column, part) for column in image.columns]
+            used = [(name, c) for name, c in zip(axes, shares, strict=True) if c]
+            missing = [name for name, _ in used if getattr(body, name) is None]
+            if missing and len(missing) < len(used):
+                raise MechanismError(
+                    f"{body.name}.{missing[0]} is missing: a copy that is turned by other than "
+                    f"quarter turns needs {' and '.join(axes)}; add the key"
+                )
+            if not missing:
+                terms = [affine(getattr(body, name)).scaled(c) for name, c in used]
+                result[axis] = written(reduce(Affine.plus, terms))
+            else:
+                result[axis] = None
+    return result
+
+
 def _body_image(body: Body, image: Image) -> Body:
     """Return the image of a body."""
     return replace(
@@ -337,6 +369,7 @@ def _body_image(body: Body, image: Image) -> Body:
         points={image.words(name): image.point(point) for name, point in body.points.items()},
         outline=tuple(map(image.point, body.outline)),
         holes=tuple(tuple(map(image.point, hole)) for hole in body.holes),
+        **_start_image(body, image),
     )
 
 

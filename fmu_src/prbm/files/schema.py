@@ -232,6 +232,12 @@ class BodyTable(Named):
     )
     density: Annotated[Quantity, measured(parts.FlexureType, "density")] | None = None
     payload: Annotated[Quantity, PAYLOAD] | None = None
+    start_angle: Annotated[Quantity, measured(parts.Body, "start_angle")] | None = None
+    start_x: Annotated[Quantity, measured(parts.Body, "start_x")] | None = None
+    start_y: Annotated[Quantity, measured(parts.Body, "start_y")] | None = None
+    start_omega: Annotated[Quantity, measured(parts.Body, "start_omega")] | None = None
+    start_vx: Annotated[Quantity, measured(parts.Body, "start_vx")] | None = None
+    start_vy: Annotated[Quantity, measured(parts.Body, "start_vy")] | None = None
     mirror: LineOrLines = mirror_key()
     repeat: RepeatTable | None = repeat_key()
 
@@ -570,6 +576,7 @@ def _body(
     outline = tuple(_corner(table, corner) for corner in table.outline)
     holes = tuple(tuple(_corner(table, corner) for corner in hole) for hole in table.holes)
     shape: dict[str, Any] = {"points": table.points, "outline": outline, "holes": holes}
+    shape |= {key: getattr(table, key) for key in (*parts.POSITIONS, *parts.VELOCITIES)}
     given = {key: getattr(table, key) for key in GIVEN if getattr(table, key) is not None}
     cut = [key for key in PLATE if getattr(table, key) is not None]
     if given and cut:

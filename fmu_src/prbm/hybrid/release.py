@@ -5,9 +5,8 @@ import numpy as np
 from ..base.errors import ParameterError
 from ..mechanics.contact_state import ContactState
 from ..mechanics.inputs import Inputs
+from ..mechanics.positions import start_velocity
 from ..mechanics.start import start_shape
-from ..mechanics.statics import release_velocity
-from ..mechanism.parts import value
 from .compliant import preloaded, rephased
 from .configuration import Configuration
 from .contact_modes import choose_modes
@@ -64,8 +63,7 @@ def released(configuration: Configuration, inputs: Inputs, time: float) -> Front
     """
     mechanism, system = configuration.mechanism, configuration.system
     q = start_shape(system, configuration.values)
-    speed = value(mechanism.release, "velocity", configuration.values)
-    velocity = release_velocity(system, q, speed)
+    velocity = start_velocity(system, q, configuration.values)
     stops = len(mechanism.stops)
     contacts = ContactState.free(stops, len(mechanism.rubbing))
     equations = configuration.equations(inputs, contacts)

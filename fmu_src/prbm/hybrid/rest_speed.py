@@ -7,8 +7,9 @@ import numpy as np
 from ..base.errors import PrbmError
 from ..base.tolerances import REST_AMPLITUDE_RTOL, REST_SPEED_RTOL
 from ..mechanics.arrays import Real
+from ..mechanics.positions import start_velocity
 from ..mechanics.start import start_shape
-from ..mechanics.statics import release_velocity, resting
+from ..mechanics.statics import resting
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import value
 from .configuration import Configuration
@@ -50,7 +51,7 @@ def of_stops(mechanism: Mechanism) -> list[float]:
     configuration = Configuration.of(mechanism, values)
     system, scales = configuration.system, configuration.scales
     released = start_shape(system, values)
-    v = release_velocity(system, released, value(mechanism.release, "velocity", values))
+    v = start_velocity(system, released, values)
 
     def gaps(q: Real) -> Real:
         return system.gap_rows.values(system.directions(q))

@@ -22,6 +22,8 @@ from ..mechanism.flexure import ENDS, PROFILES
 from ..mechanism.parts import (
     FIELDS,
     GROUND,
+    POSITIONS,
+    VELOCITIES,
     Flexure,
     FlexureType,
     Force,
@@ -62,6 +64,8 @@ DIMENSIONS = (
     "rise", "initial_strain",
 )  # fmt: skip
 """Fields of a flexure type that are not always given, in the order of its fields."""
+AT_START = (*POSITIONS, *VELOCITIES)
+"""Fields of a body that are not always given, in the order of its fields."""
 STARTS = ("displacement", "angle", "amplitude")  # The starts of a release.
 TYPES = {"Real": 0, "Integer": 1, "Boolean": 2, CLOCK: 3}
 COORDINATES_MAX = 512  # The mass matrix then has 2 MB.
@@ -263,7 +267,8 @@ class _Writer:
         """Yield bodies, types of flexures, flexures, joints, springs and guides."""
         m = self.mechanism
         for body in m.bodies:
-            yield _text(body.name) + self._fields(body) + self._point(body.centre)
+            given = sum(1 << i for i, n in enumerate(AT_START) if getattr(body, n) is not None)
+            yield _text(body.name) + _u32(given) + self._fields(body) + self._point(body.centre)
         for kind in m.flexure_types:
             yield self._type(kind)
         for flexure in m.flexures:

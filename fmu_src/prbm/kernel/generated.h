@@ -35,6 +35,8 @@ enum { STATICS_ITERATIONS_MAX = 30 };
 #define STATICS_ROUNDING_RTOL 1e-13
 #define STATICS_STEP_ATOL 1e-08
 #define RIGID_RTOL 1e-12
+#define START_RTOL 1e-06
+#define START_DEPENDENT_RTOL 1e-09
 #define RELEASE_LEVER_RTOL 0.02
 #define RELEASE_MODE_RTOL 1e-06
 #define ZERO_FREQUENCY_RTOL 1e-07
@@ -260,6 +262,15 @@ typedef enum {
     DIMENSION_INITIAL_STRAIN = 7,
     DIMENSION_COUNT = 8,
 } Dimension;
+typedef enum {
+    GIVEN_ANGLE = 0,
+    GIVEN_X = 1,
+    GIVEN_Y = 2,
+    GIVEN_OMEGA = 3,
+    GIVEN_VX = 4,
+    GIVEN_VY = 5,
+    GIVEN_COUNT = 6,
+} StartField;
 typedef enum {
     START_DISPLACEMENT = 0,
     START_ANGLE = 1,

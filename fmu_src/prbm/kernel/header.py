@@ -170,6 +170,8 @@ def _tables() -> Iterator[str]:
     yield _enumeration("SlotGroup", "SLOTS", _counted(tables.SLOT_GROUPS))
     yield _enumeration("VariableType", "", tables.TYPES)
     yield _enumeration("Dimension", "DIMENSION", _numbers((*tables.DIMENSIONS, "count")))
+    at_start = [name.removeprefix("start_") for name in tables.AT_START]
+    yield _enumeration("StartField", "GIVEN", _numbers((*at_start, "count")))
     yield _enumeration("ReleaseStart", "START", _numbers((*tables.STARTS, "count")))
 
 

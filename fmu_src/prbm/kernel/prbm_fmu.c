@@ -39,6 +39,7 @@
 #include "core/factors.c"
 #include "core/branch_terms.c"
 #include "core/statics.c"
+#include "core/positions.c"
 #include "core/modal.c"
 #include "core/start.c"
 #include "core/complementarity.c"

@@ -11,11 +11,11 @@ from ..base.tolerances import (
     ZERO_FREQUENCY_RTOL,
     ZERO_MODE_RTOL,
 )
-from ..mechanism.parts import value
 from . import constraints
 from .arrays import Complex, Real
 from .elements import Elements
 from .forces import field_row
+from .positions import start_speed
 from .statics import Equilibrium, held_rows, resting, sprung, tangent_stiffness
 from .system import Rows, System
 
@@ -215,7 +215,7 @@ def slow_rates(system: System) -> tuple[float, float]:
     The first is the scale of velocities.  About an unstable equilibrium it is the rate of the most
     unstable mode.  If a motion deforms no spring and lifts no weight, it is the larger of the rates
     sqrt(g/L) and u/L of a fall and of the motion at the release, with the size L, gravity g and the
-    speed u of the released body; without both, the lowest angular frequency that is not zero.
+    largest speed u given there; without both, the lowest angular frequency that is not zero.
 
     The second is the scale of times: the same, or the lowest angular frequency if it is larger and
     the mechanism is not unstable.
@@ -224,7 +224,7 @@ def slow_rates(system: System) -> tuple[float, float]:
     frequency, least = found.frequency, found.rounding
     if len(frequency) and frequency[0] < -least:
         return (-2 * math.pi * float(frequency[0]),) * 2
-    speed = abs(value(system.mechanism.release, "velocity", system.values))
+    speed = start_speed(system)
     fall = math.sqrt(abs(system.gravity) / system.length)
     acting = 2 * math.pi * frequency[frequency > least]
     lowest = float(acting[0]) if len(acting) else 0.0

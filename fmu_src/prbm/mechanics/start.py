@@ -7,10 +7,11 @@ import numpy as np
 
 from ..base.errors import EquilibriumError, ParameterError, SimulationError
 from ..base.tolerances import STATICS_CONSTRAINT_RTOL
-from ..mechanism.parts import value
+from ..mechanism.parts import POSITIONS, value
 from .arrays import Real
 from .constraints import project_positions
 from .modal import modes, moved_by, unstable_directions
+from .positions import given_at_start, positioned
 from .statics import equilibrium, held_rows, resting, with_bodies_placed
 from .system import System
 
@@ -24,7 +25,7 @@ class Instability(NamedTuple):
         Of the equilibrium under gravity, without stops.
     release : int
         Of the shape that is held at the displacement or the angle of the release; 0 if the release
-        is along a mode.
+        is along a mode, or if bodies are given positions.
     """
 
     rest: int
@@ -58,7 +59,7 @@ def instability(system: System, values: Mapping[str, float]) -> Instability:
     """
     release, (rest, balanced) = system.mechanism.release, resting(system)
     held = 0
-    if not release.mode:
+    if not release.mode and not given_at_start(system.mechanism, values, POSITIONS):
         placed = with_bodies_placed(system)
         shape = equilibrium(placed, value(release, release.start, values))
         found = modes(placed, shape)
@@ -70,7 +71,8 @@ def instability(system: System, values: Mapping[str, float]) -> Instability:
 def start_shape(system: System, values: Mapping[str, float], fraction: float = 1.0) -> Real:
     """Return the coordinates of the released shape, (n,).
 
-    Bodies without flexures and joints are placed, those on springs too.
+    Bodies without flexures and joints are placed, those on springs too.  Positions that bodies are
+    given replace that of the release, see :mod:`prbm.mechanics.positions`.
 
     Parameters
     ----------
@@ -79,16 +81,20 @@ def start_shape(system: System, values: Mapping[str, float], fraction: float = 1
     values : mapping
         Values of all parameters.
     fraction : float
-        Share of the displacement, angle or amplitude [-].
+        Share of the displacement, angle or amplitude, or of the positions of bodies [-].
 
     Raises
     ------
     EquilibriumError
-        If no equilibrium has the displacement or the angle, or no shape the amplitude.
+        If no equilibrium has the displacement, the angle or the positions, or no shape the
+        amplitude.
     ParameterError
-        If there is no such mode, or it does not move the released point.
+        If positions contradict the constraints or the release, there is no such mode, or it does
+        not move the released point.
     """
     release = system.mechanism.release
+    if given := given_at_start(system.mechanism, values, POSITIONS):
+        return positioned(system, given, fraction)
     amount = fraction * value(release, release.start, values)
     if release.mode:
         return mode_shape(system, release.mode, amount)

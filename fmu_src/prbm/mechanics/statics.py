@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.errors import EquilibriumError, ParameterError, SimulationError
+from ..base.errors import EquilibriumError, SimulationError
 from ..base.tolerances import (
     RELEASE_LEVER_RTOL,
     ROW_RTOL,
@@ -52,13 +52,35 @@ from .system import Rows, System
 from .system import unit as unit_vector
 
 
+class Held(NamedTuple):
+    """Bodies that are held at given positions, instead of the released one.
+
+    Parameters
+    ----------
+    rows : Rows
+        The loops and guides, then a row for each position that forces and moments hold.
+    places : (p,)
+        The coordinates that are placed.
+    angles : tuple of (int, float)
+        Coordinates that are held at angles [rad].
+    """
+
+    rows: Rows
+    places: Real
+    angles: tuple[tuple[int, float], ...]
+
+
 class _Given(NamedTuple):
-    """What is given: displacement, row and moments of the loads, share of strains, pretension."""
+    """What is given: displacement, row and moments of the loads, share of strains, pretension.
+
+    Positions, if there are any, take the place of the displacement.
+    """
 
     held: float | None
     w: Complex
     moment: Real
     share: float
+    positions: Held | None = None
 
 
 @dataclass(frozen=True)
@@ -187,6 +209,33 @@ def equilibrium(
     return Equilibrium(state[:n], state[n : n + r], force, w)
 
 
+def held_slowly(system: System, positions: Callable[[float], Held]) -> tuple[Real, float]:
+    """Return the shape under gravity with bodies held at positions, as :func:`equilibrium`.
+
+    Parameters
+    ----------
+    system : System
+        The mechanism.
+    positions : callable
+        The positions at a share of the load.
+
+    Returns
+    -------
+    q : (n,)
+        Coordinates.
+    done : float
+        Share that is reached; below 1 if no equilibrium was found beyond it.
+    """
+    w, moment = load_row(system, {})
+
+    def given(share: float) -> _Given:
+        return _Given(None, share * w, share * moment, share, positions(share))
+
+    straight = np.concatenate([system.q0, np.zeros(len(positions(0.0).rows))])
+    state, done = _load_fully(system, given, straight)
+    return state[: system.n], done
+
+
 def sprung(system: System) -> Whole:
     """Return the coordinates of the bodies that only springs connect to the ground, (3 k,)."""
     found: Whole = np.setdiff1d(system.floating, system.placed)
@@ -277,7 +326,7 @@ def _follow(
         smallest, crossed = step <= STATICS_LOAD_STEP_MIN, 0
         now = given(target)
         trial = _newton(system, now, state)
-        if trial is not None and _holds(system, now.held, trial):
+        if trial is not None and _holds(system, now, trial):
             crossed = _determinant_sign(system, now, trial) if closely else 0
             if smallest or sign * crossed >= 0:
                 turn = float(np.abs((trial - state)[bent]).max(initial=0.0))
@@ -295,7 +344,7 @@ def _follow(
 
 def _determinant_sign(system: System, given: _Given, state: Real) -> int:
     """Return the sign of the determinant of the balance in a state; 0 if it is singular."""
-    rows = _holding_rows(system, given.held)
+    rows = _holding_rows(system, given)
     kkt = _linear_balance(
         system, state[: system.n], (given.w, given.share), rows, state[system.n :]
     )
@@ -316,8 +365,11 @@ def _linear_balance(
     return _placed(system, constraints.saddle(K_t, G, G))
 
 
-def _holding_rows(system: System, held: float | None) -> Rows:
-    """Return the loops and, if a force holds the released body, the row of its displacement."""
+def _holding_rows(system: System, given: _Given) -> Rows:
+    """Return the loops and the rows of what forces hold: the released body, or positions."""
+    held = given.held
+    if given.positions is not None:
+        return given.positions.rows
     if held is None or system.released_free:
         return system.loop_rows
     return held_rows(system, held)
@@ -382,14 +434,15 @@ def free_displacement(system: System) -> float:
 def _newton(system: System, given: _Given, start: Real) -> Real | None:
     """Find the equilibrium with what is given; None without convergence."""
     n, elements = system.n, Elements(system)
-    held, w, moment, share = given
-    rows = _holding_rows(system, held)
+    held, w, moment, share, positions = given
+    rows = _holding_rows(system, given)
     stiffest = float(np.abs(elements.drawn).max())
     springs_scale = STATICS_FORCE_RTOL * stiffest
     idle = sprung(system)
     least = SPRING_IDLE_RTOL * (stiffest or float(np.abs(w).max()) or 1.0)
     state, turn = start.copy(), math.inf
-    state[system.placed] = _places(system, held or 0.0)
+    places = _places(system, held or 0.0) if positions is None else positions.places
+    state[system.placed] = places
     for _ in range(STATICS_ITERATIONS_MAX):
         q, lam = state[:n], state[n:]
         e = system.directions(q)
@@ -423,11 +476,14 @@ def _newton(system: System, given: _Given, start: Real) -> Real | None:
     return None
 
 
-def _holds(system: System, held: float | None, state: Real) -> bool:
-    """Return whether a shape is held at an amount, and not half a turn or more away.
+def _holds(system: System, given: _Given, state: Real) -> bool:
+    """Return whether a shape is held at what is given, and not half a turn or more away.
 
     The sine that holds a rotation vanishes there, too.
     """
+    if given.positions is not None:
+        return all(abs(state[j] - at) < STATICS_TURN_MAX for j, at in given.positions.angles)
+    held = given.held
     if held is None or not system.mechanism.release.turns or system.released_free:
         return True
     return abs(system.amount(state[: system.n]) - held) < STATICS_TURN_MAX
@@ -534,10 +590,10 @@ def immobile(system: System) -> str:
             f"the body {system.mechanism.release.body} cannot turn; give release.displacement "
             "instead, or let flexures stretch (axial = true)"
         )
-    return _immovable(system, "give release.angle, another release.point, or release another body")
+    return immovable(system, "give release.angle, another release.point, or release another body")
 
 
-def _immovable(system: System, remedy: str) -> str:
+def immovable(system: System, remedy: str) -> str:
     """Return why the released point, as drawn, cannot move along the release, and a remedy."""
     name = system.mechanism.release.body
     if _on_pivot(system, name):
@@ -625,38 +681,3 @@ def _left_by_loops(system: System, e: Complex, rows: Real) -> float:
     loops = system.loop_rows.jacobian(e)
     left = rows - (loops.T @ np.linalg.lstsq(loops.T, rows.T, rcond=None)[0]).T
     return float(np.abs(left).max())
-
-
-def release_velocity(system: System, q: Real, speed: float) -> Real:
-    """Return the velocity of least kinetic energy with a given speed of the released body.
-
-    Parameters
-    ----------
-    q : (n,)
-        Angles at release [rad].
-    speed : float
-        Speed of the released point along the direction of the release [m/s].
-
-    Returns
-    -------
-    v : (n,)
-        Rates of the coordinates, as after an impulse on the point along that direction [rad/s].
-
-    Raises
-    ------
-    ParameterError
-        If the body cannot move along that direction.
-    """
-    if speed == 0.0:
-        return np.zeros(system.n)
-    e = system.directions(q)
-    M = system.mass_matrix(e)
-    rows = np.vstack([system.loop_rows.jacobian(e), system.gradient(system.release, e)])
-    rates = np.zeros(len(rows))
-    rates[-1] = -speed
-    try:
-        return constraints.project_velocities(M, rows, rates, np.zeros(system.n), system.length)
-    except SimulationError:
-        remedy = "give another release.point, or release another body"
-        why = _immovable(system, remedy)
-        raise ParameterError(f"release.velocity = {speed:g} m/s: {why}") from None

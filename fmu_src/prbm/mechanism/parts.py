@@ -37,6 +37,11 @@ class Body:
         points.  The outline is drawn only: mass, inertia and contact do not depend on it.
     holes : tuple of tuples of Point
         Corners of the holes in the outline as drawn [m].
+    start_angle, start_x, start_y : Quantity or None
+        Rotation [rad] and displacement of the centre of mass [m] from the straight shape at the
+        start; None: not given.
+    start_omega, start_vx, start_vy : Quantity or None
+        Angular velocity [rad/s] and velocity of the centre of mass [m/s] at the start.
     """
 
     name: str
@@ -46,6 +51,12 @@ class Body:
     points: Mapping[str, Point] = field(default_factory=dict)
     outline: tuple[Point, ...] = ()
     holes: tuple[tuple[Point, ...], ...] = ()
+    start_angle: Quantity | None = None
+    start_x: Quantity | None = None
+    start_y: Quantity | None = None
+    start_omega: Quantity | None = None
+    start_vx: Quantity | None = None
+    start_vy: Quantity | None = None
 
 
 @dataclass(frozen=True)
@@ -482,7 +493,10 @@ LENGTH_MIN = 1e-9  # m; smallest dimension of a mechanism.
 MASS_MIN = 1e-15  # kg; half the mass of a cubic micrometre of silicon.
 LENGTH_MAX = 1e3  # m; largest dimension of a mechanism.
 RESTITUTION_MIN = 0.01  # Smallest coefficient of restitution of a compliant stop.
-ANGLE_MAX = 100.0  # rad; largest rotation of a release.
+ANGLE_MAX = 100.0  # rad; largest rotation of a release, at the start or of a free angle.
+POSITIONS = ("start_angle", "start_x", "start_y")
+VELOCITIES = ("start_omega", "start_vx", "start_vy")
+"""Fields of bodies that are positions and velocities at the start."""
 MODE_MAX = 512  # Largest number of the mode of a release.
 
 
@@ -537,6 +551,12 @@ FIELDS: dict[type, dict[str, tuple[str, str, float, float, float | None, bool]]]
         "inertia": _meta(
             "kg.m2", "Moment of inertia about the centre of mass", 1e-30, 1e9, 1e-4
         ),
+        "start_angle": _meta("rad", "Rotation at the start", -ANGLE_MAX, ANGLE_MAX, 0.1),
+        "start_x": _meta("m", "Displacement along x at the start", -LENGTH_MAX, LENGTH_MAX, 1e-2),
+        "start_y": _meta("m", "Displacement along y at the start", -LENGTH_MAX, LENGTH_MAX, 1e-2),
+        "start_omega": _meta("rad/s", "Angular velocity at the start", -1e6, 1e6, 1.0),
+        "start_vx": _meta("m/s", "Velocity along x at the start", -1e4, 1e4, 1.0),
+        "start_vy": _meta("m/s", "Velocity along y at the start", -1e4, 1e4, 1.0),
     },
     Joint: {
         "stiffness": _meta(

@@ -29,6 +29,8 @@ typedef struct {
     const char *name;
     Expression mass, inertia;
     Point centre;
+    uint32_t given; /* The bits of the positions and velocities that are given at the start. */
+    Expression at_start[GIVEN_COUNT];
 } Body;
 
 typedef struct {
@@ -223,7 +225,7 @@ typedef struct {
     int gravity[2], tolerance, damping_zeta, damping_beta; /* Indices of parameters. */
     double default_step; /* Step of the default experiment [s]; 0: unknown. */
     /* Sizes of the assembled system. */
-    int coordinate_count, direction_count, loop_count, guided_count, link_count, strain_count, stretch_count,
+    int coordinate_count, direction_count, loop_count, guided_count, given_count, link_count, strain_count, stretch_count,
         shift_count, placed_count, floating_count, step_count, mass_count, spring_count, corner_count;
     int compliant_count; /* Number of compliant stops. */
     int first_extra;     /* 2 n + 2: position of the states of compliant stops in a state. */

@@ -7,6 +7,7 @@
 #include "core/forces.h"
 #include "core/matrix.h"
 #include "core/modal.h"
+#include "core/positions.h"
 
 #define FULL_TURN 6.283185307179586 /* rad */
 
@@ -243,7 +244,7 @@ PRBM bool slow_rates(const System *system, double *rate, double *fast, Scratch s
     bool balanced, found = resting_frequencies(system, frequencies, &balanced, scratch, problem);
     if (found) {
         double least = ZERO_FREQUENCY_RTOL * largest(k, frequencies);
-        double speed = fabs(evaluate(system->mechanism->release.velocity, system->values));
+        double speed = start_speed(system, scratch);
         double fall = square_root(modulus(system->gravity) / system->length);
         while (j < k && !(frequencies[j] > least)) {
             j++;

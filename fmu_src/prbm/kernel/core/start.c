@@ -3,6 +3,7 @@
 
 #include "core/constraints.h"
 #include "core/modal.h"
+#include "core/positions.h"
 #include "core/start.h"
 
 /* Displace the rest shape q along a mode, column k of phi (n, count), by which the released point
@@ -86,6 +87,9 @@ PRBM bool start_shape(const System *system, const double *values, double *q, Scr
                       Problem *problem) {
     const Release *release = &system->mechanism->release;
     double amount = evaluate(release->amount, values);
+    if (has_positions(system)) {
+        return positioned(system, values, q, scratch, problem);
+    }
     if (release->start == START_AMPLITUDE) {
         return mode_shape(system, amount, q, scratch, problem);
     }
@@ -117,7 +121,7 @@ static bool unstable_shape(const System *system, bool held, double amount, int *
 PRBM bool instability(const System *system, const double *values, int *rest, int *release,
                       Scratch scratch, Problem *problem) {
     const Release *given = &system->mechanism->release;
-    bool held = given->start != START_AMPLITUDE;
+    bool held = given->start != START_AMPLITUDE && !has_positions(system);
     System placed = with_bodies_placed(system);
     *release = 0;
     return unstable_shape(system, false, 0.0, rest, scratch, problem) &&

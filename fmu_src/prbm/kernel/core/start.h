@@ -8,7 +8,7 @@
 PRBM bool start_shape(const System *system, const double *values, double *q, Scratch scratch,
                       Problem *problem);
 /* Count the unstable directions of the equilibrium under gravity and, unless the release is along a
- * mode, of the shape held at the amount of the release. */
+ * mode or bodies are given positions, of the shape held at the amount of the release. */
 PRBM bool instability(const System *system, const double *values, int *rest, int *release,
                       Scratch scratch, Problem *problem);
 

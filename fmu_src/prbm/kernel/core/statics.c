@@ -85,6 +85,82 @@ PRBM void place_bodies(const System *system, double amount, double *q) {
     }
 }
 
+/* --- positions at the start ------------------------------------------------------------------- */
+
+PRBM const char *start_name(const StartValue *x) {
+    static const char *const names[GIVEN_COUNT] = {"start_angle", "start_x",  "start_y",
+                                                   "start_omega", "start_vx", "start_vy"};
+    return names[x->field];
+}
+
+PRBM const char *start_unit(const StartValue *x) {
+    static const char *const units[GIVEN_COUNT] = {"rad", "m", "m", "rad/s", "m/s", "m/s"};
+    return units[x->field];
+}
+
+PRBM bool rotates(const StartValue *x) {
+    return x->field == GIVEN_ANGLE || x->field == GIVEN_OMEGA;
+}
+
+static Complex start_axis(const StartValue *x) {
+    bool along_x = x->field == GIVEN_X || x->field == GIVEN_VX;
+    return complex_of(along_x, !along_x);
+}
+
+PRBM double start_row(const System *system, const StartValue *x, double share, Complex *B) {
+    const BodyFrame *frame = x->frame;
+    double amount = share * x->value;
+    Complex u = conjugate(start_axis(x));
+    for (int j = 0; j < system->d; j++) {
+        B[j] = rotates(x) ? complex_of(0.0, 0.0) : product(u, frame->A[j]);
+    }
+    if (!rotates(x)) {
+        return product(u, minus(frame->c, frame->drawn)).re - amount;
+    }
+    double angle = system->q0[frame->j] + amount;
+    Complex e;
+    unit_vectors(1, &angle, &e);
+    B[frame->arm] = complex_of(-system->length * e.im, -system->length * e.re);
+    return 0.0;
+}
+
+/* Return the number of rows of what holds a mechanism. */
+static int rows_of(const Hold *hold) {
+    int rows = hold->held;
+    for (int k = 0; k < hold->count; k++) {
+        rows += hold->values[k].held;
+    }
+    return rows;
+}
+
+/* Stack the loops and the rows of what holds a mechanism, at a share of its amounts. */
+static void stack_hold(const System *system, const Hold *hold, double share, Complex *B, double *c) {
+    int row = system->r;
+    stack_holding(system, share * hold->amount, B, c);
+    for (int k = 0; k < hold->count; k++) {
+        if (hold->values[k].held) {
+            c[row] = start_row(system, &hold->values[k], share, B + row * system->d);
+            row++;
+        }
+    }
+}
+
+/* Set the coordinates that are placed, at a share of the amounts. */
+static void place_held(const System *system, const Hold *hold, double share, double *q) {
+    place_bodies(system, share * hold->amount, q);
+    for (int i = 0; i < hold->count; i++) {
+        const StartValue *x = &hold->values[i];
+        for (int k = 0; k < system->placed_count; k += PLACED_EACH) {
+            const int *place = system->placed + k;
+            if (place[SHIFTS_EACH] == x->frame->j && rotates(x)) {
+                q[x->frame->j] += share * x->value;
+            } else if (place[SHIFTS_EACH] == x->frame->j) {
+                q[place[x->field == GIVEN_X ? AXIS_X : AXIS_Y]] += share * x->value / system->length;
+            }
+        }
+    }
+}
+
 /* Set the elements of the coordinates that are placed to zero. */
 static void clear_placed(const System *system, double *x) {
     for (int k = 0; k < system->placed_count; k++) {
@@ -254,32 +330,32 @@ static bool balance_out(const Balance *balance, double *state, Scratch scratch) 
     return done || (balanced && !going);
 }
 
-/* Return the balance at a fraction of gravity and, if held, of the displacement. */
-static Balance balance_at(const System *system, bool held, double displacement, double fraction,
+/* Return the balance at a fraction of gravity and of what holds the mechanism. */
+static Balance balance_at(const System *system, const Hold *hold, double fraction,
                           Scratch *scratch) {
-    int d = system->d, r = system->r;
-    Complex *B = take_complex(scratch, r + 1, d);
-    double *c = take(scratch, (size_t)r + 1);
+    int d = system->d, r = system->r, held = rows_of(hold);
+    Complex *B = take_complex(scratch, r + held + 1, d);
+    double *c = take(scratch, (size_t)(r + held) + 1);
     Balance balance = {system, rows_beside_loops(system, r + held, B, c, scratch),
                        take_complex(scratch, 1, d), fraction};
-    stack_holding(system, fraction * displacement, B, c);
+    stack_hold(system, hold, fraction, B, c);
     field_row(d, system->S, scaled(fraction, system->gravity), balance.w);
     spread(system, 1, balance.w, balance.w);
     return balance;
 }
 
 /* Find the equilibrium at a fraction of the load, from a state that is overwritten. */
-static bool loaded(const System *system, bool held, double displacement, double fraction,
-                   double *state, Scratch scratch) {
-    Balance balance = balance_at(system, held, displacement, fraction, &scratch);
-    place_bodies(system, fraction * displacement, state);
+static bool loaded(const System *system, const Hold *hold, double fraction, double *state,
+                   Scratch scratch) {
+    Balance balance = balance_at(system, hold, fraction, &scratch);
+    place_held(system, hold, fraction, state);
     return balance_out(&balance, state, scratch);
 }
 
 /* Return the sign of the determinant at an equilibrium at a fraction of the load; 0 if singular. */
-static int sign_at(const System *system, bool held, double displacement, double fraction,
-                   const double *state, Scratch scratch) {
-    Balance balance = balance_at(system, held, displacement, fraction, &scratch);
+static int sign_at(const System *system, const Hold *hold, double fraction, const double *state,
+                   Scratch scratch) {
+    Balance balance = balance_at(system, hold, fraction, &scratch);
     int n = system->n, r = balance.rows.count, size = n + r;
     Complex *e = take_complex(&scratch, 1, system->d);
     double *K_t = take_matrix(&scratch, n, n), *kkt = take_matrix(&scratch, size, size);
@@ -374,17 +450,35 @@ static bool unreachable(const System *system, bool held, double displacement, do
                 hint);
 }
 
-/* Return whether a shape is held at an amount, and not half a turn or more away.  The sine that
- * holds a rotation vanishes there, too. */
-static bool holds(const System *system, bool held, double amount, const double *state) {
+static bool unreachable_start(const Hold *hold, double done, Problem *problem) {
+    const StartValue *x = hold->values;
+    return fail(problem,
+                "%s.%s = %g %s cannot be reached%s: no equilibrium was found beyond %.3g %% of the way "
+                "from the drawn shape; start closer to it, or give the positions of further bodies",
+                x->body->name, start_name(x), x->value, start_unit(x),
+                hold->count > 1 ? " together with the other positions" : "", 100.0 * done);
+}
+
+/* Return whether a shape is held at a share of the amounts, and not half a turn or more away.  The sine
+ * that holds a rotation vanishes there, too. */
+static bool holds(const System *system, const Hold *hold, double share, const double *state) {
+    bool near = true;
     int j = system->released.j;
-    return !held || !turns(system) ||
-           fabs(state[j] - system->q0[j] - amount) < STATICS_TURN_MAX;
+    if (hold->held && turns(system)) {
+        near = fabs(state[j] - system->q0[j] - share * hold->amount) < STATICS_TURN_MAX;
+    }
+    for (int k = 0; k < hold->count; k++) {
+        const StartValue *x = &hold->values[k];
+        double turned = state[x->frame->j] - system->q0[x->frame->j];
+        bool held = x->held && rotates(x);
+        near = near && (!held || fabs(turned - share * x->value) < STATICS_TURN_MAX);
+    }
+    return near;
 }
 
 /* Set the state (q, lam, force) of the straight, unloaded shape. */
-static void straighten(const System *system, bool held, double *state) {
-    zeros(system->n + system->r + held, state);
+static void straighten(const System *system, const Hold *hold, double *state) {
+    zeros(system->n + system->r + rows_of(hold), state);
     copy(system->n, system->q0, state);
 }
 
@@ -393,15 +487,15 @@ static void straighten(const System *system, bool held, double *state) {
  * the next one, which does not grow after a rejected step.  A long step may jump to an unstable branch
  * beside the path.  Closely, the steps turn little, and only the smallest of them may change the sign
  * of the determinant.  Returns the share of the load that is reached, with its state. */
-static double load_slowly(const System *system, bool held, double displacement, bool closely,
-                          double *state, Scratch scratch) {
-    int size = system->n + system->r + held;
+static double load_slowly(const System *system, const Hold *hold, bool closely, double *state,
+                          Scratch scratch) {
+    int size = system->n + system->r + rows_of(hold);
     double part = closely ? STATICS_CLOSE_SHARE : 1.0;
     double *trial = take(&scratch, (size_t)size), done = 0.0, step = 1.0;
     double growth = STATICS_GROWTH_MAX;
     bool going = true;
-    straighten(system, held, state);
-    int sign = closely ? sign_at(system, held, displacement, 0.0, state, scratch) : 0;
+    straighten(system, hold, state);
+    int sign = closely ? sign_at(system, hold, 0.0, state, scratch) : 0;
     while (done < 1.0 && going) {
         double target = lesser(1.0, done + step), turn = HUGE_VAL, ratio = STATICS_SHRINK;
         int crossed = 0;
@@ -409,9 +503,8 @@ static double load_slowly(const System *system, bool held, double displacement, 
         step = lesser(step, 1.0 - done);
         bool smallest = step <= STATICS_LOAD_STEP_MIN;
         copy(size, state, trial);
-        if (loaded(system, held, displacement, target, trial, scratch) &&
-            holds(system, held, target * displacement, trial)) {
-            crossed = closely ? sign_at(system, held, displacement, target, trial, scratch) : 0;
+        if (loaded(system, hold, target, trial, scratch) && holds(system, hold, target, trial)) {
+            crossed = closely ? sign_at(system, hold, target, trial, scratch) : 0;
             if (smallest || sign * crossed >= 0) {
                 turn = jump(system, state, trial);
                 ratio = part * STATICS_TURN_AIM / greater(turn, STATICS_TURN_MIN);
@@ -435,19 +528,20 @@ static double load_slowly(const System *system, bool held, double displacement, 
 
 /* Load the mechanism slowly.  If a direction has become unstable, the search may have jumped, and the
  * path is followed closely; if that does not reach the load, the mechanism snaps. */
-static bool load_fully(const System *system, bool held, double displacement, double *state,
-                       Scratch scratch, Problem *problem) {
-    double done = load_slowly(system, held, displacement, false, state, scratch);
+static bool load_fully(const System *system, const Hold *hold, double *state, Scratch scratch,
+                       Problem *problem) {
+    double done = load_slowly(system, hold, false, state, scratch);
     if (!(done >= 1.0)) {
-        return unreachable(system, held, displacement, done, problem);
+        return hold->count > 0 ? unreachable_start(hold, done, problem)
+                               : unreachable(system, hold->held, hold->amount, done, problem);
     }
-    int size = system->n + system->r + held;
+    int size = system->n + system->r + rows_of(hold);
     double *close = take(&scratch, (size_t)size);
-    straighten(system, held, close);
-    int before = sign_at(system, held, displacement, 0.0, close, scratch);
-    int after = sign_at(system, held, displacement, 1.0, state, scratch);
+    straighten(system, hold, close);
+    int before = sign_at(system, hold, 0.0, close, scratch);
+    int after = sign_at(system, hold, 1.0, state, scratch);
     if (before * after < 0 &&
-        load_slowly(system, held, displacement, true, close, scratch) >= 1.0) {
+        load_slowly(system, hold, true, close, scratch) >= 1.0) {
         copy(size, close, state);
     }
     return true;
@@ -467,14 +561,25 @@ PRBM bool equilibrium(const System *system, bool held, double displacement, Equi
     double *state = take(&scratch, (size_t)n + (size_t)r + 1);
     bool straight = !heavy(system) && !element_strained(system) && !(held && displacement != 0.0) &&
                     drawn_closed(system, scratch);
-    held = held && !released_free(system);
-    straighten(system, true, state);
-    bool found = straight || ((!held || displaceable(system, displacement, scratch, problem)) &&
-                              load_fully(system, held, displacement, state, scratch, problem));
+    Hold hold = {held && !released_free(system), held ? displacement : 0.0, 0, NULL};
+    zeros(n + r + 1, state);
+    copy(n, system->q0, state);
+    bool found = straight ||
+                 ((!hold.held || displaceable(system, displacement, scratch, problem)) &&
+                  load_fully(system, &hold, state, scratch, problem));
     copy(n, state, shape->q);
     copy(r, state + n, shape->lam);
     /* The constraint of an angle is the rotation times the size. */
     shape->force = turns(system) ? system->length * state[n + r] : state[n + r];
+    return found;
+}
+
+PRBM bool held_slowly(const System *system, const StartValue *values, int count, double *q,
+                      Scratch scratch, Problem *problem) {
+    Hold hold = {false, 0.0, count, values};
+    double *state = take(&scratch, (size_t)(system->n + system->r + rows_of(&hold)));
+    bool found = load_fully(system, &hold, state, scratch, problem);
+    copy(system->n, state, q);
     return found;
 }
 
@@ -489,31 +594,4 @@ PRBM bool resting(const System *system, Equilibrium *shape, bool *balanced, Scra
     System placed = with_bodies_placed(system);
     zeros(system->r, shape->lam); /* That of the placed system may have fewer rows. */
     return equilibrium(&placed, false, 0.0, shape, scratch, problem);
-}
-
-PRBM bool release_velocity(const System *system, const double *q, double speed, double *v,
-                           Scratch scratch, Problem *problem) {
-    int n = system->n, r = system->r + 1;
-    zeros(n, v);
-    if (speed == 0.0) {
-        return true;
-    }
-    Complex *e = take_complex(&scratch, 1, system->d), *B = take_complex(&scratch, r, system->d);
-    double *M = take_matrix(&scratch, n, n);
-    double *rows = take_matrix(&scratch, r, n), *rates = take(&scratch, (size_t)r);
-    directions(system, q, e);
-    mass_matrix(system, e, M, scratch);
-    stack_release(system, B, rates);
-    Rows held = rows_beside_loops(system, r, B, NULL, &scratch);
-    jacobian(&held, e, rows);
-    zeros(r, rates);
-    rates[r - 1] = -speed;
-    Problem singular; /* The loops do not allow the released body to move. */
-    bool found = project_velocities(n, r, M, rows, rates, v, NULL, system->length, scratch,
-                                    &singular);
-    return found || fail(problem,
-                         "release.velocity = %g m/s: the body %s cannot move along the direction "
-                         "of the release; choose another direction or body, or let flexures "
-                         "stretch (axial = true)",
-                         speed, system->mechanism->bodies[system->mechanism->release.body - 1].name);
 }

@@ -9,6 +9,24 @@ typedef struct {
     double force; /* N, or N m if the release is by an angle */
 } Equilibrium;
 
+/* A position or a velocity of a body at the start, in SI units. */
+typedef struct {
+    const Body *body;
+    const BodyFrame *frame;
+    int field; /* GIVEN_... */
+    double value;
+    bool held; /* Whether a row holds it; otherwise the body is placed, or it follows from others. */
+} StartValue;
+
+/* What holds a mechanism at rest: a force on the released body at a displacement or an angle, or a
+ * force for each of some positions at the start, or nothing. */
+typedef struct {
+    bool held;
+    double amount;
+    int count;
+    const StartValue *values; /* (count,) */
+} Hold;
+
 /* Set B (r + 1, n) and c (r + 1,): the loops, then the displacement of the released point. */
 PRBM void stack_release(const System *system, Complex *B, double *c);
 /* Stack the loops and a last row that holds the released body at a displacement [m], or at an angle
@@ -35,7 +53,15 @@ PRBM bool equilibrium(const System *system, bool held, double displacement, Equi
  * connect to the ground are as drawn, and balanced is false. */
 PRBM bool resting(const System *system, Equilibrium *shape, bool *balanced, Scratch scratch,
                   Problem *problem);
-PRBM bool release_velocity(const System *system, const double *q, double speed, double *v,
-                           Scratch scratch, Problem *problem);
+/* Return the name of the field, its unit, and whether it is a rotation or an angular velocity. */
+PRBM const char *start_name(const StartValue *x);
+PRBM const char *start_unit(const StartValue *x);
+PRBM bool rotates(const StartValue *x);
+/* Set a row B (d,) that holds a body at a share of a position, and return its constant.  That of a
+ * rotation is the sine of the remaining angle times the size. */
+PRBM double start_row(const System *system, const StartValue *x, double share, Complex *B);
+/* Compute the shape q (n,) under gravity with bodies at positions (count,) at the start. */
+PRBM bool held_slowly(const System *system, const StartValue *values, int count, double *q,
+                      Scratch scratch, Problem *problem);
 
 #endif

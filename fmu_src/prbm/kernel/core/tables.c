@@ -70,8 +70,15 @@ static void read_bodies(Reader *reader, Mechanism *m) {
     Body *bodies = kept(reader, (size_t)m->body_count, sizeof *bodies);
     for (int i = 0; i < m->body_count && !reader->wrong; i++) {
         bodies[i].name = read_text(reader);
+        bodies[i].given = (uint32_t)read_index(reader, 0, 1 << GIVEN_COUNT);
         bodies[i].mass = read_expression(reader, m);
         bodies[i].inertia = read_expression(reader, m);
+        for (int k = 0; k < GIVEN_COUNT; k++) {
+            if (bodies[i].given >> k & 1u) {
+                bodies[i].at_start[k] = read_expression(reader, m);
+                m->given_count++;
+            }
+        }
         bodies[i].centre = read_point(reader, m);
     }
     m->bodies = bodies;

@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "core/gaps.h"
+#include "core/positions.h"
 #include "core/start.h"
 #include "hybrid/access.h"
 #include "hybrid/compliant.h"
@@ -65,18 +66,17 @@ PRBM double simulation_requested(const Simulation *simulation, double tolerance)
 }
 
 static bool start_state(Simulation *sim, Problem *problem) {
-    const Mechanism *m = sim->configuration.mechanism;
     const System *system = system_of(sim);
     Scratch scratch = sim->scratch;
     size_t n = (size_t)system->n;
     double *front = sim->state.front;
     double *q = take(&scratch, n);
-    double speed = evaluate(m->release.velocity, sim->state.acting_values);
-    bool ok = start_shape(system, sim->state.acting_values, q, scratch, problem);
+    const double *values = sim->state.acting_values;
+    bool ok = start_shape(system, values, q, scratch, problem);
     if (ok) {
         zeros(state_size(sim), front);
         copy((int)n, q, front);
-        ok = release_velocity(system, q, speed, front + n, scratch, problem);
+        ok = start_velocity(system, q, values, front + n, scratch, problem);
     }
     return ok;
 }

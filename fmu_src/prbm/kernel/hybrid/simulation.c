@@ -58,6 +58,7 @@ static void place_state(State *state, const Mechanism *m, Memory *memory) {
 static void place_scratch(ScratchBlock *block, const Mechanism *m, Memory *memory) {
     size_t d = (size_t)m->direction_count, s = (size_t)m->stop_count; /* d is at least n. */
     size_t size = d + (size_t)m->loop_count + 2 * s + (size_t)m->rubbing_count + 2;
+    size += (size_t)m->given_count; /* Rows that hold bodies at the start. */
     size_t drawn = (size_t)m->ground_count + (size_t)m->body_count, pieces = (size_t)m->longest;
     for (int i = 0; i < m->type_count; i++) {
         size_t pivots = (size_t)m->types[i].pivots;

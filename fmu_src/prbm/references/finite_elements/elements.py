@@ -10,9 +10,10 @@ import numpy as np
 from ...base.errors import ParameterError
 from ...mechanics.arrays import Complex, Real
 from ...mechanics.modal import Modes
+from ...mechanics.positions import given_at_start
 from ...mechanics.system import unit
 from ...mechanism.description import Mechanism
-from ...mechanism.parts import value
+from ...mechanism.parts import POSITIONS, VELOCITIES, value
 from ...runs.result import Result
 from . import statics
 from .equations import Equations
@@ -233,6 +234,11 @@ class FiniteElements:
             raise FiniteElementError(
                 "finite elements are released from a held shape: give release.displacement, and "
                 "no release.mode"
+            )
+        given = given_at_start(self.mechanism, self.values, (*POSITIONS, *VELOCITIES))
+        if given:
+            raise FiniteElementError(
+                f"finite elements start from the release: remove {given[0].text}"
             )
         held = value(self.mechanism.release, "displacement", self.values)
         speed = value(self.mechanism.release, "velocity", self.values)
