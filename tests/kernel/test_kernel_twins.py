@@ -19,8 +19,8 @@ import pytest
 
 import prbm.interface.tables
 import sizes
-from free_bodies import flying
-from guides import beaded
+from free_bodies import double_pendulum, flying, with_start
+from guides import beaded, incline, slider_crank
 from kernel_library import (
     KERNEL,
     KernelError,
@@ -64,7 +64,7 @@ from prbm.mechanism import flexure
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.expressions import Affine
 from prbm.mechanism.parameters import Parameter
-from prbm.mechanism.parts import FlexureType
+from prbm.mechanism.parts import POSITIONS, FlexureType, Release
 from springs import oscillator, web
 from support import ROOT, SHIPPED, SUPPORT, mechanism
 
@@ -1268,6 +1268,70 @@ def test_unstable_directions_are_the_same(name):
         q = np.full(system.n, np.nan)
         kernel().start_shape(ours.structure, ours.values, q)
         assert_same(q, starts.start_shape(system, system.values), 1e-9)
+
+
+def at_start():
+    """Yield mechanisms with positions and velocities of bodies at the start."""
+    crank = {"start_angle": 0.3, "start_omega": -4.0}
+    yield with_start(slider_crank(velocity=0.0), "crank", **crank)
+    yield with_start(incline(20.0, turning=True), "block", start_x=0.05, start_omega=1.0)
+    rods = {"start_angle": -0.7, "start_vx": 0.3}, {"start_x": -0.2, "start_omega": 2.0}
+    yield double_pendulum(*rods)
+    guide = mechanism("PRBDM2R")
+    body = guide.release.body
+    given = {"start_x": -3e-3, "start_vy": 1e-3}
+    yield with_start(replace(guide, release=Release(body)), body, **given)
+
+
+@twin(
+    positioned=positions.positioned, start_velocity=positions.start_velocity,
+    start_speed=positions.start_speed,
+)  # fmt: skip
+def test_positions_and_velocities_at_the_start_are_the_same():
+    for model in at_start():
+        system = assembly.assemble(model, model.values())
+        ours = KernelSystem(model, system.n - len(system.loops))
+        ours.assemble(model.values())
+        given = positions.given_at_start(model, system.values, POSITIONS)
+        expected = positions.positioned(system, given)
+        q, v = np.full((2, system.n), np.nan)
+        kernel().positioned(ours.structure, ours.values, q)
+        assert_same(q, expected, 1e-9, scale=1.0)
+        kernel().start_velocity(ours.structure, expected, ours.values, v)
+        assert_same(v, positions.start_velocity(system, expected, system.values), 1e-9)
+        assert_same(kernel().start_speed(ours.structure), positions.start_speed(system))
+        ours.close()
+
+
+@pytest.mark.parametrize(
+    ("model", "name", "start"),
+    [
+        (slider_crank(velocity=0.0), "slider", {"start_x": 1.0}),
+        (slider_crank(velocity=0.0), "slider", {"start_x": -0.03, "start_y": 1e-3}),
+        (slider_crank(velocity=2.0), "slider", {"start_vx": 1.0}),
+        (slider_crank(velocity=0.0), "slider", {"start_vx": 1.0, "start_vy": 2.0}),
+        (incline(20.0, displacement=0.01), "block", {"start_x": 0.05}),
+        (incline(20.0), "block", {"start_x": 0.05, "start_y": 0.3, "start_angle": 0.1}),
+    ],
+)
+def test_messages_about_values_at_the_start_are_the_same(model, name, start):
+    model = with_start(model, name, **start)
+    system = assembly.assemble(model, model.values())
+    ours = KernelSystem(model, system.n - len(system.loops))
+    ours.assemble(model.values())
+    q, v = system.q0.copy(), np.zeros(system.n)
+
+    def theirs():
+        shape = starts.start_shape(system, system.values)
+        positions.start_velocity(system, shape, system.values)
+
+    def own():
+        kernel().start_shape(ours.structure, ours.values, q)
+        kernel().start_velocity(ours.structure, q, ours.values, v)
+
+    errors = (ParameterError, EquilibriumError)
+    assert message_of(KernelError, own) == message_of(errors, theirs)
+    ours.close()
 
 
 @twin(fundamental_frequency=modal.fundamental_frequency)

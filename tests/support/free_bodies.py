@@ -1,4 +1,6 @@
-"""Mechanisms with bodies that nothing connects to the ground."""
+"""Mechanisms with bodies that nothing connects to the ground, and pendulums."""
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -98,4 +100,23 @@ def flying(gravity=(0.3, -2.0)):
         release=Release("ball", -80.0, velocity=0.3),
         gravity=gravity,
         damping_beta=1e-5,
+    )  # fmt: skip
+
+
+def with_start(model, name, **start):
+    """Return a mechanism whose body of a name has positions and velocities at the start."""
+    bodies = [replace(body, **start) if body.name == name else body for body in model.bodies]
+    return replace(model, bodies=tuple(bodies))
+
+
+def double_pendulum(first=None, second=None, gravity=(0.0, -9.81)):
+    """Return two equal rods on pins, with start values of each."""
+    rods = [
+        Body(name, 0.4, 3e-3, (0.0, -y), {"top": (0.0, 0.1 - y), "end": (0.0, -0.1 - y)}, **start)
+        for name, y, start in (("upper", 0.1, first or {}), ("lower", 0.3, second or {}))
+    ]
+    return ball(
+        gravity=gravity, stops=(), bodies=tuple(rods), ground={"pin": (0.0, 0.0)},
+        joints=(Joint("hip", "ground.pin", "upper.top"), Joint("knee", "upper.end", "lower.top")),
+        release=Release("upper"),
     )  # fmt: skip

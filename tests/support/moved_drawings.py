@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from prbm.mechanism.description import Mechanism
+from prbm.mechanism.parts import POSITIONS, VELOCITIES
 
 
 def moved(given: Mechanism, place, *, turn: float = 0.0, sign: float = 1.0) -> Mechanism:
@@ -19,6 +20,16 @@ def moved(given: Mechanism, place, *, turn: float = 0.0, sign: float = 1.0) -> M
             part, point=point(part.point), direction=sign * part.direction + turn, **changes
         )
 
+    def started(body):
+        changes = {}
+        for angle, *axes in (POSITIONS, VELOCITIES):
+            rotation, vector = getattr(body, angle), [getattr(body, name) for name in axes]
+            changes[angle] = None if rotation is None else sign * rotation
+            if vector != [None, None]:
+                new = place(complex(*vector)) - place(0j)
+                changes |= dict(zip(axes, (new.real, new.imag), strict=True))
+        return changes
+
     along = place(complex(*given.gravity)) - place(0j)
     return replace(
         given,
@@ -27,6 +38,7 @@ def moved(given: Mechanism, place, *, turn: float = 0.0, sign: float = 1.0) -> M
             replace(
                 body,
                 centre=point(body.centre),
+                **started(body),
                 points={name: point(z) for name, z in body.points.items()},
             )
             for body in given.bodies

@@ -47,6 +47,7 @@
 #include "core/complementarity.h"
 #include "core/contact.h"
 #include "core/statics.h"
+#include "core/positions.h"
 #include "core/modal.h"
 #include "core/start.h"
 

@@ -193,6 +193,7 @@ def _check_reached(
     worst = int(np.argmax(missing))
     if missing[worst] > START_RTOL * scale:
         one, found = given[worst], reached[worst]
+        found = 0.0 if abs(found) < START_DEPENDENT_RTOL * sizes[worst] * scale else found
         raise ParameterError(
             f"{one.text} deviates by {one.value - found:.6g} {one.unit} from {found:.9g} "
             f"{one.unit}, which the constraints and the other values at the start allow; change "

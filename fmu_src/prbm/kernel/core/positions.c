@@ -73,12 +73,14 @@ static bool reached_all(const System *system, const Starts *given, const double 
         most = greater(most, missing);
     }
     const StartValue *x = &given->values[worst];
+    double round_off = START_DEPENDENT_RTOL * (rotates(x) ? 1.0 : system->length) * scale;
+    double found = fabs(reached[worst]) < round_off ? 0.0 : reached[worst];
     return most <= START_RTOL * scale ||
            fail(problem,
                 "%s.%s = %g %s deviates by %.6g %s from %.9g %s, which the constraints and the other "
                 "values at the start allow; change it to that, or leave it out",
-                x->body->name, start_name(x), x->value, start_unit(x), x->value - reached[worst],
-                start_unit(x), reached[worst], start_unit(x));
+                x->body->name, start_name(x), x->value, start_unit(x), x->value - found,
+                start_unit(x), found, start_unit(x));
 }
 
 /* Set row (n,) to the derivatives of a rotation or a displacement by the coordinates. */
@@ -194,7 +196,7 @@ PRBM bool positioned(const System *system, const double *values, double *q, Scra
     const char *unit_name = release->start == START_ANGLE ? "rad" : "m";
     bool found = alone(names[release->start], unit_name, evaluate(release->amount, values),
                        given.values, problem) &&
-                 held_slowly(&placed, given.values, given.count, q, scratch, problem);
+                 held_at_start(&placed, given.values, given.count, q, scratch, problem);
     if (found) {
         for (int k = 0; k < given.count; k++) {
             given.values[k].held = true;

@@ -574,7 +574,7 @@ PRBM bool equilibrium(const System *system, bool held, double displacement, Equi
     return found;
 }
 
-PRBM bool held_slowly(const System *system, const StartValue *values, int count, double *q,
+PRBM bool held_at_start(const System *system, const StartValue *values, int count, double *q,
                       Scratch scratch, Problem *problem) {
     Hold hold = {false, 0.0, count, values};
     double *state = take(&scratch, (size_t)(system->n + system->r + rows_of(&hold)));

@@ -61,7 +61,7 @@ PRBM bool rotates(const StartValue *x);
  * rotation is the sine of the remaining angle times the size. */
 PRBM double start_row(const System *system, const StartValue *x, double share, Complex *B);
 /* Compute the shape q (n,) under gravity with bodies at positions (count,) at the start. */
-PRBM bool held_slowly(const System *system, const StartValue *values, int count, double *q,
+PRBM bool held_at_start(const System *system, const StartValue *values, int count, double *q,
                       Scratch scratch, Problem *problem);
 
 #endif
