@@ -22,7 +22,13 @@ PAIRS = ROOT / "tests" / "kernel" / "test_kernel_twins.py"
 
 MORE = {
     "mechanics/direction_map": ("core/system",),
-    "mechanics/dynamics": ("core/equations", "core/evaluation", "core/friction", "core/gaps", "core/projection"),
+    "mechanics/dynamics": (
+        "core/equations",
+        "core/evaluation",
+        "core/friction",
+        "core/gaps",
+        "core/projection",
+    ),
     "mechanics/stress": ("core/sections",),
     "hybrid/runge_kutta": ("core/runge_kutta",),
 }

@@ -1436,9 +1436,7 @@ class KernelEquations:
         given = [(f.real, f.imag, m) for f, m in zip(inputs.forces, inputs.moments, strict=True)]
         walls = [astuple(wall) for wall in inputs.walls]
         self.arrays = [np.array(part, float) for part in (given, walls, inputs.mobilities)]
-        self.modes, self.sides = (
-            np.array(x, np.int32) for x in (contacts.modes, contacts.sides)
-        )
+        self.modes, self.sides = (np.array(x, np.int32) for x in (contacts.modes, contacts.sides))
         base = structures()["Complex"](inputs.base.real, inputs.base.imag)
         self.inputs = structures()["Inputs"](
             self.arrays[0].ctypes.data, base, *(part.ctypes.data for part in self.arrays[1:])

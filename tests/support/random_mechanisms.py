@@ -236,9 +236,7 @@ def _torsion(b: _Builder, joint: Joint) -> Joint:
     return replace(joint, stiffness=stiffness, free_angle=free, damping=damping)
 
 
-def _guide(
-    b: _Builder, i: int, names: list[str], frictions: Sequence[float | None]
-) -> Guide:
+def _guide(b: _Builder, i: int, names: list[str], frictions: Sequence[float | None]) -> Guide:
     """Return a guide of a point of a body, on a line of the ground or of another body."""
     body = b.choose(names)
     other = b.choose([GROUND, *(name for name in names if name != body)])
