@@ -119,12 +119,10 @@ def test_values_that_contradict_the_constraints_are_rejected_with_the_deviation(
 
 
 @engines
-def test_a_position_out_of_reach_is_rejected_with_the_share_that_is_reached(engine):
+def test_a_position_out_of_reach_is_rejected_with_what_is_reached(engine):
     """The slider moves to x = 0.4 m at most, which is 0.117 m from its drawn place."""
     model = with_start(slider_crank(velocity=0.0), "slider", start_x=0.2)
-    with pytest.raises(
-        EquilibriumError, match=r"slider.start_x = 0.2 m cannot be reached: no .* %"
-    ):
+    with pytest.raises(EquilibriumError, match=r"slider\.start_x = 0\.2 m cannot be .* 0\.117. m"):
         started(model, {}, engine=engine)
 
 

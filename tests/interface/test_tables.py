@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import pytest
 
+from free_bodies import double_pendulum
 from kernel_library import KernelError, kernel
 from many_parts import anvil, elastic, profiles
 from prbm.base.errors import MechanismError
@@ -19,7 +20,16 @@ from prbm.mechanics.independent import independent
 from prbm.mechanics.inputs import input_names
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.expressions import affine
-from prbm.mechanism.parts import FIELDS, FlexureType, body_of, field_of, fields_of, value
+from prbm.mechanism.parts import (
+    FIELDS,
+    POSITIONS,
+    VELOCITIES,
+    FlexureType,
+    body_of,
+    field_of,
+    fields_of,
+    value,
+)
 from support import SHIPPED
 
 REQUIRED = ("thickness", "width", "youngs_modulus", "density")
@@ -118,10 +128,16 @@ class Reader:
         return lambda values: (x(values), y(values))
 
 
-@pytest.fixture(scope="module", params=[*SHIPPED, "Lever", "Elastic", "Profiles"])
+OWN = {
+    "Elastic": elastic, "Profiles": profiles,
+    "Starts": lambda: double_pendulum({"start_angle": 0.2, "start_vy": 0.1}, {"start_x": 0.01}),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module", params=[*SHIPPED, "Lever", *OWN])
 def mechanism(request, tmp_path_factory) -> Mechanism:
-    if request.param in ("Elastic", "Profiles"):
-        return elastic() if request.param == "Elastic" else profiles()
+    if request.param in OWN:
+        return OWN[request.param]()
     if request.param == "Lever":
         path = tmp_path_factory.mktemp("lever") / "lever.toml"
         path.write_text(EXPRESSIONS, encoding="utf-8")
@@ -218,6 +234,10 @@ class Comparison:
     def body_data(self) -> None:
         for body in self.mechanism.bodies:
             assert self.reader.text() == body.name
+            given, names = self.reader.take("I"), (*POSITIONS, *VELOCITIES)
+            assert [bool(given >> i & 1) for i, _ in enumerate(names)] == [
+                getattr(body, name) is not None for name in names
+            ]
             self.fields(body)
             self.point(body.centre)
 

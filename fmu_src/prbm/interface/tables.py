@@ -276,8 +276,8 @@ class _Writer:
             yield _u32(*map(ENDS.index, flexure.ends))
         for joint in m.joints:
             yield _text(joint.name) + self._between(joint)
-            stated = (getattr(joint, name) is not None for name in FIELDS[Joint])
-            yield _u32(*stated) + self._fields(joint)
+            flags = (getattr(joint, name) is not None for name in FIELDS[Joint])
+            yield _u32(*flags) + self._fields(joint)
         for spring in m.springs:
             yield _text(spring.name) + self._between(spring)
             yield _u32(spring.free_length is not None) + self._fields(spring)

@@ -102,11 +102,12 @@ def positioned(system: System, given: Sequence[Given], fraction: float = 1.0) ->
 
     q, done = held_slowly(placed, positions)
     if done < 1.0:
+        first = given[0]
         others = " together with the other positions" if len(given) > 1 else ""
         raise EquilibriumError(
-            f"{given[0].text} cannot be reached{others}: no equilibrium was found beyond "
-            f"{100.0 * done:.3g} % of the way from the drawn shape; start closer to it, or give "
-            "the positions of further bodies"
+            f"{first.text} cannot be reached{others}: no equilibrium was found beyond "
+            f"{done * fraction * first.value + 0.0:.4g} {first.unit}, in proportion; start closer "
+            "to the drawn shape, or give the positions of further bodies"
         )
     e = system.directions(q)
     kept = [given[k] for k in _independent(system, e, [_gradient(system, x, e) for x in given])]
@@ -146,9 +147,9 @@ def start_velocity(system: System, q: Real, values: Mapping[str, float]) -> Real
         return release_velocity(system, q, value(system.mechanism.release, "velocity", values))
     _check_alone(system, "velocity", given)
     e = system.directions(q)
-    rows = np.array([_gradient(system, x, e) for x in given])
-    speeds = np.array([x.value for x in given])
-    kept = _independent(system, e, rows)
+    gradients = [_gradient(system, x, e) for x in given]
+    rows, speeds = np.array(gradients), np.array([x.value for x in given])
+    kept = _independent(system, e, gradients)
     held = np.vstack([system.loop_rows.jacobian(e), rows[kept]])
     rates = np.concatenate([np.zeros(len(system.loops)), -speeds[kept]])
     v = constraints.project_velocities(
@@ -225,7 +226,9 @@ def _gradient(system: System, one: Given, e: Complex) -> Real:
     """Return the derivatives of a rotation or a displacement by the coordinates, (n,)."""
     frame = _frame(system, one)
     if one.turns:
-        return np.eye(system.n)[frame.j]
+        row = np.zeros(system.n)
+        row[frame.j] = 1.0
+        return row
     return system.gradient(AXES[one.name[-1]].conjugate() * frame.A, e)
 
 
@@ -249,7 +252,8 @@ def _rows(system: System, given: Sequence[Given], share: float) -> Rows:
 
 def _places(system: System, given: Sequence[Given], share: float) -> Real:
     """Return the coordinates that are placed: as drawn, or at a share of given positions."""
-    q, placed = system.q0.copy(), system.placed.tolist()
+    q: Real = system.q0.copy()
+    placed = system.placed.tolist()
     for one in given:
         j, amount = _frame(system, one).j, share * one.value
         if j in placed:
@@ -258,7 +262,8 @@ def _places(system: System, given: Sequence[Given], share: float) -> Real:
                 q[j] += amount
             else:
                 q[placed[turn - 2 + "xy".index(one.name[-1])]] += amount / system.length
-    return q[placed]
+    result: Real = q[placed]
+    return result
 
 
 def _reached(system: System, one: Given, q: Real) -> float:

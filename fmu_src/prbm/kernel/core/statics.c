@@ -453,10 +453,11 @@ static bool unreachable(const System *system, bool held, double displacement, do
 static bool unreachable_start(const Hold *hold, double done, Problem *problem) {
     const StartValue *x = hold->values;
     return fail(problem,
-                "%s.%s = %g %s cannot be reached%s: no equilibrium was found beyond %.3g %% of the way "
-                "from the drawn shape; start closer to it, or give the positions of further bodies",
+                "%s.%s = %g %s cannot be reached%s: no equilibrium was found beyond %.4g %s, in "
+                "proportion; start closer to the drawn shape, or give the positions of further bodies",
                 x->body->name, start_name(x), x->value, start_unit(x),
-                hold->count > 1 ? " together with the other positions" : "", 100.0 * done);
+                hold->count > 1 ? " together with the other positions" : "", done * x->value + 0.0,
+                start_unit(x));
 }
 
 /* Return whether a shape is held at a share of the amounts, and not half a turn or more away.  The sine
