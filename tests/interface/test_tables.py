@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import pytest
 
-from free_bodies import double_pendulum
+from free_bodies import ball, with_start
 from kernel_library import KernelError, kernel
 from many_parts import anvil, elastic, profiles
 from prbm.base.errors import MechanismError
@@ -130,7 +130,7 @@ class Reader:
 
 OWN = {
     "Elastic": elastic, "Profiles": profiles,
-    "Starts": lambda: double_pendulum({"start_angle": 0.2, "start_vy": 0.1}, {"start_x": 0.01}),
+    "Starts": lambda: with_start(ball(), "ball", start_angle=0.2, start_y=0.1, start_vx=0.3),
 }  # fmt: skip
 
 
