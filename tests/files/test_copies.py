@@ -578,3 +578,120 @@ def test_coordinates_that_differ_are_not_the_same_point() -> None:
     assert same(("a/2", 0.1), ("0.5*a", 0.1 + 1e-14))
     for other in (("0.5*a", 0.1001), ("0.5*b", 0.1), ("a/2 + 0.001", 0.1), ("a/2", "0.1*a")):
         assert not same(("a/2", 0.1), other)
+
+
+TOUCHED = """
+[ground]
+left = ["-span", 0]
+right = ["span", 0]
+
+[[bodies]]
+name = "left_block"
+mass = "10 g"
+inertia = "5 kg.mm2"
+centre = ["-span", "30 mm"]
+points.left_edge = ["-span - 2 mm", "30 mm"]
+mirror = "x = 0"
+
+[[flexures]]
+name = "left_leaf"
+type = "leaf"
+start = "ground.left"
+end = "left_block.left_edge"
+mirror = "x = 0"
+
+[[stops]]
+name = "left_stop"
+body = "left_block"
+point = "left_block.left_edge"
+direction = 170
+position = "1 mm"
+offset = "0.2 mm"
+friction = 0.1
+mirror = "x = 0"
+
+[[stops]]
+name = "left_bump"
+body = "left_block"
+point = ["-span + 3 mm", "30 mm"]
+direction = 0
+position = "2 mm"
+on = "right_block"
+mirror = "x = 0"
+
+[[frictions]]
+name = "left_rub"
+body = "left_block"
+direction = 20
+coefficient = 0.2
+normal_force = "1 N"
+normal_stiffness = "30 N/m"
+mirror = "x = 0"
+
+[[forces]]
+name = "left_push"
+body = "left_block"
+point = "left_block.left_edge"
+mirror = "x = 0"
+
+[[probes]]
+name = "left_probe"
+point = "left_block.left_edge"
+mirror = "x = 0"
+"""
+
+
+def test_mirror_images_of_stops_friction_forces_and_probes(tmp_path: Path) -> None:
+    """Directions are reflected; offsets and displacements to the left change their signs."""
+    mechanism = read(tmp_path, TOUCHED, '[release]\nbody = "left_block"\ndisplacement = "1 mm"\n')
+    left, right, bump, other = mechanism.stops
+    assert (right.name, right.body, right.direction, right.on) == (
+        "right_stop", "right_block", 10.0, "ground",
+    )  # fmt: skip
+    known = mechanism.values()
+    places = [[affine(c)(known) for c in stop.point] for stop in (left, right)]
+    assert places[0] == [-places[1][0], places[1][1]]
+    assert (right.position, right.offset, right.friction) == (1e-3, -2e-4, 0.1)
+    assert right.rest_speed == pytest.approx(left.rest_speed)
+    assert right.rest_speed > 0.0
+    assert (bump.body, bump.on, other.body, other.on) == (
+        "left_block", "right_block", "right_block", "left_block",
+    )  # fmt: skip
+    assert other.direction == 180.0
+    left_rub, rub = mechanism.frictions
+    assert (rub.body, rub.direction, rub.normal_force) == ("right_block", 160.0, 1.0)
+    assert (rub.normal_stiffness, left_rub.normal_stiffness) == (-30.0, 30.0)
+    assert [force.name for force in mechanism.forces] == ["left_push", "right_push"]
+    assert mechanism.probes[1].point == "right_block.right_edge"
+
+
+def test_stops_on_a_circle_are_turned_with_it(tmp_path: Path) -> None:
+    more = """
+[[stops]]
+name = "pin"
+body = "stage"
+point = "stage.hub"
+direction = 90
+position = "1 mm"
+offset = "0.1 mm"
+repeat = { count = 3, angle = 120, about = [0, "10 mm"] }
+"""
+    wheel = read(tmp_path, CIRCLE + more, '[release]\nbody = "stage"\nangle = "1 deg"\n')
+    assert [stop.direction for stop in wheel.stops] == [90.0, -150.0, -30.0]
+    assert {stop.offset for stop in wheel.stops} == {1e-4}
+    known = wheel.values()
+    for k, stop in enumerate(wheel.stops):
+        place = complex(*(affine(c)(known) for c in stop.point)) - 0.01j
+        assert place == pytest.approx(0.01 * cmath.exp(2j * math.pi * k / 3), abs=1e-15)
+
+
+def test_a_copy_of_a_stop_at_its_place_is_rejected(tmp_path: Path) -> None:
+    again = (
+        TOUCHED.replace("direction = 170\n", "direction = 90\noffset = 0.0\n")
+        .replace('offset = "0.2 mm"\n', "")
+        .replace('point = "left_block.left_edge"\ndirection', 'point = [0, "30 mm"]\ndirection')
+    )
+    again = again.replace('name = "left_stop"\nbody = "left_block"', 'name = "stop"\nbody = "mid"')
+    again += '\n[[bodies]]\nname = "mid"\nmass = 1\ninertia = 1\ncentre = [0, "30 mm"]\n'
+    with pytest.raises(MechanismError, match="a copy of stop is at the same place"):
+        read(tmp_path, again, '[release]\nbody = "left_block"\ndisplacement = "1 mm"\n')

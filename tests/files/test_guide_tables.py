@@ -66,7 +66,8 @@ def test_guides_have_repeated_copies(tmp_path):
         (('"left_post.pin"', '"left_post.top"'), None),
         (('start = "ground.left"', 'start = "left_post.top"'), "points of two bodies"),
         (("turning = false", "turning = 0"), "turning"),
-        (("turning = false", "friction = 0.1"), "friction"),
+        (("turning = false", "friction = -0.1"), "friction"),
+        (("turning = false", 'friction = "0.1 N"'), "friction"),
         (('end = "ground.left_up"', 'end = "ground.left"'), "undefined: draw these points apart"),
         (
             ('left_up = ["-50 mm", "10 mm"]', 'left_up = ["-40 mm", "10 mm"]'),

@@ -6,7 +6,7 @@ from pydantic import Field, StrictBool
 
 from ..mechanism import parts
 from ..mechanism.expressions import Quantity
-from .tables import Named, RepeatTable
+from .tables import Named, RepeatTable, Table
 from .values import LineOrLines, Reference, measured
 
 COPYING = ("mirror", "repeat")  # Keys that are no fields of parts.
@@ -69,19 +69,21 @@ class GuideTable(Named):
     repeat: RepeatTable | None = repeat_key()
 
 
+def own_fields(table: Table) -> dict[str, Any]:
+    """Return the values of a table by key, without those that make copies."""
+    return {key: value for key, value in dict(table).items() if key not in COPYING}
+
+
 def joint_of(table: JointTable) -> parts.Joint:
     """Return the joint of a table."""
-    given = dict(table)
-    return parts.Joint(**{key: given[key] for key in given if key not in COPYING})
+    return parts.Joint(**own_fields(table))
 
 
 def spring_of(table: SpringTable) -> parts.Spring:
     """Return the spring of a table."""
-    given = dict(table)
-    return parts.Spring(**{key: given[key] for key in given if key not in COPYING})
+    return parts.Spring(**own_fields(table))
 
 
 def guide_of(table: GuideTable) -> parts.Guide:
     """Return the guide of a table."""
-    given = dict(table)
-    return parts.Guide(**{key: given[key] for key in given if key not in ("mirror", "repeat")})
+    return parts.Guide(**own_fields(table))

@@ -22,10 +22,14 @@ from ..mechanism.parts import (
     Body,
     Flexure,
     FlexureType,
+    Force,
+    Friction,
     Guide,
     Joint,
     Point,
+    Probe,
     Spring,
+    Stop,
 )
 from .images import SAME_ATOL, SAME_RTOL, Image, Line, displaced, rotated, same, written
 
@@ -37,7 +41,9 @@ SUBJECT_WORDS = 2  # The subject of a message is among its first words: flexure 
 _NAME = re.compile(r"[\w\[\]]+(?:\.[\w\[\]]+)*")
 
 Chain = tuple[Image, ...]
-Connection = TypeVar("Connection", Flexure, Joint, Spring, Guide)
+Connection = TypeVar("Connection", Flexure, Joint, Spring, Guide, Probe)
+Attached = TypeVar("Attached", Stop, Friction, Force)
+REVERSED = ("offset", "normal_stiffness")  # Fields whose sign a mirror image changes.
 
 
 class Repeat(Protocol):
@@ -179,7 +185,7 @@ class Drawing:
     def connections(
         self, tables: Sequence[Copied], parts: Sequence[Connection]
     ) -> Iterator[Connection]:
-        """Yield flexures, joints, springs or guides, each followed by its copies.
+        """Yield flexures, joints, springs, guides or probes, each followed by its copies.
 
         Raises
         ------
@@ -206,6 +212,39 @@ class Drawing:
                 if isinstance(part, Joint) and part.free_angle is not None and _mirrored(chain):
                     changed["free_angle"] = written(affine(part.free_angle).scaled(-1.0))
                 yield replace(part, **changed)
+
+    def attached(self, tables: Sequence[Copied], parts: Sequence[Attached]) -> Iterator[Attached]:
+        """Yield stops, friction points or forces, each followed by its copies.
+
+        Raises
+        ------
+        MechanismError
+            If a copy is at the place of its original.
+        """
+        for table, part in zip(tables, parts, strict=True):
+            for chain in _chains(table):
+                copy = reduce(self._attached_image, chain, part)
+                if chain and copy == replace(part, name=copy.name):
+                    raise MechanismError(
+                        f"{table.name}.{_key(chain)}: a copy of {table.name} is at the same place; "
+                        f"remove {_key(chain)}, or change the line or the displacement"
+                    )
+                yield copy
+
+    def _attached_image(self, part: Attached, image: Image) -> Attached:
+        """Return the image of a part at a point of a body."""
+        body = self._body_image(part.body, image) or part.body
+        changed: dict[str, Any] = {"name": image.name(part.name), "body": body}
+        if part.point is not None:
+            changed["point"] = image.point(part.point)
+        if isinstance(part, Stop):
+            changed["on"] = self._body_image(part.on, image) or part.on
+        if not isinstance(part, Force):
+            changed["direction"] = image.direction(part.direction)
+        for key in REVERSED:
+            if image.exchanged and hasattr(part, key):
+                changed[key] = written(affine(getattr(part, key)).scaled(-1.0))
+        return replace(part, **changed)
 
     def _image(self, reference: str, chain: Chain, user: str) -> str:
         """Return the reference to the image of a point; undefined ones are rejected later."""

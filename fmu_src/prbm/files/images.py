@@ -35,12 +35,27 @@ class Image:
         Suffix of the name of a copy.
     exchanged : mapping
         Words that the image exchanges in names; with one of them a name gets no suffix.
+    turn : float
+        Rotation of a copy that is no mirror image [deg].
     """
 
     columns: tuple[complex, complex]
     shift: tuple[Affine, Affine]
     suffix: str
     exchanged: Mapping[str, str] = field(default_factory=dict)
+    turn: float = 0.0
+
+    def direction(self, degrees: float) -> float:
+        """Return the image of a direction, counter-clockwise from +x, within half a turn [deg].
+
+        Examples
+        --------
+        >>> Line.read("x = 0").image.direction(30.0), rotated(2, 90.0, (0.0, 0.0)).direction(180.0)
+        (150.0, -90.0)
+        """
+        if not self.exchanged:
+            return math.remainder(degrees + self.turn, 360.0)
+        return math.remainder((180.0 if self.columns[0] == -1.0 else 0.0) - degrees, 360.0)
 
     def point(self, point: Point) -> Point:
         """Return the image of a point [m]."""
@@ -129,11 +144,12 @@ def rotated(k: int, angle: float, about: Point) -> Image:
     about : Point
         Centre of the circle [m].
     """
-    turn = unit(math.fmod((k - 1) * angle, 360.0))
+    degrees = math.fmod((k - 1) * angle, 360.0)
+    turn = unit(degrees)
     linear = Image((turn, 1j * turn), (Affine(), Affine()), f"_{k}")
     centre, image = (tuple(map(affine, point)) for point in (about, linear.point(about)))
     x, y = (a.plus(b.scaled(-1.0)) for a, b in zip(centre, image, strict=True))
-    return Image(linear.columns, (x, y), linear.suffix)
+    return Image(linear.columns, (x, y), linear.suffix, turn=degrees)
 
 
 def written(expression: Affine) -> Quantity:

@@ -15,15 +15,13 @@ from pydantic import (
     StrictBool,
     StrictInt,
     StrictStr,
-    ValidationInfo,
-    field_validator,
 )
 
 from ..base.errors import MechanismError, PrbmError
 from ..base.names import unknown
 from ..hybrid.rest_speed import with_rest_speeds
 from ..mechanism import parameters, parts
-from ..mechanism.description import RESERVED, Mechanism, undefined
+from ..mechanism.description import RESERVED, Mechanism
 from ..mechanism.expressions import Quantity
 from ..mechanism.flexure import (
     CLAMP,
@@ -36,7 +34,18 @@ from ..mechanism.flexure import (
     ORDER_MAX,
 )
 from ..mechanism.parameters import Tolerance
-from ..mechanism.parts import FIELDS, GROUND, LENGTH_MAX, LENGTH_MIN
+from ..mechanism.parts import FIELDS, LENGTH_MAX, LENGTH_MIN
+from .attachments import (
+    ForceTable,
+    FrictionTable,
+    ProbeTable,
+    ReleaseTable,
+    StopTable,
+    force_of,
+    friction_of,
+    release_of,
+    stop_of,
+)
 from .connections import (
     GuideTable,
     JointTable,
@@ -60,20 +69,17 @@ from .drawn import check_drawing
 from .outlines import CORNERS_MIN, mean, plate
 from .settings import has_unit, is_tolerance, tolerance
 from .tables import STRENGTHS, MaterialTable, Named, ParameterTable, RepeatTable, Table
-from .units import check_coherent, contact_stiffness
+from .units import check_coherent
 from .values import (
     NAME_LENGTH_MAX,
     Acceleration,
-    Angle,
     Corner,
     EndOrEnds,
-    Law,
     LineOrLines,
     Measured,
     Model,
     Point,
     PointName,
-    PointOrName,
     Profile,
     Reference,
     measured,
@@ -242,85 +248,6 @@ class BodyTable(Named):
     repeat: RepeatTable | None = repeat_key()
 
 
-class StopTable(Named):
-    """A contact of a point of a body with a wall, which is fixed to the ground or another body."""
-
-    body: StrictStr = Field(description="Body that hits the wall")
-    point: PointOrName = Field(description="Hit point, coordinates as drawn or body.point")
-    on: StrictStr = Field(GROUND, description="Body that carries the wall, or ground")
-    direction: Angle = parts.Stop.direction
-    position: Annotated[Quantity, measured(parts.Stop, "position")] = parts.Stop.position
-    offset: Annotated[Quantity, measured(parts.Stop, "offset")] = parts.Stop.offset
-    restitution: Annotated[Quantity, measured(parts.Stop, "restitution")] = parts.Stop.restitution
-    friction: Annotated[Quantity, measured(parts.Stop, "friction")] = parts.Stop.friction
-    rest_speed: Annotated[Quantity, measured(parts.Stop, "rest_speed")] | None = None
-    law: Law = Field(parts.RIGID, description="Law of impact")
-    exponent: Annotated[Quantity, measured(parts.Stop, "exponent")] | None = None
-    stiffness: Annotated[Quantity, measured(parts.Stop, "stiffness")] | None = None
-
-    @field_validator("stiffness", mode="before")
-    @classmethod
-    def _unit_of_stiffness(cls, written: object, info: ValidationInfo) -> object:
-        exponent = info.data.get("exponent")
-        exponent = 1.0 if exponent is None else exponent
-        invalid = isinstance(exponent, float) and exponent < 1.0  # Reported for the exponent.
-        if invalid or not isinstance(written, str):
-            return written
-        return contact_stiffness(written, exponent)
-
-
-class FrictionTable(Named):
-    """Coulomb friction against the motion of a body along a direction."""
-
-    body: StrictStr = Field(description="Body on which the friction acts")
-    point: PointOrName | None = Field(
-        None, description="Point, coordinates as drawn or body.point (default: centre of mass)"
-    )
-    direction: Angle = parts.Friction.direction
-    coefficient: Annotated[Quantity, measured(parts.Friction, "coefficient")] = (
-        parts.Friction.coefficient
-    )
-    normal_force: Annotated[Quantity, measured(parts.Friction, "normal_force")] = (
-        parts.Friction.normal_force
-    )
-    normal_stiffness: Annotated[Quantity, measured(parts.Friction, "normal_stiffness")] = (
-        parts.Friction.normal_stiffness
-    )
-
-
-class ForceTable(Named):
-    """Inputs name.x, name.y and name.moment: a force and a moment on a body."""
-
-    body: StrictStr = Field(description="Body on which the force acts")
-    point: PointOrName | None = Field(
-        None, description="Point, coordinates as drawn or body.point (default: centre of mass)"
-    )
-
-
-class ProbeTable(Named):
-    """A point whose displacement name.x, name.y and velocity name.vx, name.vy are outputs."""
-
-    point: Reference = Field(description="Point, body.point")
-
-
-class ReleaseTable(Table):
-    """Start of the motion: from a shape held at a displacement or angle, or along a mode."""
-
-    body: StrictStr = Field(description="Body that is held and released")
-    point: PointOrName | None = Field(
-        None,
-        description="Released point, coordinates as drawn or body.point (default: centre of mass)",
-    )
-    direction: Angle = parts.Release.direction
-    displacement: Annotated[Quantity, measured(parts.Release, "displacement")] | None = None
-    angle: Annotated[Quantity, measured(parts.Release, "angle")] | None = None
-    mode: Annotated[StrictInt, Field(ge=1, le=parts.MODE_MAX)] | None = Field(
-        None, description="Number of the mode, with amplitude"
-    )
-    amplitude: Annotated[Quantity, measured(parts.Release, "amplitude")] | None = None
-    velocity: Annotated[Quantity, measured(parts.Release, "velocity")] = parts.Release.velocity
-
-
 class MechanismTable(Table):
     """A planar compliant mechanism."""
 
@@ -398,6 +325,9 @@ def mechanism(file: MechanismTable, drawing: str = "") -> Mechanism:
         "joints": tuple(drawn.connections(file.joints, [*map(joint_of, file.joints)])),
         "springs": tuple(drawn.connections(file.springs, [*map(spring_of, file.springs)])),
         "guides": tuple(drawn.connections(file.guides, [*map(guide_of, file.guides)])),
+        "probes": tuple(
+            drawn.connections(file.probes, [parts.Probe(t.name, t.point) for t in file.probes])
+        ),
     }
     connected = mirrored_types(file.flexures, flexures, types)
     try:
@@ -409,7 +339,8 @@ def mechanism(file: MechanismTable, drawing: str = "") -> Mechanism:
     except PrbmError as error:
         made_by = origins(_with_copies(file)) | drawn.made_by
         raise type(error)(explained(str(error), made_by)) from None
-    return with_rest_speeds(result, {stop.name for stop in file.stops if stop.rest_speed is None})
+    unset = [stop for stop in file.stops if stop.rest_speed is None]
+    return with_rest_speeds(result, {*(stop.name for stop in unset), *origins(unset)})
 
 
 def _assembled(
@@ -429,11 +360,12 @@ def _assembled(
         flexures=connected[0],
         flexure_types=connected[1],
         **others,
-        stops=tuple(_stop(stop, points) for stop in file.stops),
-        frictions=tuple(parts.Friction(**_attached(part, points)) for part in file.frictions),
-        forces=tuple(parts.Force(**_attached(force, points)) for force in file.forces),
-        probes=tuple(parts.Probe(**dict(probe)) for probe in file.probes),
-        release=_release(file.release, points),
+        stops=tuple(drawn.attached(file.stops, [stop_of(t, points) for t in file.stops])),
+        frictions=tuple(
+            drawn.attached(file.frictions, [friction_of(t, points) for t in file.frictions])
+        ),
+        forces=tuple(drawn.attached(file.forces, [force_of(t, points) for t in file.forces])),
+        release=release_of(file.release, points),
         geometry=tuple(_parameters(file)),
         drawing=drawing,
         ground_parts=tuple(parts.GroundPart(t.outline, t.holes) for t in file.ground_parts),
@@ -516,7 +448,9 @@ def _check_names(file: MechanismTable) -> None:
 
 def _with_copies(file: MechanismTable) -> tuple[Copied, ...]:
     """Return the tables of parts that may have copies."""
-    return (*file.bodies, *file.flexures, *file.joints, *file.springs, *file.guides)
+    every: tuple[Copied, ...] = (*file.bodies, *file.flexures, *file.joints, *file.springs)
+    every = (*every, *file.guides, *file.probes)
+    return (*every, *file.stops, *file.frictions, *file.forces)
 
 
 def _referred(material: MaterialTable, key: str) -> Quantity:
@@ -651,38 +585,3 @@ def _flexure(table: FlexureTable) -> parts.Flexure:
     ends = (table.ends, table.ends) if isinstance(table.ends, str) else table.ends
     kind = table.name if table.type is None else table.type
     return parts.Flexure(table.name, kind, table.start, table.end, ends)
-
-
-def _release(table: ReleaseTable, bodies: Mapping[str, Mapping[str, parts.Point]]) -> parts.Release:
-    """Return the release of a table."""
-    return parts.Release(**_attached(table, bodies))
-
-
-def _stop(table: StopTable, bodies: Mapping[str, Mapping[str, parts.Point]]) -> parts.Stop:
-    """Return the stop of a table; :func:`mechanism` computes the rest speed if it has none."""
-    given = _attached(table, bodies)
-    if table.rest_speed is None:
-        del given["rest_speed"]
-    return parts.Stop(**given)
-
-
-def _attached(
-    table: StopTable | FrictionTable | ForceTable | ReleaseTable,
-    bodies: Mapping[str, Mapping[str, parts.Point]],
-) -> dict[str, Any]:
-    """Return the fields of a part; a point given by name is replaced by its coordinates."""
-    given = dict(table)
-    user = "release" if isinstance(table, ReleaseTable) else table.name
-    if table.body not in bodies:
-        raise MechanismError(undefined(f"{user}.body", table.body, bodies))
-    if isinstance(table.point, str):
-        body, _, name = table.point.rpartition(".")
-        points = bodies[table.body]
-        if body != table.body or name not in points:
-            listed = ", ".join(f"{table.body}.{p}" for p in points)
-            raise MechanismError(
-                f"{user}.point = {table.point!r} is not a point of the body {table.body}; "
-                + (f"its points are {listed}" if points else "define the points of this body")
-            )
-        given["point"] = points[name]
-    return given
