@@ -18,6 +18,7 @@ from prbm.mechanism.description import Mechanism
 from prbm.mechanism.expressions import affine
 from prbm.mechanism.parameters import Parameter
 from prbm.mechanism.parts import Body, Flexure, FlexureType, Force, Joint, Release, Stop
+from prbm.mechanism.supported import FREE_BODIES, SPRINGS, check_supported
 from springs import oscillator
 from support import mechanism
 
@@ -203,18 +204,18 @@ def test_bodies_that_nothing_connects_to_the_ground_are_free():
     assert changed(bodies=(BODY, loose)).free_bodies == ("loose",)
     assert changed().free_bodies == ()
     with pytest.raises(MechanismError, match=r"the closed form has no bodies .* connect loose to"):
-        changed(bodies=(BODY, loose)).check_connected("the closed form")
+        check_supported(changed(bodies=(BODY, loose)), "the closed form", FREE_BODIES)
 
 
 def test_a_computation_without_springs_names_them():
     with pytest.raises(MechanismError, match="finite elements has no springs: remove coil, or"):
-        oscillator().check_springless("a model of finite elements")
+        check_supported(oscillator(), "a model of finite elements", SPRINGS)
 
 
 def test_a_body_on_springs_to_the_ground_does_not_fly_freely():
     block = oscillator()
     assert (block.floating_bodies, block.free_bodies) == (("block",), ())
-    block.check_connected("a linear model")
+    check_supported(block, "a linear model", FREE_BODIES)
     assert dataclasses.replace(block, damping_zeta=0.1).damping_zeta == 0.1
 
 

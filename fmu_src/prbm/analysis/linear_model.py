@@ -21,6 +21,7 @@ from ..mechanics.resting import RestingShape, resting_shape
 from ..mechanics.statics import equilibrium, load_row
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
+from ..mechanism.supported import FREE_BODIES, check_supported
 from .touching import stop_index
 
 PEAK_RTOL = 1e-9  # Tolerance of the frequency of a peak.
@@ -306,7 +307,7 @@ def linearize(
     >>> model.A.shape, model.states[0]
     ((10, 10), 'mode[1].amplitude')
     """
-    mechanism.check_connected("a linear model")
+    check_supported(mechanism, "a linear model", FREE_BODIES)
     system = assemble(mechanism, mechanism.values(in_si(mechanism, values, "values")))
     given = in_si(mechanism, loads, "loads")
     free = equilibrium(system, None, given)

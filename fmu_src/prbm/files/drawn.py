@@ -4,8 +4,10 @@ import math
 from collections.abc import Iterator
 
 from ..base.errors import MechanismError
+from ..mechanics.assembly import assemble
 from ..mechanics.collection import Collection
 from ..mechanics.flexures import check_drawn
+from ..mechanics.independent import named_states
 from ..mechanism.description import Mechanism
 from ..mechanism.expressions import affine
 from ..mechanism.parts import GROUND, LENGTH_MAX, LENGTH_MIN, Point
@@ -36,6 +38,8 @@ def check_drawing(mechanism: Mechanism) -> None:
         drawn.check_apart(spring)
     for guide in mechanism.guides:
         drawn.line(guide)
+    if mechanism.states:
+        named_states(assemble(mechanism, values))
 
 
 def _places(mechanism: Mechanism) -> Iterator[tuple[str, Point]]:

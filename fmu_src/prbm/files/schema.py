@@ -256,6 +256,11 @@ class MechanismTable(Table):
     ] = Field(description="Name of the FMU, of letters a to z, digits and _")
     title: StrictStr = Field(description="Title of one line")
     description: StrictStr = Field("", description="Description of one paragraph")
+    states: tuple[StrictStr, ...] = Field(
+        (),
+        description="Coordinates that are states in model exchange, for example crank.angle, "
+        "before others",
+    )
     gravity: tuple[Acceleration, Acceleration] = Field(
         (0.0, 0.0), description="Acceleration of gravity along x and y [m/s2]"
     )
@@ -352,7 +357,7 @@ def _assembled(
 ) -> Mechanism:
     """Return the mechanism of a file, whose bodies and connections include the copies."""
     points = {body.name: body.points for body in drawn.bodies}
-    same = ("name", "title", "description", "gravity", "damping_zeta", "damping_beta")
+    same = ("name", "title", "description", "states", "gravity", "damping_zeta", "damping_beta")
     return Mechanism(
         **{key: getattr(file, key) for key in same},
         ground=drawn.ground,

@@ -7,13 +7,17 @@ therefore integrate the independent coordinates q_i and their rates v_i:
     Phi(q_i, q_d) = 0,      v_d = -(dPhi/dq_d)^-1 (dPhi/dq_i) v_i.
 
 The choice of q_i is valid as long as dPhi/dq_d is not close to singular.  It is made once, for
-shapes between the straight shape and the release.
+shapes between the straight shape and the release.  Coordinates that the mechanism names as its
+``states`` are chosen before others.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from ..base.errors import MechanismError
+from ..base.names import unknown
+from ..base.tolerances import DEPENDENT_PIVOT_RTOL
 from ..mechanism.description import Mechanism
 from .arrays import Real
 from .assembly import assemble
@@ -40,15 +44,43 @@ def independent(mechanism: Mechanism) -> tuple[int, ...]:
     ------
     EquilibriumError
         If the shape of the release cannot be reached.
+    MechanismError
+        If a state is no coordinate, or the loops determine the states from each other.
     """
     values = mechanism.values()
     system = assemble(mechanism, values)
+    states = named_states(system)
     if not len(system.loops):
         return tuple(range(system.n))
     rows = list(_jacobians(system, values))
-    choices = [_pivots(jacobian) for jacobian in rows]
+    free = [j for j in range(system.n) if j not in states]
+    choices = [_pivots(jacobian, free) for jacobian in rows]
     best = max(choices, key=lambda dependent: min(conditioning(J, dependent) for J in rows))
+    if states and not min(conditioning(J, best) for J in rows) > DEPENDENT_PIVOT_RTOL:
+        raise MechanismError(
+            f"states = {list(mechanism.states)}: the loops determine these coordinates from each "
+            f"other, at least in the drawn or the released shape; name fewer of the "
+            f"{system.n - len(system.loops)} independent coordinates, or others"
+        )
     return tuple(j for j in range(system.n) if j not in best)
+
+
+def named_states(system: System) -> list[int]:
+    """Return the coordinates that a mechanism names as its states.
+
+    Raises
+    ------
+    MechanismError
+        If a name is not that of a coordinate, or is given twice.
+    """
+    known = {name: j for j, (name, _) in enumerate(system.variables)}
+    given = system.mechanism.states
+    for name in given:
+        if name not in known:
+            raise MechanismError(f"states: {unknown(name, known)}")
+        if given.count(name) > 1:
+            raise MechanismError(f"states: {name} is named twice; remove one")
+    return [known[name] for name in given]
 
 
 def _jacobians(system: System, values: Mapping[str, float]) -> Iterator[Real]:
@@ -61,12 +93,12 @@ def _jacobians(system: System, values: Mapping[str, float]) -> Iterator[Real]:
         yield loops.jacobian(system.directions(q))
 
 
-def _pivots(jacobian: Real) -> tuple[int, ...]:
-    """Return as many columns as there are rows, chosen by QR with column pivoting."""
+def _pivots(jacobian: Real, free: Sequence[int]) -> tuple[int, ...]:
+    """Return as many of the free columns as there are rows, by QR with column pivoting."""
     from scipy.linalg import qr  # Imported here: it takes 0.3 s.
 
-    _, _, order = qr(jacobian, mode="economic", pivoting=True)
-    return tuple(int(j) for j in order[: len(jacobian)])
+    _, _, order = qr(jacobian[:, free], mode="economic", pivoting=True)
+    return tuple(free[j] for j in order[: len(jacobian)])
 
 
 def conditioning(jacobian: Real, dependent: tuple[int, ...]) -> float:
@@ -77,5 +109,7 @@ def conditioning(jacobian: Real, dependent: tuple[int, ...]) -> float:
     >>> conditioning(np.array([[2.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), (0, 1))
     0.5
     """
+    if len(dependent) < len(jacobian):
+        return 0.0
     size = np.linalg.svd(jacobian[:, dependent], compute_uv=False)
     return float(size[-1] / np.linalg.svd(jacobian, compute_uv=False)[0])

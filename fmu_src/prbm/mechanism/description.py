@@ -106,6 +106,8 @@ class Mechanism:
         Tolerances of parameters by name, which studies draw values from.
     ground_parts : tuple of GroundPart
         Fixed parts that are drawn; no result depends on them.
+    states : tuple of str
+        Coordinates that are states in model exchange, for instance ``crank.angle``, before others.
 
     Raises
     ------
@@ -137,6 +139,7 @@ class Mechanism:
     drawing: str = ""
     tolerances: Mapping[str, Tolerance] = field(default_factory=dict)
     ground_parts: tuple[GroundPart, ...] = ()
+    states: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return f"<Mechanism {self.name}: {self.title}>"
@@ -494,66 +497,6 @@ class Mechanism:
                 f"guide {guide.name} guides a point of the ground: choose a point of {guide.on}, "
                 "and a line of the ground"
             )
-
-    def check_rigid(self, use: str) -> None:
-        """Reject compliant stops, for a computation that has rigid impacts only.
-
-        Parameters
-        ----------
-        use : str
-            The computation, with an article.
-
-        Raises
-        ------
-        MechanismError
-            If a stop is compliant.
-        """
-        for stop in self.stops:
-            if stop.compliant:
-                raise MechanismError(
-                    f'{stop.name}.law = "{stop.law}": {use} has rigid impacts only; choose the '
-                    "law rigid, or simulate the mechanism"
-                )
-
-    def check_connected(self, use: str) -> None:
-        """Reject free bodies, for a computation that needs a force or a flexure to hold each body.
-
-        Parameters
-        ----------
-        use : str
-            The computation, with an article.
-
-        Raises
-        ------
-        MechanismError
-            If no flexures, joints, springs or guides connect a body to the ground.
-        """
-        if self.free_bodies:
-            raise MechanismError(
-                f"{use} has no bodies that fly freely: no flexures, joints, springs or "
-                f"guides connect {', '.join(self.free_bodies)} to the ground; connect them, or "
-                "simulate the mechanism"
-            )
-
-    def check_springless(self, use: str) -> None:
-        """Reject springs and guides, for a computation that has flexures and joints only.
-
-        Parameters
-        ----------
-        use : str
-            The computation, with an article.
-
-        Raises
-        ------
-        MechanismError
-            If there is a spring or a guide.
-        """
-        for kind, parts in (("springs", self.springs), ("guides", self.guides)):
-            if parts:
-                raise MechanismError(
-                    f"{use} has no {kind}: remove {', '.join(part.name for part in parts)}, or "
-                    "simulate the mechanism"
-                )
 
     def point(self, reference: str, user: str) -> Point:
         """Return the coordinates of the point ``body.point`` as drawn [m].

@@ -23,6 +23,7 @@ from ..mechanics.contact_state import ContactState
 from ..mechanics.dynamics import Equations
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import value
+from ..mechanism.supported import COMPLIANT_STOPS, check_supported
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ def march(
     """
     if not 0.0 < step <= stop_time:
         raise ParameterError(f"step = {step:g} s must be positive and within {stop_time:g} s")
-    mechanism.check_rigid("the integration with fixed steps")
+    check_supported(mechanism, "the integration with fixed steps", COMPLIANT_STOPS)
     simulation = Simulation(mechanism, values)
     system, n, y = simulation.system, simulation.system.n, simulation.front.y
     contacts = ContactState.free(len(mechanism.stops), len(mechanism.rubbing))

@@ -22,6 +22,7 @@ from ...mechanics.statics import Equilibrium, equilibrium
 from ...mechanics.system import System, unit
 from ...mechanism.description import Mechanism
 from ...mechanism.parts import GROUND, value
+from ...mechanism.supported import COMPLIANT_STOPS, FREE_BODIES, check_supported
 from ..touching import impact_shape, lever
 from .maps import OFFSETS, WALLS, ImpactMap, MovedStop, point_counter
 
@@ -60,8 +61,7 @@ def closed_form(
         * the body has less than :data:`ENERGY_SHARE_MIN` of the kinetic energy of the fundamental
           mode along the path.
     """
-    mechanism.check_rigid("the closed form")
-    mechanism.check_connected("the closed form")
+    check_supported(mechanism, "the closed form", COMPLIANT_STOPS, FREE_BODIES)
     which = MovedStop.of(mechanism, stop)
     s = mechanism.stops[which.index]
     if s.on != GROUND:

@@ -29,6 +29,7 @@ from ...mechanics.assembly import assemble
 from ...mechanics.modal import Modes, modes
 from ...mechanism.description import Mechanism
 from ...mechanism.parts import value
+from ...mechanism.supported import COMPLIANT_STOPS, FREE_BODIES, check_supported
 from ...references.finite_elements import FiniteElements, Shape
 from ...runs.engine import simulation
 from ..flexure_models import with_flexures
@@ -113,8 +114,7 @@ def algebraic(
     EquilibriumError
         If a wall cannot be reached by a force on the released body.
     """
-    mechanism.check_rigid("the algebraic map")
-    mechanism.check_connected("the algebraic map")
+    check_supported(mechanism, "the algebraic map", COMPLIANT_STOPS, FREE_BODIES)
     which = MovedStop.of(mechanism, stop)
     count = point_counter(progress, len(walls) * len(offsets))
 
@@ -153,8 +153,7 @@ def by_elements(
     FiniteElementError
         If Exudyn is not installed.
     """
-    mechanism.check_rigid("the map by finite elements")
-    mechanism.check_connected("the map by finite elements")
+    check_supported(mechanism, "the map by finite elements", COMPLIANT_STOPS, FREE_BODIES)
     which = MovedStop.of(mechanism, stop)
     count = point_counter(progress, len(walls) * len(offsets))
 

@@ -14,6 +14,7 @@ from ...mechanics.positions import given_at_start
 from ...mechanics.system import unit
 from ...mechanism.description import Mechanism
 from ...mechanism.parts import POSITIONS, VELOCITIES, value
+from ...mechanism.supported import FREE_BODIES, SPRINGS, check_supported
 from ...runs.result import Result
 from . import statics
 from .equations import Equations
@@ -59,8 +60,7 @@ class FiniteElements:
         *,
         elements: int = 16,
     ) -> None:
-        mechanism.check_springless("a model of finite elements")
-        mechanism.check_connected("a model of finite elements")
+        check_supported(mechanism, "a model of finite elements", SPRINGS, FREE_BODIES)
         self.model = ElementModel(mechanism, values, elements)
         self.equations = Equations(self.model)
         self.mechanism, self.values = mechanism, self.model.values

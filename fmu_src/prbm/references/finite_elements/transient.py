@@ -15,6 +15,7 @@ from ...mechanics.arrays import Real
 from ...mechanics.modal import Modes, simulated_restitution
 from ...mechanism.description import Mechanism
 from ...mechanism.parts import value
+from ...mechanism.supported import COMPLIANT_STOPS, check_supported
 from ...runs.result import Result, structured
 from .equations import Equations
 from .model import ElementModel
@@ -104,7 +105,7 @@ class Transient:
 
     def __init__(self, fe: Elements, step: float, spectral_radius: float) -> None:
         self.fe, self.step, self.radius = fe, step, spectral_radius
-        fe.mechanism.check_rigid("the transient of finite elements")
+        check_supported(fe.mechanism, "the transient of finite elements", COMPLIANT_STOPS)
         stops = fe.mechanism.stops
         self.held: set[int] = set()
         self.armed = [False] * len(stops)  # Whether the gap has opened since the last impact.
