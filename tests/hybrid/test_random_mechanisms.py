@@ -190,7 +190,7 @@ def test_mass_matrix_and_quadratic_terms_follow_from_the_positions(mechanism, se
     np.testing.assert_allclose(M, expected, atol=1e-9 * np.abs(M).max())
     w2 = w * w
     M_d, C = inertia(system.H, np.diag(0 * system.J), e)
-    quadratic = system.Phi.pull(C @ w2.real - M_d @ w2.imag)  # -Im(Hq w^2)
+    quadratic = system.Phi.to_coordinates(C @ w2.real - M_d @ w2.imag)  # -Im(Hq w^2)
     bent = (
         T.conj().T @ (system.m * second_derivative(lambda q: mass_points(system, q), q, v))
     ).real

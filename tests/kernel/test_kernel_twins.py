@@ -401,15 +401,18 @@ def test_panels_and_lines_are_the_same():
             assert_same(kernel().position(ours, x), line.position(np.array([x]))[0])
 
 
-@twin(pull=direction_map.DirectionMap.pull, mass_matrix=system_arrays.System.mass_matrix)
+@twin(
+    to_coordinates=direction_map.DirectionMap.to_coordinates,
+    mass_matrix=system_arrays.System.mass_matrix,
+)
 @each_mechanism
 def test_the_map_to_the_directions_is_the_same(name):
     for system, ours, rng in systems(name):
         n, x = system.n, rng.normal(size=system.d)
         found = np.zeros(n)
         for j in range(system.d):
-            kernel().pull(ours.structure, j, x[j], found)
-        assert_same(found, system.Phi.pull(x))
+            kernel().to_coordinates(ours.structure, j, x[j], found)
+        assert_same(found, system.Phi.to_coordinates(x))
         q, _ = random_state(system, rng)
         e, M = system.directions(q), np.full((n, n), np.nan)
         kernel().mass_matrix(ours.structure, e, M)
@@ -571,7 +574,7 @@ def test_displacements_and_velocities_of_points_are_the_same(name):
 
 @twin(
     directions=system_arrays.System.directions, turning=system_arrays.System.turning,
-    spread=system_arrays.System.spread,
+    repeat_columns=system_arrays.System.repeat_columns,
 )  # fmt: skip
 @each_mechanism
 def test_directions_and_rates_of_arms_are_the_same(name):
@@ -584,8 +587,8 @@ def test_directions_and_rates_of_arms_are_the_same(name):
         assert_same(w, system.turning(v))
         B = np.vstack([system.loops, system.gaps])
         rows = np.zeros(B.shape, complex)
-        kernel().spread(ours.structure, len(B), B, rows)
-        assert_same(rows, system.spread(B))
+        kernel().repeat_columns(ours.structure, len(B), B, rows)
+        assert_same(rows, system.repeat_columns(B))
 
 
 class KernelRows:
@@ -1119,7 +1122,7 @@ def test_tangent_stiffness_is_the_same(name):
     for system, ours, rng in systems(name):
         q, _ = random_state(system, rng)
         e, n = system.directions(q), system.n
-        w = system.spread(rng.normal(size=(system.d, 2)).view(complex)[:, 0])
+        w = system.repeat_columns(rng.normal(size=(system.d, 2)).view(complex)[:, 0])
         for rows in (system.loop_rows, system.gap_rows):
             lam, K_t = rng.normal(size=len(rows)), np.full((n, n), np.nan)
             own = KernelRows(ours, rows)

@@ -286,7 +286,7 @@ def starts(mechanism: Mechanism) -> bool:
     system = sim.system
     e = system.directions(sim.front.q)
     M, _ = inertia(system.H, np.diag(system.J), e)
-    release = jacobian(system.spread(system.release[None]), e)
+    release = jacobian(system.repeat_columns(system.release[None]), e)
     rows = np.vstack([system.loop_rows.by_direction(e), release])
     own = np.setdiff1d(np.arange(system.d), system.floats)  # No coordinate moves these directions.
     M, rows = M[np.ix_(own, own)], rows[:, own]

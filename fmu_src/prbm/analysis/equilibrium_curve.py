@@ -104,7 +104,7 @@ class EquilibriumCurve:
         if system.mechanism.release.turns:
             turning[system.released.j] = unit
         else:
-            change = system.spread(1j * unit * system.release)
+            change = system.repeat_columns(1j * unit * system.release)
         return cls(system, (w, change), (moment, turning))
 
     def shape(self, state: Real) -> Equilibrium:
@@ -122,7 +122,7 @@ class EquilibriumCurve:
         kkt = balance_matrix(system, shape, held=False)
         pin_idle(system, kkt)
         loads, by_share = (
-            system.Phi.pull((w * e).real) + moment
+            system.Phi.to_coordinates((w * e).real) + moment
             for w, moment in (
                 (shape.load, self.moments[0] + state[-1] * self.moments[1]),
                 (self.loads[1], self.moments[1]),

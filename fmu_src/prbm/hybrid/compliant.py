@@ -255,7 +255,7 @@ def _calm(configuration: Configuration, front: Front, stop: int) -> Rest | None:
         return None
     held = replace(touching, phase=Phase.FROZEN, depth=depth)
     # The displacement of the wall by the contact becomes part of its motion.
-    folded, walls = fold_gives(front, (stop,))
+    folded, walls = fold_recoils(front, (stop,))
     rest = folded.with_walls(walls).with_contacts(front.contacts.with_touching(stop, held))
     law, inverse_mass = front.equations.compliant.laws[stop], point_mobility(front, stop)
     force, elastic = _stop_force(rest, stop), law.elastic_force(depth)
@@ -330,16 +330,16 @@ def present_walls(front: Front, state: Callable[[], Real]) -> tuple[Wall, ...]:
     stops = front.equations.compliant.stops
     if not any(front.inputs.mobilities[i] for i in stops):
         return front.inputs.walls
-    return fold_gives(replace(front, y=state()), stops)[1]
+    return fold_recoils(replace(front, y=state()), stops)[1]
 
 
-def fold_gives(front: Front, stops: Sequence[int]) -> tuple[Front, tuple[Wall, ...]]:
+def fold_recoils(front: Front, stops: Sequence[int]) -> tuple[Front, tuple[Wall, ...]]:
     """Return the front without displacements of walls by contact forces, and the moved walls."""
     own, n, y = front.equations.compliant, front.equations.n, front.y.copy()
     walls = list(front.inputs.walls)
     for i in stops:
-        at = 2 * n + 2 + own.index(i, CompliantState.GIVE)
-        rate = 2 * n + 2 + own.index(i, CompliantState.GIVE_RATE)
+        at = 2 * n + 2 + own.index(i, CompliantState.RECOIL)
+        rate = 2 * n + 2 + own.index(i, CompliantState.RECOIL_RATE)
         walls[i] = walls[i].displaced(float(y[at])).pushed(front.time, float(y[rate]))
         y[at] = y[rate] = 0.0
     return replace(front, y=y), tuple(walls)

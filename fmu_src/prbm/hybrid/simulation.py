@@ -272,7 +272,7 @@ class Simulation:
         inputs = Inputs.of(self.mechanism, self.given, moved)
         equations = configuration.equations(inputs, self.contacts)
         front = Front(self.time, y, equations, self.latched, self.front.touches)
-        front, _ = compliant.fold_gives(front, equations.compliant.stops)
+        front, _ = compliant.fold_recoils(front, equations.compliant.stops)
         if pushed:
             front = impacts.receive(front, given - self.received)
         front, struck = contact_modes.release_moving(configuration, front)

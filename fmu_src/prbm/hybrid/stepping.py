@@ -346,14 +346,14 @@ def contact_error(
         touching = equations.contacts.touching[i]
         assert touching is not None
         speed = touching.reference_speed
-        give = 2 * n + 2 + own.index(i, CompliantState.GIVE)
+        recoil = 2 * n + 2 + own.index(i, CompliantState.RECOIL)
         depth = max(
             abs(float(rows[i] @ (y1[:n] - y[:n]))), speed * h, INDENTATION_MIN_RTOL * scales.length
         )
         sizes = []
         for difference in (fine, coarse):
-            d = (rows[i] @ difference[:n] + difference[give]) / depth
-            rate = (rows[i] @ difference[n : 2 * n] + difference[give + 1]) / speed
+            d = (rows[i] @ difference[:n] + difference[recoil]) / depth
+            rate = (rows[i] @ difference[n : 2 * n] + difference[recoil + 1]) / speed
             sizes.append(math.hypot(float(d), float(rate)))
         size = math.hypot(*sizes)
         largest = max(largest, sizes[0] ** 2 / size if size > 0.0 else size)

@@ -101,7 +101,7 @@ static bool check_time(const Simulation *sim, double time, Problem *problem) {
 
 /* Whether the motion goes on: nothing has been set, and all walls rest on their references. */
 static bool goes_on(const Simulation *sim) {
-    return sim->untouched && !sim->equations.walls_move && !sim->equations.walls_give;
+    return sim->untouched && !sim->equations.walls_move && !sim->equations.walls_recoil;
 }
 
 /* Compute the walls with the displacements by forces of compliant stops in their motion. */
@@ -109,13 +109,13 @@ static bool fold_present(Simulation *sim, Wall *walls, Problem *problem) {
     Scratch scratch = sim->scratch;
     bool ok = true;
     memcpy(walls, sim->state.walls, (size_t)system_of(sim)->s * sizeof(Wall));
-    if (sim->equations.walls_give) {
+    if (sim->equations.walls_recoil) {
         double *y = take(&scratch, (size_t)state_size(sim));
         ok = arc_state(sim, y, sim->present.e, &sim->present.reference, &sim->at_front, scratch,
                        problem);
         for (int i = 0; ok && i < system_of(sim)->s; i++) {
             if (sim->configuration.mechanism->stops[i].compliant) {
-                fold_give(&walls[i], sim->state.time, extra_of(sim, y, i));
+                fold_recoil(&walls[i], sim->state.time, extra_of(sim, y, i));
             }
         }
     }
@@ -153,7 +153,7 @@ static bool begin_step(Simulation *sim, double time, Problem *problem) {
         (set && !keep_gaps(sim, joined, problem))) {
         return false;
     }
-    fold_gives(sim); /* They are part of the walls joined. */
+    fold_recoils(sim); /* They are part of the walls joined. */
     memcpy(state->walls, joined, bytes);
     return restart(sim, problem);
 }
@@ -301,7 +301,7 @@ static bool apply_changes(Simulation *sim, bool at_event, bool impulses, Problem
     if (!(at_event ? leave_for_event(sim, &event, problem) : leave_arc(sim, true, problem))) {
         return false;
     }
-    fold_gives(sim);
+    fold_recoils(sim);
     sim->state.interrupted = sim->state.interrupted && !moved;
     turn_walls(sim);
     take_inputs(sim);

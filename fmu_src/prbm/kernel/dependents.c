@@ -161,7 +161,7 @@ PRBM void load_states(const Simulation *sim, const double *x, double *y) {
     copy(2, x + 2 * count, y + 2 * n);
     for (int c = 0; c < m->compliant_count; c++) {
         double *extra = y + m->first_extra + EXTRA_STATES * c;
-        extra[EXTRA_GIVE] = extra[EXTRA_GIVE_RATE] = 0.0;
+        extra[EXTRA_RECOIL] = extra[EXTRA_RECOIL_RATE] = 0.0;
         copy(EXCHANGED_STATES, x + 2 * count + 2 + EXCHANGED_STATES * c, extra + EXTRA_IMPULSE);
     }
 }

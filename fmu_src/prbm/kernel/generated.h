@@ -281,8 +281,8 @@ typedef enum {
 /* --- prbm.mechanics.compliant_stops ------------------------------------------------------------- */
 
 typedef enum {
-    EXTRA_GIVE = 0,
-    EXTRA_GIVE_RATE = 1,
+    EXTRA_RECOIL = 0,
+    EXTRA_RECOIL_RATE = 1,
     EXTRA_IMPULSE = 2,
     EXTRA_LOSS = 3,
 } CompliantState;

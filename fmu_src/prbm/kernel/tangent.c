@@ -189,7 +189,7 @@ static void apply_pull(const Tangent *t) {
     for (int j = 0; j < system->d; j++) {
         int a = arm_of(system, j);
         bool along_y = is_shift(system, j) && t->e[j].re != 0.0;
-        pull(system, j, a == j || along_y ? t->pull[a].re : t->pull[a].im, t->dx);
+        to_coordinates(system, j, a == j || along_y ? t->pull[a].re : t->pull[a].im, t->dx);
     }
 }
 

@@ -169,7 +169,7 @@ class _Assembler(Collection):
         # At zero stretch the directions e equal the arms E.  Rows of places are zero at stretches.
         e0 = np.exp(1j * Phi.of(q0))
         e0[self.floats] = 0.0
-        spread = A[:, arm]
+        repeated = A[:, arm]
         frames = {body.name: self.frame(body.name, body.name, None) for body in mechanism.bodies}
         self.lines += [(body, "body", self.corners(body), NO_THICKNESS) for body in frames]
         release, loops = mechanism.release, self.loop_arrays(d)
@@ -185,7 +185,7 @@ class _Assembler(Collection):
             floats=np.array(self.floats, int),
             floating=np.array(self.floating, int),
             placed=np.array(self.placed, int),
-            H=spread.conj().T @ (m[:, None] * spread),
+            H=repeated.conj().T @ (m[:, None] * repeated),
             J=np.array(self.J),
             K=self.stiffness(),
             turns=self.turns(),

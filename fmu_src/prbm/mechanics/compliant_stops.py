@@ -26,8 +26,8 @@ COMPLIANT_STATES = 4
 class CompliantState(IntEnum):
     """The index of each state of a compliant stop."""
 
-    GIVE = 0
-    GIVE_RATE = 1
+    RECOIL = 0
+    RECOIL_RATE = 1
     IMPULSE = 2
     LOSS = 3
 
@@ -83,7 +83,7 @@ class CompliantStops:
         """Return the index of a state of a compliant stop behind the energies."""
         return COMPLIANT_STATES * self.stops.index(stop) + extra
 
-    def add_gives(self, extras: Real | None, x: Real, extra: CompliantState) -> None:
+    def add_recoils(self, extras: Real | None, x: Real, extra: CompliantState) -> None:
         """Add the displacements of the walls by contact forces, or their rates, to x (..., s)."""
         if extras is not None and self.stops:
             x[..., self.stops] += extras[..., extra::COMPLIANT_STATES]
@@ -110,9 +110,9 @@ class CompliantStops:
         result = np.zeros(self.size)
         for k, i in enumerate(self.stops):
             at = COMPLIANT_STATES * k
-            result[at + CompliantState.GIVE] = extras[at + CompliantState.GIVE_RATE]
+            result[at + CompliantState.RECOIL] = extras[at + CompliantState.RECOIL_RATE]
             if i in self.pressed:
-                result[at + CompliantState.GIVE_RATE] = inputs.mobilities[i] * normal[i]
+                result[at + CompliantState.RECOIL_RATE] = inputs.mobilities[i] * normal[i]
             result[at + CompliantState.IMPULSE] = normal[i]
         return result
 

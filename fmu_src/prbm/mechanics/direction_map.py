@@ -35,7 +35,7 @@ class DirectionMap:
     Two directions that turn with the mean and the difference of two coordinates:
 
     >>> mean = DirectionMap(np.array([[0.5, 0.5], [1.0, -1.0]]))
-    >>> mean.of(np.array([3.0, 1.0])).tolist(), mean.pull(np.array([1.0, 0.0])).tolist()
+    >>> mean.of(np.array([3.0, 1.0])).tolist(), mean.to_coordinates(np.array([1.0, 0.0])).tolist()
     ([2.0, 2.0], [0.5, 0.5])
     """
 
@@ -54,7 +54,7 @@ class DirectionMap:
         result: Real = q @ self.Phi.T
         return result
 
-    def pull(self, x: Row) -> Row:
+    def to_coordinates(self, x: Row) -> Row:
         """Return the derivatives by coordinates (..., n) of derivatives by directions (..., d)."""
         if self.identity:
             return x

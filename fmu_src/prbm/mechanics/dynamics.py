@@ -127,8 +127,8 @@ class Equations:
         for frame, force, moment in zip(system.pushed, inputs.forces, inputs.moments, strict=True):
             w = w + forces.force_row(frame.A, force)
             self.moment[frame.j] += moment
-        self.w_input = system.spread(w)
-        self.w = self.w_input + system.spread(forces.field_row(system.S, system.gravity))
+        self.w_input = system.repeat_columns(w)
+        self.w = self.w_input + system.repeat_columns(forces.field_row(system.S, system.gravity))
         self.driven = bool(np.any(self.w_input) or np.any(self.moment))
         held = [inputs.walls[i] for i in self.held]
         self.moving_walls = any(wall.rate or wall.span for wall in held)
@@ -189,7 +189,7 @@ class Equations:
         system, e, w = self.system, self.system.directions(q), self.system.turning(v)
         Hq = turned_moments(system.H, e)
         M = system.Phi.congruence(Hq.real) + system.inertia
-        Q = system.Phi.pull(forces.generalised(self.w, e) + Hq.dot(w * w).imag)
+        Q = system.Phi.to_coordinates(forces.generalised(self.w, e) + Hq.dot(w * w).imag)
         Q += self.elements.motion_force(q, e, v, self.beta)
         R, bent = self.rows.terms(e, v)
         kkt = constraints.saddle(M, R, R)
@@ -326,14 +326,14 @@ class Equations:
         """
         walls = np.array([wall.motion(t)[0] for wall in self.inputs.walls]).T
         result: Real = self.system.gap_rows.values(e) + walls
-        self.compliant.add_gives(extras, result, CompliantState.GIVE)
+        self.compliant.add_recoils(extras, result, CompliantState.RECOIL)
         return result
 
     def gap_rates(self, t: float | Real, e: Complex, v: Real, extras: Real | None = None) -> Real:
         """Return the rates of all gaps [m/s]; arguments may be stacks, as for :meth:`gaps`."""
         walls = np.array([wall.motion(t)[1] for wall in self.inputs.walls]).T
         result: Real = self.system.gap_rows.rates(e, v) + walls
-        self.compliant.add_gives(extras, result, CompliantState.GIVE_RATE)
+        self.compliant.add_recoils(extras, result, CompliantState.RECOIL_RATE)
         return result
 
     def gap_accelerations(
@@ -454,7 +454,7 @@ def input_power(equations: Equations, t: float, q: Real, v: Real, lam: Real) -> 
     power, system = 0.0, equations.system
     if equations.driven:
         e = system.directions(q)
-        load = system.Phi.pull(forces.generalised(equations.w_input, e))
+        load = system.Phi.to_coordinates(forces.generalised(equations.w_input, e))
         power += float((load + equations.moment) @ v)
     if equations.moving_walls:
         held = lam[equations.first_hold : equations.first_stick]
@@ -488,9 +488,9 @@ def add_compliant_rates(
     if pressure is None:
         return
     for i, force, loss in zip(equations.pressed, pressure.force, pressure.loss, strict=True):
-        give_rate = extras[own.index(i, CompliantState.GIVE_RATE)]
+        recoil_rate = extras[own.index(i, CompliantState.RECOIL_RATE)]
         result[2 * n] += loss
-        result[2 * n + 1] -= force * (inputs.walls[i].motion(t)[1] + give_rate)
+        result[2 * n + 1] -= force * (inputs.walls[i].motion(t)[1] + recoil_rate)
         result[2 * n + 2 + own.index(i, CompliantState.LOSS)] = loss
 
 

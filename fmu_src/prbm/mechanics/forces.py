@@ -69,7 +69,8 @@ def load_rows(system: System, frame: BodyFrame, e: Complex) -> Real:
     """
     rows = np.zeros((3, system.n))
     for k, force in enumerate((1.0 + 0.0j, 1.0j)):
-        rows[k] = system.Phi.pull(generalised(system.spread(force_row(frame.A, force)), e))
+        w = system.repeat_columns(force_row(frame.A, force))
+        rows[k] = system.Phi.to_coordinates(generalised(w, e))
     rows[2, frame.j] = 1.0
     return rows
 

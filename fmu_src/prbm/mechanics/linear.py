@@ -199,8 +199,8 @@ class _SmallMotions:
             raise ParameterError(f"no input of a linear model: {unknown(name, known)}")
         owner, _, what = name.rpartition(".")
         if owner == "base.acceleration":
-            w = system.spread(field_row(system.S, -complex(what == "x", what == "y")))
-            return system.Phi.pull((w * self.e).real)
+            w = system.repeat_columns(field_row(system.S, -complex(what == "x", what == "y")))
+            return system.Phi.to_coordinates((w * self.e).real)
         index = [force.name for force in system.mechanism.forces].index(owner)
         row: Real = load_rows(system, system.pushed[index], self.e)[list(LOADS).index(what)]
         return row
@@ -270,8 +270,8 @@ class _SmallMotions:
 
     def _gradients(self, A: Complex) -> Complex:
         """Return dz/dq of positions z = c + A E, (p, n) complex."""
-        by_direction = 1j * self.system.spread(A) * self.e
-        real, imaginary = (self.system.Phi.pull(part) for part in (
+        by_direction = 1j * self.system.repeat_columns(A) * self.e
+        real, imaginary = (self.system.Phi.to_coordinates(part) for part in (
             by_direction.real, by_direction.imag))  # fmt: skip
         result: Complex = real + 1j * imaginary
         return result

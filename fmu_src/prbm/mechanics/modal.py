@@ -260,8 +260,8 @@ def modes_at(system: System, q: Real) -> Modes:
     M = system.mass_matrix(e)
     rows = held_rows(system, system.amount(q))
     G = rows.jacobian(e)
-    w = field_row(system.spread(system.S), system.gravity)
-    load = Elements(system).force(q, e) + system.Phi.pull((w * e).real)
+    w = field_row(system.repeat_columns(system.S), system.gravity)
+    load = Elements(system).force(q, e) + system.Phi.to_coordinates((w * e).real)
     right = np.concatenate([load, np.zeros(len(rows))])
     kkt = constraints.saddle(M, G, G)
     lam = -constraints.solve(kkt, right, system.n, system.length)[system.n :]

@@ -123,7 +123,7 @@ def _balanced(rows: Rows, c: Real, w: Complex, moment: Real, start: Real) -> Rea
             np.abs(open_by).max(initial=0.0) <= STATICS_CONSTRAINT_RTOL * system.length
         ):
             return state
-        loads = system.Phi.pull((w * e).real) + moment
+        loads = system.Phi.to_coordinates((w * e).real) + moment
         torque = elements.force(q, e) + loads + lam @ G
         kkt = constraints.saddle(tangent_stiffness(elements.tangent(e), w, rows, lam, e), G, G)
         try:

@@ -412,14 +412,14 @@ def _holding_unit(system: System) -> float:
 
 
 def load_row(system: System, loads: Mapping[str, float]) -> tuple[Complex, Real]:
-    """Return the spread row w of gravity and the given forces, and the given moments [N m]."""
+    """Return the row w of gravity and the given forces, repeated, and the moments [N m]."""
     given = checked_loads(system.mechanism, loads)
     w, moment = field_row(system.S, system.gravity), np.zeros(system.n)
     for force, frame in zip(system.mechanism.forces, system.pushed, strict=True):
         x, y, turning = (given[f"{force.name}.{what}"] for what in ("x", "y", "moment"))
         w = w + force_row(frame.A, complex(x, y))
         moment[frame.j] += turning
-    return system.spread(w), moment
+    return system.repeat_columns(w), moment
 
 
 def free_displacement(system: System) -> float:
@@ -447,7 +447,7 @@ def _newton(system: System, given: _Given, start: Real) -> Real | None:
         q, lam = state[:n], state[n:]
         e = system.directions(q)
         G = rows.jacobian(e)
-        loads = system.Phi.pull((w * e).real) + moment
+        loads = system.Phi.to_coordinates((w * e).real) + moment
         torque = elements.force(q, e, share) + loads + lam @ G
         torque[system.placed] = 0.0
         open_by = rows.values(e)

@@ -27,8 +27,8 @@ Arrays have a column for every direction.  The vector e contains E for the angle
 -i E for its stretch, and -i and 1 for the displacements along x and y of an arm that floats, so
 that the derivative of E by its direction is i e for all.  (An arm that floats has no direction of
 its own: its angle depends on no coordinate, and its element of e is E.)  The columns of A and B at
-stretches and displacements are zero; :meth:`System.spread` replaces them by the columns of the
-arms.  Then dx/dtheta = -Im(spread(B) e), and dx/dq = dx/dtheta Phi.
+stretches and displacements are zero; :meth:`System.repeat_columns` replaces them by the columns of
+the arms.  Then dx/dtheta = -Im(B e) with repeated columns, and dx/dq = dx/dtheta Phi.
 """
 
 import cmath
@@ -59,7 +59,7 @@ def values(B: Complex, c: Real, e: Complex) -> Real:
 
 
 def jacobian(B: Complex, e: Complex) -> Real:
-    """Return dx/dtheta = -Im(B e) [m/rad], (r, d), of rows B, spread over the stretches."""
+    """Return dx/dtheta = -Im(B e) [m/rad], (r, d), of rows B with repeated columns."""
     return -(B * e).imag
 
 
@@ -92,7 +92,7 @@ class Rows:
         on: Whole | None = None,
     ) -> None:
         self.system, self.B, self.c = system, B, c
-        self.spread = system.spread(B)
+        self.repeated = system.repeat_columns(B)
         self.every_on: Whole = np.full(len(B), FIXED) if on is None else on
         self.every_z: Complex = np.zeros(len(B), complex) if z is None else z
         self.carried: Whole = np.flatnonzero(self.every_on != FIXED)
@@ -138,11 +138,11 @@ class Rows:
 
     def jacobian(self, e: Complex) -> Real:
         """Return dx/dq [m/rad], (..., r, n); e may be a stack (..., d)."""
-        return self.system.Phi.pull(self.by_direction(e))
+        return self.system.Phi.to_coordinates(self.by_direction(e))
 
     def by_direction(self, e: Complex) -> Real:
         """Return dx/dtheta [m/rad], (..., r, d); e may be a stack (..., d)."""
-        result = jacobian(self.spread, e[..., None, :])
+        result = jacobian(self.repeated, e[..., None, :])
         if len(self.carried):
             result[..., self.carried, :] = self._carried_by_direction(e)
         return result
@@ -150,7 +150,7 @@ class Rows:
     def _carried_by_direction(self, e: Complex) -> Real:
         """Return dx/dtheta of the carried rows [m/rad]."""
         f = e[..., self.on].conj()
-        result: Real = -(f[..., None] * self.spread[self.carried] * e[..., None, :]).imag
+        result: Real = -(f[..., None] * self.repeated[self.carried] * e[..., None, :]).imag
         turned = self._carried_values(e @ self.B.T, e).imag
         result[..., np.arange(len(self.on)), self.on] += turned
         return result
@@ -172,7 +172,7 @@ class Rows:
         D = np.zeros((self.system.d, self.system.d))
         values = self._carried_values(self.B @ e, e).real
         for k, on, value in zip(self.carried, self.on, values.tolist(), strict=True):
-            across = lam[k] * (e[on].conj() * self.spread[k] * e).real
+            across = lam[k] * (e[on].conj() * self.repeated[k] * e).real
             D[on] -= across
             D[:, on] -= across
             D[on, on] += lam[k] * value
@@ -183,7 +183,7 @@ class Rows:
 
         That of arms that float is the size.
         """
-        most, lengths = np.abs(self.spread), np.ones(self.system.d)
+        most, lengths = np.abs(self.repeated), np.ones(self.system.d)
         lengths[self.system.floats] = self.system.length
         most[self.carried, self.on] += (np.abs(self.B) @ lengths)[self.carried] + np.abs(self.z)
         return most @ np.abs(self.system.Phi.Phi)
@@ -209,12 +209,12 @@ class Rows:
     def terms(self, e: Complex, v: Real) -> tuple[Real, Real]:
         """Return :meth:`jacobian` and :meth:`convective` for rates v (n,) of the coordinates."""
         w = self.system.turning(v)
-        turned = self.spread * e
+        turned = self.repeated * e
         slopes, bent = -turned.imag, turned.dot(w * w).real
         if len(self.carried):
             slopes[self.carried] = self._carried_by_direction(e)
             bent[self.carried] = self._carried_convective(e, v)
-        return self.system.Phi.pull(slopes), bent
+        return self.system.Phi.to_coordinates(slopes), bent
 
     def _carried_convective(self, e: Complex, v: Real) -> Real:
         """Return the convective terms of the carried rows [m/s^2]."""
@@ -248,7 +248,7 @@ class System:
     placed : (3 b,) int
         Those of the bodies that springs do not hold, either: no balance determines them.
     H : (d, d) complex
-        A^H diag(m) A with the columns of A spread, Hermitian [kg m^2].
+        A^H diag(m) A with the columns of A repeated, Hermitian [kg m^2].
     J : (d,)
         Rotary inertia of each body about the mass centres of its parts [kg m^2].
     K : (n, n)
@@ -546,14 +546,14 @@ class System:
 
     def gradient(self, B: Complex, e: Complex) -> Real:
         """Return dx/dq [m/rad], (..., n), of rows x = Re(B E) + c, (..., d)."""
-        return self.Phi.pull(jacobian(self.spread(B), e))
+        return self.Phi.to_coordinates(jacobian(self.repeat_columns(B), e))
 
     def motion(self, frame: BodyFrame, e: Complex, v: Real) -> tuple[complex, complex]:
         """Return the displacement from the straight shape [m] and the velocity [m/s] of a point."""
         displacement = complex(frame.A @ e) + frame.c - frame.drawn
         return displacement, complex(1j * (frame.A @ self.swing(e, v)))
 
-    def spread(self, B: Complex) -> Complex:
+    def repeat_columns(self, B: Complex) -> Complex:
         """Return rows with the column of each arm repeated for its stretch or displacements."""
         return B[..., self.arm] if len(self.shared) else B
 

@@ -73,8 +73,8 @@ PRBM void map_directions(const System *system, const double *x, double *theta) {
 
 /* Add r rows x of derivatives by the directions, wide apart, pulled back to the coordinates, to out,
  * even apart. */
-SIZED void pull_branch(int size, int count, const System *system, const Branch *branch, int r,
-                       const double *RESTRICT x, double *RESTRICT out) {
+SIZED void branch_to_coordinates(int size, int count, const System *system, const Branch *branch,
+                                 int r, const double *RESTRICT x, double *RESTRICT out) {
     const int even = even_length(size), paired = size - size % PAIR;
     x += branch->start;
     for (int row = 0; row < r; row++) {
@@ -94,20 +94,20 @@ SIZED void pull_branch(int size, int count, const System *system, const Branch *
     }
 }
 
-static void pull_rows(const System *system, const Branch *branch, int r, const double *x,
-                      double *out) {
+static void rows_to_coordinates(const System *system, const Branch *branch, int r, const double *x,
+                                double *out) {
     switch (branch->code) {
-    case LEAF_5: pull_branch(5, LEAF_COORDINATES, system, branch, r, x, out); break;
+    case LEAF_5: branch_to_coordinates(5, LEAF_COORDINATES, system, branch, r, x, out); break;
     case LEAF_5_BODY:
-    case LEAF_6: pull_branch(6, LEAF_COORDINATES, system, branch, r, x, out); break;
-    case LEAF_6_BODY: pull_branch(7, LEAF_COORDINATES, system, branch, r, x, out); break;
-    case ANY_BRANCH: pull_branch(branch->size, branch->count, system, branch, r, x, out);
+    case LEAF_6: branch_to_coordinates(6, LEAF_COORDINATES, system, branch, r, x, out); break;
+    case LEAF_6_BODY: branch_to_coordinates(7, LEAF_COORDINATES, system, branch, r, x, out); break;
+    case ANY_BRANCH: branch_to_coordinates(branch->size, branch->count, system, branch, r, x, out);
     }
 }
 
-PRBM void pull_directions(const System *system, int r, const double *x, double *out) {
+PRBM void directions_to_coordinates(const System *system, int r, const double *x, double *out) {
     for (int k = 0; k < system->branch_count; k++) {
-        pull_rows(system, &system->branches[k], r, x, out);
+        rows_to_coordinates(system, &system->branches[k], r, x, out);
     }
 }
 
@@ -292,7 +292,7 @@ PRBM void branch_terms(const System *system, const double *own, int r, Evaluatio
             root_terms(system, branch, result);
         }
         add_own_terms(system, branch, own, result);
-        pull_rows(system, branch, 1, result->load, result->a);
-        pull_rows(system, branch, r, result->rows, result->factors.Z);
+        rows_to_coordinates(system, branch, 1, result->load, result->a);
+        rows_to_coordinates(system, branch, r, result->rows, result->factors.Z);
     }
 }

@@ -10,7 +10,7 @@ PRBM void map_directions(const System *system, const double *x, double *theta);
 PRBM void map_motion(const System *system, Kinematics *at);
 /* Add the derivatives by directions x (r, wide), pulled back to the coordinates, to out
  * (r, even). */
-PRBM void pull_directions(const System *system, int r, const double *x, double *out);
+PRBM void directions_to_coordinates(const System *system, int r, const double *x, double *out);
 /* Compute the mass matrix of the coordinates.  Add the quadratic velocity terms to the loads, and
  * pull loads and r rows back to the coordinates.  own (d,) is the diagonal of the mass matrix of
  * the directions. */

@@ -138,7 +138,7 @@ PRBM void row_jacobian(const Rows *rows, int i, const Complex *e, double *row) {
     }
     zeros(system->n, row);
     for (int j = 0; j < system->d; j++) {
-        pull(system, j, slope(rows, i, e, j), row);
+        to_coordinates(system, j, slope(rows, i, e, j), row);
     }
 }
 

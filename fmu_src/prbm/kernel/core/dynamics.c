@@ -44,14 +44,14 @@ NOINLINE void compliant_rates(const Equations *eq, const Evaluation *at, double 
         double force = pressed ? at->pressure[i]
                        : is_held(&eq->contacts, i) ? stop_force(eq, at->lam, i)
                                                   : 0.0;
-        rates[EXTRA_GIVE] = now[EXTRA_GIVE_RATE];
-        rates[EXTRA_GIVE_RATE] = pressed ? eq->inputs.mobilities[i] * force : 0.0;
+        rates[EXTRA_RECOIL] = now[EXTRA_RECOIL_RATE];
+        rates[EXTRA_RECOIL_RATE] = pressed ? eq->inputs.mobilities[i] * force : 0.0;
         rates[EXTRA_IMPULSE] = force;
         rates[EXTRA_LOSS] = pressed ? at->contact_loss[i] : 0.0;
         if (pressed) {
             double velocity = wall_motion(&eq->inputs.walls[i], at->at.time).v;
             energies[0] += at->contact_loss[i];
-            energies[1] -= force * (velocity + now[EXTRA_GIVE_RATE]);
+            energies[1] -= force * (velocity + now[EXTRA_RECOIL_RATE]);
         }
     }
 }

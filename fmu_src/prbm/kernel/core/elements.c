@@ -95,7 +95,7 @@ PRBM void span_gradient(const System *system, int k, Complex u, const Complex *e
     zeros(system->n, row);
     for (int j = 0; j < system->d; j++) {
         Complex arm = product(A[arm_of(system, j)], e[j]);
-        pull(system, j, -product(conjugate(u), arm).im, row);
+        to_coordinates(system, j, -product(conjugate(u), arm).im, row);
     }
 }
 
@@ -167,7 +167,7 @@ static void add_stiffnesses(const System *system, int k, const SpringState *now,
 
 PRBM void stiffen(const System *system, int i, int j, double x, double *K_t) {
     if (system->mapped) {
-        pull_both(system, i, j, x, K_t);
+        both_to_coordinates(system, i, j, x, K_t);
     } else {
         K_t[i * system->n + j] += x;
     }

@@ -120,7 +120,7 @@ static void set_rows(Equations *eq) {
 static void set_row_parts(Equations *eq) {
     int d = eq->system->d, wide = eq->system->wide;
     for (int k = 0; k < eq->r; k++) {
-        spread(eq->system, 1, eq->B + k * d, eq->w); /* w is free memory here. */
+        repeat_columns(eq->system, 1, eq->B + k * d, eq->w); /* w is free memory here. */
         pad_parts(d, eq->w, parts_from(eq->B_conjugate, k * wide));
     }
     for (int i = 0; i < eq->r * wide; i++) {
@@ -194,9 +194,9 @@ static void set_loads(Equations *eq) {
         }
         eq->moment[frame->arm] += given[2];
     }
-    spread(system, 1, eq->w_input, eq->w_input);
+    repeat_columns(system, 1, eq->w_input, eq->w_input);
     field_row(d, system->S, system->gravity, eq->w);
-    spread(system, 1, eq->w, eq->w);
+    repeat_columns(system, 1, eq->w, eq->w);
     eq->driven = false;
     for (int j = 0; j < d; j++) {
         eq->w[j] = plus(eq->w_input[j], eq->w[j]);
@@ -209,10 +209,10 @@ static void set_loads(Equations *eq) {
         const Wall *wall = &eq->inputs.walls[i];
         eq->walls_move = eq->walls_move || wall->rate != 0.0 || wall->span > 0.0;
     }
-    eq->walls_give = false;
+    eq->walls_recoil = false;
     for (int i = 0; m->compliant_count > 0 && i < system->s; i++) {
-        bool gives = m->stops[i].compliant && eq->inputs.mobilities[i] > 0.0;
-        eq->walls_give = eq->walls_give || gives;
+        bool recoils = m->stops[i].compliant && eq->inputs.mobilities[i] > 0.0;
+        eq->walls_recoil = eq->walls_recoil || recoils;
     }
     eq->driven = eq->driven || eq->walls_move || m->compliant_count > 0;
     eq->more_powers = eq->driven || eq->slipping_count > 0 || eq->mass_damping != 0.0;

@@ -51,7 +51,7 @@ typedef struct {
     Complex *w, *w_input;   /* (d,) */
     double *moment;         /* (wide,) */
     bool walls_move;
-    bool walls_give;        /* whether forces of compliant stops may move their walls */
+    bool walls_recoil;        /* whether forces of compliant stops may move their walls */
     bool driven;            /* inputs or walls do work, or stops are compliant */
     bool more_powers;       /* whether more than the losses of springs changes the energies */
     bool contacts_or_walls; /* whether contacts slip or are pressed, or walls move */

@@ -462,7 +462,7 @@ static void find_shift(const System *system, const Kinematics *at, double *shift
 
 /* Compute M, add the quadratic velocity terms to the loads of the directions, and pull loads and
  * rows back to the coordinates. */
-static void pull_blocks(const Equations *eq, Evaluation *result) {
+static void blocks_to_coordinates(const Equations *eq, Evaluation *result) {
     const System *system = eq->system;
     const double *own = own_inertia(system, &result->at);
     if (system->stretch_count > 0) {
@@ -495,7 +495,7 @@ NOINLINE void mapped_terms(const Equations *eq, const Reference *near, Evaluatio
         set_lanes(result->a + j, all_lanes(0.0));
     }
     memset(Z, 0, (size_t)(eq->r * even) * sizeof *Z);
-    pull_blocks(eq, result);
+    blocks_to_coordinates(eq, result);
     for (int k = 0; system->stretch_count > 0 && k < eq->r; k++) {
         result->lam[k] += even_dot(wide, result->rows + k * wide, result->shift);
     }
@@ -535,7 +535,7 @@ NOINLINE void add_pressure(const Equations *eq, Evaluation *result) {
         double d = -gap(eq, i, t, result->at.e, extra);
         double rate = -dot(eq->system->n, result->row, result->at.speed) -
                       wall_motion(&eq->inputs.walls[i], t).v -
-                      give_of(eq, i, extra, EXTRA_GIVE_RATE);
+                      recoil_of(eq, i, extra, EXTRA_RECOIL_RATE);
         double force = contact_force(&eq->laws[i], &eq->contacts.touching[i], d, rate);
         result->pressure[i] = force;
         result->contact_loss[i] = (force - elastic_force(&eq->laws[i], d)) * rate;

@@ -40,7 +40,7 @@ PRBM void load_rows(const System *system, const BodyFrame *frame, const Complex 
     zeros(3 * n, rows);
     for (int k = 0; k < 2; k++) {
         force_row(d, frame->A, complex_of(k == 0, k == 1), w);
-        spread(system, 1, w, w);
+        repeat_columns(system, 1, w, w);
         add_loads(system, w, e, rows + k * n);
     }
     rows[2 * n + frame->j] = 1.0;
@@ -54,7 +54,7 @@ PRBM void generalised(int n, const Complex *w, const Complex *e, double *Q) {
 
 PRBM void add_loads(const System *system, const Complex *w, const Complex *e, double *Q) {
     for (int j = 0; j < system->d; j++) {
-        pull(system, j, product(w[j], e[j]).re, Q);
+        to_coordinates(system, j, product(w[j], e[j]).re, Q);
     }
 }
 

@@ -12,7 +12,7 @@ PRBM void force_row(int n, const Complex *A, Complex force, Complex *w);
 PRBM void load_rows(const System *system, const BodyFrame *frame, const Complex *e, double *rows,
                     Scratch scratch);
 PRBM void generalised(int n, const Complex *w, const Complex *e, double *Q);
-/* Add the generalised forces Phi^T Re(w e) of a row w (d,), spread, to Q (n,). */
+/* Add the generalised forces Phi^T Re(w e) of a row w (d,), with repeated columns, to Q (n,). */
 PRBM void add_loads(const System *system, const Complex *w, const Complex *e, double *Q);
 PRBM double gravitational_energy(const System *system, const Complex *e);
 PRBM double normal_force(double lift, double preload, double stiffness);

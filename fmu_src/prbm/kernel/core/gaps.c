@@ -1,7 +1,7 @@
 /* Gaps of the stops, their rates and their accelerations: as in mechanics/dynamics.py. */
 #include "core/gaps.h"
 
-PRBM double give_of(const Equations *eq, int i, const double *extra, CompliantState which) {
+PRBM double recoil_of(const Equations *eq, int i, const double *extra, CompliantState which) {
     if (extra == NULL) {
         return 0.0;
     }
@@ -13,14 +13,14 @@ PRBM double gap(const Equations *equations, int i, double t, const Complex *e,
                 const double *extra) {
     Rows rows = gap_rows(equations->system);
     return row_value(&rows, i, e) + rows.c[i] + wall_motion(&equations->inputs.walls[i], t).x +
-           give_of(equations, i, extra, EXTRA_GIVE);
+           recoil_of(equations, i, extra, EXTRA_RECOIL);
 }
 
 PRBM double gap_rate(const Equations *equations, int i, double t, const Complex *e,
                      const double *v, const double *extra) {
     Rows rows = gap_rows(equations->system);
     return row_rate(&rows, i, e, v) + wall_motion(&equations->inputs.walls[i], t).v +
-           give_of(equations, i, extra, EXTRA_GIVE_RATE);
+           recoil_of(equations, i, extra, EXTRA_RECOIL_RATE);
 }
 
 PRBM double gap_acceleration(const Equations *equations, int i, double t, const Complex *e,

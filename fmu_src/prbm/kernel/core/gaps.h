@@ -7,7 +7,7 @@
 
 /* The displacement of a wall by the force of its compliant stop, or its rate.  extra: the states of
  * compliant stops, or NULL for zeros. */
-PRBM double give_of(const Equations *eq, int i, const double *extra, CompliantState which);
+PRBM double recoil_of(const Equations *eq, int i, const double *extra, CompliantState which);
 /* The gap of a stop, its rate and its acceleration; extra as above. */
 PRBM double gap(const Equations *equations, int i, double t, const Complex *e,
                 const double *extra);

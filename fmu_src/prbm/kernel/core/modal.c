@@ -78,7 +78,7 @@ static bool generalised_eigen(int n, double *K, double *M, double *w, double *Y,
 /* Set the row w (d,) of the loads of gravity, with columns for stretches. */
 static void gravity_row(const System *system, Complex *w) {
     field_row(system->d, system->S, system->gravity, w);
-    spread(system, 1, w, w);
+    repeat_columns(system, 1, w, w);
 }
 
 PRBM int mode_count(const System *system) {

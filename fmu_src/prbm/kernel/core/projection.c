@@ -108,7 +108,7 @@ NOINLINE void mapped_rows(const Equations *eq, Correction *c) {
     const System *system = eq->system;
     rows_and_convection(eq, &c->at, c->by_direction, c->convective);
     zeros(eq->r * system->even, c->rows);
-    pull_directions(system, eq->r, c->by_direction, c->rows);
+    directions_to_coordinates(system, eq->r, c->by_direction, c->rows);
 }
 
 SIZED void velocity_residuals(int even, const Equations *eq, double t, Correction *c) {

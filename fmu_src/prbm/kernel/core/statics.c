@@ -237,7 +237,7 @@ static double largest_modulus(int count, const Complex *x) {
 typedef struct {
     const System *system;
     Rows rows;
-    Complex *w; /* (d,) spread */
+    Complex *w; /* (d,) with repeated columns */
     double fraction; /* of the initial strains and of the pretension of springs */
 } Balance;
 
@@ -340,7 +340,7 @@ static Balance balance_at(const System *system, const Hold *hold, double fractio
                        take_complex(scratch, 1, d), fraction};
     stack_hold(system, hold, fraction, B, c);
     field_row(d, system->S, scaled(fraction, system->gravity), balance.w);
-    spread(system, 1, balance.w, balance.w);
+    repeat_columns(system, 1, balance.w, balance.w);
     return balance;
 }
 

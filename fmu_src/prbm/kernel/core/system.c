@@ -44,7 +44,7 @@ PRBM double direction_of(const System *system, const double *x, int j) {
     return sum;
 }
 
-PRBM void pull(const System *system, int j, double x, double *sum) {
+PRBM void to_coordinates(const System *system, int j, double x, double *sum) {
     if (!system->mapped) {
         sum[j] += x;
         return;
@@ -55,10 +55,10 @@ PRBM void pull(const System *system, int j, double x, double *sum) {
     }
 }
 
-PRBM void pull_both(const System *system, int i, int j, double x, double *sum) {
+PRBM void both_to_coordinates(const System *system, int i, int j, double x, double *sum) {
     const DirectionMap *map = &system->mechanism->map;
     for (int k = map->first[i]; k < map->first[i + 1]; k++) {
-        pull(system, j, system->factors[k] * x, sum + map->coordinate[k] * system->n);
+        to_coordinates(system, j, system->factors[k] * x, sum + map->coordinate[k] * system->n);
     }
 }
 
@@ -174,7 +174,7 @@ PRBM void motion(const System *system, const BodyFrame *frame, const Complex *e,
     *velocity = speed;
 }
 
-PRBM void spread(const System *system, int r, const Complex *B, Complex *rows) {
+PRBM void repeat_columns(const System *system, int r, const Complex *B, Complex *rows) {
     int d = system->d;
     for (int i = 0; i < r * d; i += d) {
         for (int j = 0; j < d; j++) {
@@ -196,7 +196,7 @@ PRBM void mass_matrix(const System *system, const Complex *e, double *M, Scratch
         zeros(n * n, M);
         for (int i = 0; i < d * d; i++) {
             if (own[i] != 0.0) {
-                pull_both(system, i / d, i % d, own[i], M);
+                both_to_coordinates(system, i / d, i % d, own[i], M);
             }
         }
     }

@@ -109,9 +109,9 @@ typedef struct {
 } Branch;
 
 /* The constant arrays of a mechanism, as in the twin.  There are n coordinates, d directions, r
- * loop rows, p mass points, s stops, f friction points and guides with friction, and b bodies.  Columns of A and of the
- * rows are zero at stretches, see spread.  Vectors with the shape (even,) or (wide,) have n or d
- * elements, and are padded to an even length. */
+ * loop rows, p mass points, s stops, f friction points and guides with friction, and b bodies.
+ * Columns of A and of the rows are zero at stretches, see repeat_columns.  Vectors with the shape
+ * (even,) or (wide,) have n or d elements, and are padded to an even length. */
 typedef struct {
     const Mechanism *mechanism;
     const double *values;
@@ -203,9 +203,9 @@ PRBM bool is_float(const System *system, int j);
 /* Return direction j of coordinates x (n,), or its rate if x are rates. */
 PRBM double direction_of(const System *system, const double *x, int j);
 /* Add x times the change of direction j with the coordinates to sum (n,). */
-PRBM void pull(const System *system, int j, double x, double *sum);
+PRBM void to_coordinates(const System *system, int j, double x, double *sum);
 /* Add x times the changes of the directions i and j with the coordinates to sum (n, n). */
-PRBM void pull_both(const System *system, int i, int j, double x, double *sum);
+PRBM void both_to_coordinates(const System *system, int i, int j, double x, double *sum);
 /* Return the coordinate that is the direction of a body or a link. */
 PRBM int angle_of(const System *system, int j);
 /* Return what the variable of a coordinate is for each unit of the coordinate: the size for a
@@ -227,7 +227,7 @@ PRBM void motion(const System *system, const BodyFrame *frame, const Complex *e,
                  Complex *displacement, Complex *velocity);
 /* Copy B (r, d) to rows, and repeat the column of each arm for its stretch or displacements.  rows
  * may be B. */
-PRBM void spread(const System *system, int r, const Complex *B, Complex *rows);
+PRBM void repeat_columns(const System *system, int r, const Complex *B, Complex *rows);
 /* Replace the unit vectors e by the arms, and by what belongs to stretches and displacements, see
  * directions.  theta (d,) are the directions. */
 PRBM void stretch(const System *system, const double *theta, Complex *e);

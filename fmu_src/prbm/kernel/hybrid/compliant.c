@@ -266,17 +266,17 @@ static bool is_stuck(Simulation *sim, int stop, bool *result, Problem *problem) 
     return ok;
 }
 
-PRBM void fold_give(Wall *wall, double t, double *extra) {
-    wall->position += extra[EXTRA_GIVE] - extra[EXTRA_GIVE_RATE] * (t - wall->since);
-    wall->rate += extra[EXTRA_GIVE_RATE];
-    extra[EXTRA_GIVE] = extra[EXTRA_GIVE_RATE] = 0.0;
+PRBM void fold_recoil(Wall *wall, double t, double *extra) {
+    wall->position += extra[EXTRA_RECOIL] - extra[EXTRA_RECOIL_RATE] * (t - wall->since);
+    wall->rate += extra[EXTRA_RECOIL_RATE];
+    extra[EXTRA_RECOIL] = extra[EXTRA_RECOIL_RATE] = 0.0;
 }
 
-PRBM void fold_gives(Simulation *sim) {
+PRBM void fold_recoils(Simulation *sim) {
     for (int i = 0; i < system_of(sim)->s; i++) {
         if (stop_of(sim, i)->compliant) {
             double *extra = extra_of(sim, sim->state.front, i);
-            fold_give(&sim->state.walls[i], sim->state.front_time, extra);
+            fold_recoil(&sim->state.walls[i], sim->state.front_time, extra);
         }
     }
 }
@@ -286,7 +286,7 @@ typedef struct {
     ContactPhase touching;
     ContactMode mode;
     Wall wall;
-    double give, give_rate;
+    double recoil, recoil_rate;
     bool has_k1;
 } Unfrozen;
 
@@ -295,8 +295,8 @@ static Unfrozen hold_contact(Simulation *sim, int stop, double depth) {
     State *state = &sim->state;
     double *extra = extra_of(sim, state->front, stop);
     Unfrozen before = {state->touching[stop], state->modes[stop],     state->walls[stop],
-                        extra[EXTRA_GIVE],     extra[EXTRA_GIVE_RATE], state->has_k1};
-    fold_give(&state->walls[stop], state->front_time, extra);
+                        extra[EXTRA_RECOIL],     extra[EXTRA_RECOIL_RATE], state->has_k1};
+    fold_recoil(&state->walls[stop], state->front_time, extra);
     set_phase(sim, stop, PHASE_FROZEN, before.touching.reference_speed, depth);
     return before;
 }
@@ -306,8 +306,8 @@ static void press_again(Simulation *sim, int stop, const Unfrozen *before) {
     State *state = &sim->state;
     double *extra = extra_of(sim, state->front, stop);
     state->walls[stop] = before->wall;
-    extra[EXTRA_GIVE] = before->give;
-    extra[EXTRA_GIVE_RATE] = before->give_rate;
+    extra[EXTRA_RECOIL] = before->recoil;
+    extra[EXTRA_RECOIL_RATE] = before->recoil_rate;
     state->modes[stop] = before->mode;
     set_phase(sim, stop, before->touching.phase, before->touching.reference_speed, 0.0);
     state->has_k1 = before->has_k1;

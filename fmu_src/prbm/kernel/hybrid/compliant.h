@@ -16,8 +16,8 @@ PRBM bool freeze_calm(Simulation *sim, double *balances, Problem *problem);
 PRBM bool freezes_here(Simulation *sim, bool *result, Problem *problem);
 /* Let the displacement of a wall by the force of its stop become its motion at time t; extra: the
  * states of the stop. */
-PRBM void fold_give(Wall *wall, double t, double *extra);
-PRBM void fold_gives(Simulation *sim); /* of all compliant stops at the front */
+PRBM void fold_recoil(Wall *wall, double t, double *extra);
+PRBM void fold_recoils(Simulation *sim); /* of all compliant stops at the front */
 /* The kinetic energy at the front with the rates v [J]. */
 PRBM double kinetic_energy(Simulation *sim, const double *v, Scratch scratch);
 /* Compute the rate at which the damping of a pressed contact changes its speed [1/s]. */

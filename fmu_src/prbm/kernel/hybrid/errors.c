@@ -83,11 +83,11 @@ PRBM double contact_error(Simulation *sim, double h) {
         double depth = greater(greater(fabs(dot(n, row, change)), speed * h),
                                INDENTATION_MIN_RTOL * system->length);
         double squares[2];
-        int give = system->mechanism->first_extra + stop_of(sim, i)->extra + EXTRA_GIVE;
+        int recoil = system->mechanism->first_extra + stop_of(sim, i)->extra + EXTRA_RECOIL;
         for (int part = 0; part < 2; part++) {
             const double *error = part == 0 ? stepping->error : stepping->coarse_error;
-            double d = (dot(n, row, error) + error[give]) / depth;
-            double rate = (dot(n, row, error + n) + error[give + 1]) / speed;
+            double d = (dot(n, row, error) + error[recoil]) / depth;
+            double rate = (dot(n, row, error + n) + error[recoil + 1]) / speed;
             squares[part] = d * d + rate * rate;
         }
         double size = square_root(squares[0] + squares[1]);

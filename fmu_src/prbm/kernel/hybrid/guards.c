@@ -169,8 +169,8 @@ static double gap_reach(const Simulation *sim, int stop, const Complex *e, const
     const Complex *row = system->gaps + stop * system->d;
     const Wall *wall = &sim->state.walls[stop];
     const double *extra = extra_states(sim, sim->state.arc.y);
-    double given = give_of(&sim->equations, stop, extra, EXTRA_GIVE_RATE);
-    double reach = (fabs(wall->rate) + fabs(given)) * sim->state.arc.h +
+    double recoil = recoil_of(&sim->equations, stop, extra, EXTRA_RECOIL_RATE);
+    double reach = (fabs(wall->rate) + fabs(recoil)) * sim->state.arc.h +
                    2.0 * fabs(wall->offset) + fabs(wall->excess) * wall->span;
     for (int j = 0; j < system->d; j++) {
         reach += (fabs(row[j].re) + fabs(row[j].im)) * arms[j];
@@ -208,7 +208,7 @@ PRBM bool separation_near(Simulation *sim) {
     const Complex *e = sim->stepping.reference.e;
     double start = sim->state.arc.start, *arms = sim->stepping.reach;
     const double *extra = extra_states(sim, sim->state.arc.y);
-    if (eq->pressed_count == 0 || eq->walls_give) {
+    if (eq->pressed_count == 0 || eq->walls_recoil) {
         return eq->pressed_count > 0;
     }
     bound_arms(sim, arms);

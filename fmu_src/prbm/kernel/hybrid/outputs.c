@@ -56,8 +56,8 @@ static void output_stops(const Simulation *sim, double *out) {
         values[STOP_GAP] = value + wall.x;
         values[STOP_GAP_RATE] = rate + wall.v;
         if (stop->compliant) {
-            values[STOP_GAP] += extra[stop->extra + EXTRA_GIVE];
-            values[STOP_GAP_RATE] += extra[stop->extra + EXTRA_GIVE_RATE];
+            values[STOP_GAP] += extra[stop->extra + EXTRA_RECOIL];
+            values[STOP_GAP_RATE] += extra[stop->extra + EXTRA_RECOIL_RATE];
         }
         values[STOP_POINT_DISPLACEMENT] = -value - field_value(sim, stop->position);
         values[STOP_POINT_VELOCITY] = -rate;
