@@ -15,11 +15,12 @@ from ..base.errors import MechanismError, ParameterError
 from ..base.names import unknown
 from ..base.tolerances import WALL_MOBILITY_MAX
 from ..mechanics.inputs import MOBILITY, input_units
+from ..mechanics.positions import given_at_start
 from ..mechanics.stress import stressed
 from ..mechanism.description import Mechanism
 from ..mechanism.expressions import affine
 from ..mechanism.parameters import Parameter
-from ..mechanism.parts import GROUND, Force, Guide, Spring, Stop
+from ..mechanism.parts import GROUND, POSITIONS, Force, Guide, Spring, Stop
 from .units import QUANTITIES, Quantity
 
 Number = float | int | bool
@@ -123,12 +124,14 @@ class Scales:
 
 
 def scales(mechanism: Mechanism, sample: Mapping[str, Number]) -> Scales:
-    """Return typical magnitudes, from the release, the masses and the fundamental frequency."""
+    """Return typical magnitudes, from the start, the masses and the fundamental frequency."""
     values = mechanism.values()
     span = extent(mechanism) or 1.0
     release = mechanism.release
     amount = abs(_quantity(getattr(release, release.start), f"release.{release.start}", values))
-    x = (span * min(amount, 1.0) if release.turns else amount) or span / 10
+    given = given_at_start(mechanism, values, POSITIONS)
+    amounts = [(amount, release.turns), *((abs(one.value), one.turns) for one in given)]
+    x = max(span * min(x, 1.0) if turns else x for x, turns in amounts) or span / 10
     omega = 2 * math.pi * float(sample["mode.frequency"]) or 1.0
     mass = sum(_quantity(body.mass, f"{body.name}.mass", values) for body in mechanism.bodies)
     magnitudes = {

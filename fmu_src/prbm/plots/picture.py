@@ -31,11 +31,12 @@ from ..drawing.style import (
 from ..mechanics.arrays import Complex
 from ..mechanics.assembly import assemble
 from ..mechanics.modal import Modes, modes
+from ..mechanics.positions import given_at_start
 from ..mechanics.start import start_shape
 from ..mechanics.statics import equilibrium
 from ..mechanics.system import FIXED, unit
 from ..mechanism.description import Mechanism
-from ..mechanism.parts import value
+from ..mechanism.parts import POSITIONS, value
 from .scene import quiet
 
 MODE_AMPLITUDE = 0.12  # Largest displacement in the picture of a mode, as a share of the size.
@@ -325,8 +326,11 @@ class Drawing:
             z = shapes.body(name, E)
             if self.apart(z, shapes.body(name, shapes.straight)):
                 self.line(np.append(z, z[0]), START, 1.0, 3.6, "--")
+        given = given_at_start(system.mechanism, system.values, POSITIONS)
         name = f"release.{system.mechanism.release.start}"
         label = f"dashed: released shape, {name} = {self.start()}"
+        if given:
+            label = f"dashed: shape at the start, {', '.join(one.text for one in given)}"
         self.axes.set_xlabel(f"{self.axes.get_xlabel()}\n{label}", fontsize=8)
         gaps = system.gap_rows.values(E)
         for i, stop in enumerate(system.mechanism.stops):
