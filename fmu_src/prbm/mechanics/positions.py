@@ -208,18 +208,26 @@ def _frame(system: System, one: Given) -> BodyFrame:
 
 def _independent(system: System, e: Complex, rows: Sequence[Real]) -> list[int]:
     """Return the rows, gradients (n,) each, that no constraint and no earlier row determines."""
-    M, chosen = system.mass_matrix(e), []
-    held, n = system.loop_rows.jacobian(e), system.n
+    M, chosen, held = system.mass_matrix(e), [], system.loop_rows.jacobian(e)
     for k, row in enumerate(rows):
-        mobility = []
-        for kept in (held[:0], held):
-            right = np.concatenate([row, np.zeros(len(kept))])
-            x = constraints.solve(constraints.saddle(M, kept, kept), right, n, system.length)
-            mobility.append(float(row @ x[:n]))
-        if mobility[1] > START_DEPENDENT_RTOL * mobility[0]:
+        freely, left = (_mobility(system, M, kept, row) for kept in (held[:0], held))
+        if left > START_DEPENDENT_RTOL * freely:
             held = np.vstack([held, row])
             chosen.append(k)
     return chosen
+
+
+def _mobility(system: System, M: Real, held: Real, row: Real) -> float:
+    """Return the motion along a row by a unit impulse along it, with other rows held [1/kg].
+
+    It is zero where the held rows determine every motion.
+    """
+    n, right = system.n, np.concatenate([row, np.zeros(len(held))])
+    try:
+        x = constraints.solve(constraints.saddle(M, held, held), right, n, system.length)
+    except SimulationError:
+        return 0.0
+    return float(row @ x[:n])
 
 
 def _gradient(system: System, one: Given, e: Complex) -> Real:
