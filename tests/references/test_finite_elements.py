@@ -1,10 +1,12 @@
 """Finite elements compared with beam theory, conservation laws and results for the guides."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from free_bodies import pendulum, with_start
 from prbm.base.errors import SimulationError
 from prbm.files.mechanism_file import shipped
 from prbm.hybrid.simulation import Simulation
@@ -339,8 +341,6 @@ def default_run():
 @pytest.mark.slow
 def test_bounces_of_the_default_run_match_those_of_a_chain_of_links(default_run):
     """Times and closing speeds of the first five impacts equal those of a chain of 12 links."""
-    from dataclasses import replace
-
     base = mechanism("PRBDM2R")
     chain = replace(
         base, flexure_types=(replace(base.flexure_types[0], model="nR", n=12, coefficients={}),)
@@ -427,3 +427,18 @@ def test_a_transient_ends_at_its_stop_time(end):
     q, v = fe.release()
     t, *_ = interrupted._fly(end * (1 - 1e-13), q, v, end)  # Only round-off is left.
     assert t == pytest.approx(end, rel=1e-12)
+
+
+@pytest.mark.parametrize("given", [{"stiffness": 0.3}, {"damping": 0.1}])
+def test_torsion_at_joints_is_rejected_by_name(given):
+    swing = pendulum(0.0)
+    with pytest.raises(FiniteElementError, match=rf"pin\.{next(iter(given))} is not 0"):
+        FiniteElements(replace(swing, joints=(replace(swing.joints[0], **given),)))
+
+
+def test_velocities_of_bodies_at_the_start_are_rejected_by_name():
+    model = with_start(mechanism("PRBDM2R"), "shuttle", start_vx=0.3)
+    with pytest.raises(
+        FiniteElementError, match=r"start from the release: remove shuttle\.start_vx"
+    ):
+        FiniteElements(model, elements=2).release()
