@@ -8,12 +8,13 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 
 from free_bodies import ball, double_pendulum, pendulum, with_start
-from guides import CRANK, ROD, incline, slider_crank
+from guides import CRANK, ROD, incline, slider_crank, trammel
 from moved_drawings import moved
 from prbm.base.errors import EquilibriumError, ParameterError
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanism.parts import Release, Stop
 from prbm.runs.engine import simulation as started
+from springs import four_bar
 from support import GUIDES, energy_balance, mechanism
 
 G = 9.81
@@ -251,3 +252,32 @@ def test_a_wall_that_is_penetrated_at_the_start_is_rejected(engine):
     model = replace(with_start(pendulum(0.0), "bob", start_angle=0.8), stops=(wall,))
     with pytest.raises(ParameterError, match=r"the wall wall is penetrated by 0\.115207 m at"):
         started(model, {}, engine=engine)
+
+
+@engines
+@pytest.mark.parametrize(
+    "model",
+    [
+        slider_crank(),
+        four_bar(stiffness=0.04, free_angle=0.5, damping=1e-4),
+        double_pendulum({"start_angle": 1.0}, {"start_angle": 2.0}),
+        trammel(velocity=0.5),
+    ],
+    ids=lambda model: model.name,
+)
+def test_a_motion_that_is_started_from_all_its_values_continues(engine, model):
+    """More values than degrees of freedom, which agree within round-off."""
+    sim = started(model, {}, engine=engine, tolerance=1e-11)
+    sim.advance(0.1)
+    out, again = sim.outputs(), replace(model, release=Release(model.release.body))
+    for body in model.bodies:
+        names = ("angle", "x", "y", "omega", "vx", "vy")
+        start = {f"start_{name}": out[f"{body.name}.{name}"] for name in names}
+        again = with_start(again, body.name, **start)
+    new = started(again, {}, engine=engine, tolerance=1e-11)
+    for t in (0.0, 0.15):
+        sim.advance(0.1 + t)
+        new.advance(t)
+        expected, found = sim.outputs(), new.outputs()
+        for name in (f"{b.name}.{key}" for b in model.bodies for key in ("x", "angle", "vy")):
+            assert found[name] == pytest.approx(expected[name], abs=1e-6), (name, t)
