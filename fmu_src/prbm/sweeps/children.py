@@ -18,7 +18,6 @@ import threading
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
-from itertools import chain
 from typing import Any, BinaryIO, Protocol
 
 from ..base.threads import THREAD_LIMITS
@@ -34,11 +33,8 @@ class Unusable(Exception):
     """The simulation cannot run here with any parameters; the message gives the reason."""
 
 
-class Task(Protocol):
-    """A simulation that a process can run for different parameters; it can be pickled."""
-
-    def opened(self) -> Callable[[Row], Outcome]:
-        """Return the function that runs once; an exception if there is none."""
+Task = Callable[[], Callable[[Row], Outcome]]
+"""Called once in a process; returns the function that simulates.  It can be pickled."""
 
 
 class Job(Protocol):
@@ -52,9 +48,9 @@ class Job(Protocol):
 
 
 def main() -> None:
-    """Run the batches; end this process at once, while its other thread waits for more."""
+    """Run the rows; end this process at once, while its other thread waits for more."""
     try:
-        _run_batches()
+        _run_rows()
     except BaseException:
         traceback.print_exc()
         sys.stderr.flush()
@@ -62,37 +58,37 @@ def main() -> None:
     os._exit(0)
 
 
-def _run_batches() -> None:
-    """Run the batches read from standard input until it closes; write one outcome per run."""
+def _run_rows() -> None:
+    """Run the rows read from standard input until it closes; write the outcome of each."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     replies = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # Output of an FMU must not mix with the replies.
-    batches: queue.Queue[Any] = queue.Queue()
-    threading.Thread(target=_read, args=(sys.stdin.buffer, batches), daemon=True).start()
+    received: queue.Queue[Any] = queue.Queue()
+    threading.Thread(target=_read, args=(sys.stdin.buffer, received), daemon=True).start()
     try:
-        run = batches.get().opened()
+        run = received.get()()
     except Exception as error:
-        _reply(replies, f"{error}" or type(error).__name__)
+        _send(replies, f"{error}" or type(error).__name__)
         return
-    _reply(replies, "")
-    for values in chain.from_iterable(iter(batches.get, None)):
-        outcome = run(values)
-        _reply(replies, outcome)
+    _send(replies, "")
+    while True:
+        outcome = run(received.get())
+        _send(replies, outcome)
         if outcome.spent:
-            os._exit(0)  # An FMU may hang after an error when its library is unloaded.
+            return  # An FMU may hang after an error when its library is unloaded.
 
 
-def _read(stream: BinaryIO, batches: "queue.Queue[Any]") -> None:
-    """Queue the batches; end this process at once when its parent ends, even during a run."""
+def _read(stream: BinaryIO, received: "queue.Queue[Any]") -> None:
+    """Queue the rows; end this process at once when its parent ends, even during a run."""
     try:
         while True:
-            batches.put(pickle.load(stream))
+            received.put(pickle.load(stream))
     except (EOFError, OSError, pickle.UnpicklingError):
         os._exit(0)
 
 
-def _reply(stream: BinaryIO, reply: object) -> None:
-    pickle.dump(reply, stream)
+def _send(stream: BinaryIO, message: object) -> None:
+    pickle.dump(message, stream)
     stream.flush()
 
 
@@ -126,10 +122,8 @@ class Child:
 
     def send(self, message: object) -> None:
         """Send a message to the process."""
-        assert self.process.stdin is not None
         with contextlib.suppress(OSError):  # receive() reports that the process has ended.
-            pickle.dump(message, self.process.stdin)
-            self.process.stdin.flush()
+            _send(self.process.stdin, message)  # type: ignore[arg-type]
 
     def receive(self, timeout: float | None) -> Any:
         """Return a reply; None if the process ended or was killed after ``timeout`` [s]."""
@@ -207,45 +201,31 @@ class Processes:
         self.lock, self.stack, self.closed = threading.Lock(), ExitStack(), False
         self.task = self.stack.enter_context(job.placed())
 
-    def run(self, rows: Sequence[Row]) -> list[Outcome]:
-        """Simulate once for each row.
+    def run(self, row: Row) -> Outcome:
+        """Simulate once.
 
         Raises
         ------
         Unusable
             If the simulation cannot be opened, or the study was stopped.
         """
-        outcomes: list[Outcome] = []
-        attempts = 0
-        while len(outcomes) < len(rows):
+        for _ in range(self.retries + 1):
             child = self._child()
-            child.send(rows[len(outcomes) :])
-            spent = False
-            while not spent and len(outcomes) < len(rows):
-                outcome = child.receive(self.timeout)
-                if outcome is None:
-                    break
-                outcomes.append(outcome)
-                attempts, spent = 0, outcome.spent
-            if len(outcomes) == len(rows) and not spent:
+            child.send(row)
+            outcome: Outcome | None = child.receive(self.timeout)
+            if outcome is not None and not outcome.spent:
                 self._keep(child)
-                break
+                return outcome
             late, end = child.late, self._drop(child)
             if self.closed:
                 raise Unusable(STOPPED)
-            if spent:
-                continue
-            attempts += 1
+            if outcome is not None:
+                return outcome
             if late:
                 limit = self.timeout or math.inf
-                outcomes.append(Outcome(TIMEOUT, f"not finished after {limit:g} s", limit))
-                attempts = 0
-            elif attempts > self.retries:
-                times = f", in each of {attempts} attempts" if attempts > 1 else ""
-                message = f"the process of the simulation crashed: {end}{times}"
-                outcomes.append(Outcome(CRASHED, message))
-                attempts = 0
-        return outcomes
+                return Outcome(TIMEOUT, f"not finished after {limit:g} s", limit)
+        times = f", in each of {self.retries + 1} attempts" if self.retries else ""
+        return Outcome(CRASHED, f"the process of the simulation crashed: {end}{times}")
 
     def _child(self) -> Child:
         """Return an idle process, or a new one."""
@@ -326,7 +306,8 @@ def run_batch(study: str, rows: Sequence[Row], given: tuple[Any, ...] | None) ->
                 _processes[study] = Processes(*given)
             except Exception as error:  # FMPy raises plain exceptions.
                 raise Unusable(f"a worker cannot unpack the FMU ({error})") from None
-    return _processes[study].run(rows)
+    run = _processes[study].run
+    return [run(row) for row in rows]
 
 
 def release(study: str) -> None:

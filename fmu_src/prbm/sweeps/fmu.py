@@ -10,7 +10,8 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from ctypes import c_uint
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import pairwise
 from math import isclose
 from pathlib import Path
@@ -47,7 +48,7 @@ LOGGED_MAX = 100  # More messages in a run switch logging off for the next runs.
 
 @dataclass(frozen=True)
 class Job:
-    """Settings common to all runs of a study.
+    """Runs of an FMU, a :class:`prbm.sweeps.children.Job`.
 
     Parameters
     ----------
@@ -63,6 +64,8 @@ class Job:
         Texts and units of inputs over time by name.  Names in braces are columns of the table.
     reuse : bool
         Reset the instance between runs if its reset works (default: True).
+    content : bytes
+        The FMU.
     """
 
     start: float
@@ -73,51 +76,22 @@ class Job:
     outputs: tuple[Output, ...]
     inputs: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     reuse: bool = True
-
-
-@dataclass(frozen=True)
-class PackedFmu:
-    """An FMU that can be sent to other machines, a :class:`~prbm.sweeps.children.Job`.
-
-    Parameters
-    ----------
-    content : bytes
-        The FMU.
-    job : Job
-        Settings of the runs.
-    """
-
-    content: bytes
-    job: Job
+    content: bytes = field(default=b"", repr=False)
 
     @contextmanager
-    def placed(self) -> "Iterator[UnpackedFmu]":
-        """Unpack the FMU."""
+    def placed(self) -> "Iterator[Callable[[], Callable[[Mapping[str, float]], Outcome]]]":
+        """Unpack the FMU; yield the function that loads it and returns the one that runs it."""
         from ..fmu.unpack import unpacked  # imported here: the processes do not need it
 
         with unpacked(io.BytesIO(self.content)) as folder:
-            yield UnpackedFmu(folder, self.job)
+            yield partial(_loaded, folder, replace(self, content=b""))
 
 
-@dataclass(frozen=True)
-class UnpackedFmu:
-    """An FMU in a folder, a :class:`~prbm.sweeps.children.Task`."""
-
-    folder: Path
-    job: Job
-
-    def opened(self) -> Callable[[Mapping[str, float]], Outcome]:
-        """Load the FMU; return the function that runs it.
-
-        Raises
-        ------
-        RuntimeError
-            If it cannot be loaded or instantiated.
-        """
-        try:
-            return Runner(self.folder, self.job).run
-        except Exception as error:  # FMPy raises plain exceptions.
-            raise RuntimeError(f"the FMU cannot be loaded: {error}") from None
+def _loaded(folder: Path, job: Job) -> Callable[[Mapping[str, float]], Outcome]:
+    try:
+        return Runner(folder, job).run
+    except Exception as error:  # FMPy raises plain exceptions.
+        raise RuntimeError(f"the FMU cannot be loaded: {error}") from None
 
 
 def communication_points(start: float, stop: float, step: float) -> list[float]:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from time import perf_counter
 from typing import Any
 
@@ -17,7 +18,7 @@ from .outputs import FAILED, OK, Outcome, Output, evaluate
 
 @dataclass(frozen=True)
 class MechanismJob:
-    """Simulations of a mechanism in a process, a :class:`~prbm.sweeps.children.Job` and its task.
+    """Simulations of a mechanism, a :class:`prbm.sweeps.children.Job`.
 
     Parameters
     ----------
@@ -50,13 +51,9 @@ class MechanismJob:
     names: tuple[str, ...]
 
     @contextmanager
-    def placed(self) -> "Iterator[MechanismJob]":
-        """Do nothing: the job has all that it needs."""
-        yield self
-
-    def opened(self) -> Callable[[Mapping[str, float]], Outcome]:
-        """Return the function that simulates."""
-        return self.run
+    def placed(self) -> Iterator[Callable[[], Callable[[Mapping[str, float]], Outcome]]]:
+        """Yield a function that returns :meth:`run`: the job has all that it needs."""
+        yield partial(getattr, self, "run")
 
     def run(self, values: Mapping[str, float]) -> Outcome:
         """Simulate once; errors of the simulation are returned as outcomes."""

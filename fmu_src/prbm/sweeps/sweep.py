@@ -29,7 +29,7 @@ from ..base.progress import Progress
 from ..runs.inputs import filled, placeholders, read_signal
 from ..runs.run import ROWS_MAX
 from .design import drawn
-from .fmu import Job, PackedFmu
+from .fmu import Job
 from .journal import Journal, Point, compare
 from .outputs import GOOD, Outcome, Output, parse_output
 from .runner import Runner, StudyError, check_limits, pool
@@ -151,8 +151,9 @@ def sweep(
         with pool(workers, len(rest), executor=scheduler) as where:
             # The check of a reset doubles the duration of a run, which may exceed a timeout.
             reuse = timeout is None and len(rest) >= RESET_RUNS_MIN * where.threads()
-            fmu_job = PackedFmu(plan.fmu, replace(plan.job, reuse=reuse))
-            with Runner(fmu_job, plan.parameters, journal, where, retries, timeout) as runner:
+            with Runner(
+                replace(plan.job, reuse=reuse), plan.parameters, journal, where, retries, timeout
+            ) as runner:
                 found = _frame(plan, runner.outcomes(plan.points, progress))
         write(out, _parquet(found, journal.settings))
         journal.remove()
@@ -204,7 +205,6 @@ class Plan:
     of each run.
     """
 
-    fmu: bytes
     job: Job
     settings: Mapping[str, Any]
     parameters: tuple[str, ...]
@@ -257,7 +257,7 @@ def _make_plan(
     times = _times(description, stop_time, step, tolerance)
     first: dict[str, float] = frame.iloc[0].to_dict()  # type: ignore[assignment]
     driven = _inputs(inputs, within, description, first, {*frame, *fixed})
-    job = Job(**times, values=fixed, outputs=kept, inputs=driven)
+    job = Job(**times, values=fixed, outputs=kept, inputs=driven, content=data)
     settings = {
         "FMU": hashlib.sha256(data).hexdigest(),
         "model": description.modelName,
@@ -271,7 +271,7 @@ def _make_plan(
         "tolerance": job.tolerance,
     }
     points = [tuple(row) for row in frame.to_numpy(float).tolist()]
-    return Plan(data, job, settings, tuple(frame.columns), points)
+    return Plan(job, settings, tuple(frame.columns), points)
 
 
 def _inputs(
