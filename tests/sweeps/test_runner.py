@@ -7,12 +7,14 @@ import pytest
 
 from prbm.sweeps.journal import Journal
 from prbm.sweeps.outputs import OK, Outcome
-from prbm.sweeps.runner import Runner, pool
+from prbm.sweeps.runner import Runner
 from prbm.sweeps.study import study
 
 
 class Endless:
     """A simulation that ends for the parameter 0 only."""
+
+    parallel = True
 
     def run(self, row):
         while row["a"]:
@@ -29,10 +31,9 @@ def test_an_error_ends_simulations_in_threads():
             raise InterruptedError
 
     def compute():
-        with pool(2, 2, here=True, parallel=True) as where:
-            assert where.here
-            with Runner(Endless(), ["a"], journal, where) as runner:
-                runner.outcomes([(0.0,), (1.0,)], stop)
+        with Runner(Endless(), ["a"], journal, 2, workers=2) as runner:
+            assert runner.run is not None
+            runner.outcomes([(0.0,), (1.0,)], stop)
 
     with pytest.raises(InterruptedError):
         compute()

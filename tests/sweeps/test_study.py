@@ -21,6 +21,7 @@ from prbm.sweeps import mechanism as simulations
 from prbm.sweeps import runner
 from prbm.sweeps import study as module
 from prbm.sweeps.design import grid
+from prbm.sweeps.journal import Journal
 from prbm.sweeps.optimum import FLAT_RTOL, Constraint, Optimum, Samples, Search
 from prbm.sweeps.study import Study, study
 from support import ROOT
@@ -411,8 +412,9 @@ def test_without_a_kernel_the_processes_are_given_the_python_engine(mechanisms, 
 def test_the_number_of_processes_has_a_limit(monkeypatch):
     monkeypatch.setattr(base_processes, "PROCESSES_MAX", 61)
     for workers, processes in ((100, 61), (3, 3)):
-        with runner.pool(workers, 70) as where:
-            assert where.threads() == processes
+        journal = Journal(None, {}, [], [])
+        with runner.Runner(None, [], journal, 70, workers=workers, timeout=1.0) as begun:
+            assert begun.threads() == processes
 
 
 # --- figures --------------------------------------------------------------------------------------

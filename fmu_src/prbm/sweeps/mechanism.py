@@ -10,6 +10,7 @@ from typing import Any
 from ..analysis.static_shape import equilibrium
 from ..base.errors import PrbmError
 from ..mechanism.description import Mechanism
+from ..runs.engine import PYTHON
 from ..runs.inputs import Source, filled, placeholders
 from ..runs.result import names as column_names
 from ..runs.run import sampled, simulate
@@ -49,6 +50,11 @@ class MechanismJob:
     tolerance: float | None
     engine: str | None
     names: tuple[str, ...]
+
+    @property
+    def parallel(self) -> bool:
+        """Whether the engine lets other threads work meanwhile, as the kernel does."""
+        return self.engine != PYTHON
 
     @contextmanager
     def placed(self) -> Iterator[Callable[[], Callable[[Mapping[str, float]], Outcome]]]:

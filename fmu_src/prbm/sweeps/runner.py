@@ -23,8 +23,7 @@ from concurrent.futures import (
     ThreadPoolExecutor,
     wait,
 )
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from contextlib import ExitStack, contextmanager, suppress
 from statistics import median
 from typing import Any, Self
 
@@ -51,102 +50,13 @@ class Stopped(BaseException):
     """Raised in a thread that simulates when the study ends before the simulation."""
 
 
-@dataclass
-class Pool:
-    """An executor and the number of simulations that it runs at a time.
-
-    Parameters
-    ----------
-    executor : Executor or None
-        None: this thread runs the simulations.
-    threads : callable
-        Returns the present number of parallel runs.
-    here : bool
-        Whether the threads of the executor simulate themselves, in this process.
-    closing : callable
-        Called with the name of the study at its end.
-    """
-
-    executor: Executor | None
-    threads: Callable[[], int]
-    here: bool = False
-    closing: Callable[[str], object] = release
-
-
-def check_limits(workers: int | None, timeout: float | None, retries: int = 0) -> None:
-    """Reject limits of a study that are not positive.
-
-    Raises
-    ------
-    ParameterError
-        If the number of workers or the longest duration of a run [s] is not positive, or the number
-        of repetitions is negative.
-    """
+def _check_limits(workers: int | None, timeout: float | None, retries: int) -> None:
     if workers is not None and workers < 1:
         raise ParameterError(f"workers = {workers} must be 1 or more")
     if timeout is not None and not timeout > 0.0:
         raise ParameterError(f"timeout = {timeout:g} s must be positive")
     if retries < 0:
         raise ParameterError(f"retries = {retries} must be 0 or more")
-
-
-@contextmanager
-def pool(
-    workers: int | None,
-    runs: int,
-    *,
-    here: bool = False,
-    parallel: bool = False,
-    executor: Executor | str | None = None,
-) -> Iterator[Pool]:
-    """Yield where the simulations of a study run.
-
-    Parameters
-    ----------
-    workers : int or None
-        Number of parallel runs; None: one per core, or those of the executor.
-    runs : int
-        Number of runs.
-    here : bool
-        The simulations may run in this process, where they cannot be ended: one at a time,
-    parallel : bool
-        or in parallel, since they release the lock of the interpreter.
-    executor : Executor, str or None
-        A ``concurrent.futures`` executor, or the address of a Dask scheduler.  None: threads of
-        this process, each with a process that simulates.
-
-    Raises
-    ------
-    StudyError
-        If the scheduler does not respond or has no workers.
-    """
-    if isinstance(executor, str):
-        with _client(executor) as client:
-            yield Pool(
-                client.get_executor(pure=False),
-                lambda: max(1, sum(client.nthreads().values())),
-                closing=lambda study: client.run(release, study),
-            )
-        return
-    if executor is not None:
-        known: Any = executor
-        client = getattr(known, "_client", None)  # Of Dask's ClientExecutor.
-        if workers is None and client is not None:
-            yield Pool(executor, lambda: max(1, sum(client.nthreads().values())),
-                       closing=lambda study: client.run(release, study))  # fmt: skip
-        else:
-            count = workers or getattr(known, "_max_workers", None) or process_count(runs)
-            yield Pool(executor, lambda: count)
-        return
-    count = process_count(max(runs, 1), workers)
-    if here and count == 1:
-        yield Pool(None, lambda: 1)
-        return
-    threads = ThreadPoolExecutor(count)
-    try:
-        yield Pool(threads, lambda: count, here and parallel)
-    finally:
-        threads.shutdown(cancel_futures=True)
 
 
 @contextmanager
@@ -173,7 +83,6 @@ def _client(address: str) -> Iterator[Any]:
         yield client
 
 
-@dataclass
 class Runner:
     """Computes rows and keeps their outcomes in a journal.
 
@@ -183,28 +92,75 @@ class Runner:
     Parameters
     ----------
     job : Job
-        The simulation; ``run`` of it is called in this process if the pool has no executor.
+        The simulation.  If it has ``run``, rows may be computed in this process, where they cannot
+        be ended: in this thread for one worker, in several ones if it has ``parallel``.
     parameters : sequence of str
         Names of the numbers of a point.
     journal : Journal
         The completed rows.
-    pool : Pool
-        Where the simulations run.
+    runs : int
+        Expected number of rows, which limits that of the workers.
+    workers : int or None
+        Number of parallel runs; None: one per core, or those of the executor.
+    executor : Executor, str or None
+        A ``concurrent.futures`` executor, or the address of a Dask scheduler.  None: threads of
+        this process.
     retries : int
         Number of repetitions of a run whose process crashed.
     timeout : float or None
-        Longest duration of a run [s]; None: no limit.
+        Longest duration of a run [s]; None: no limit.  With a limit, other processes simulate.
+
+    Raises
+    ------
+    ParameterError
+        If the number of workers or the longest duration of a run [s] is not positive, or the number
+        of repetitions is negative.
+    StudyError
+        If the scheduler does not respond or has no workers.
     """
 
-    job: Job
-    parameters: Sequence[str]
-    journal: Journal
-    pool: Pool
-    retries: int = 1
-    timeout: float | None = None
-    study: str = field(default_factory=lambda: uuid.uuid4().hex)
-    stopped: bool = False
-    busy: set[int] = field(default_factory=set)  # Threads that simulate themselves.
+    def __init__(
+        self,
+        job: Job,
+        parameters: Sequence[str],
+        journal: Journal,
+        runs: int,
+        *,
+        workers: int | None = None,
+        executor: Executor | str | None = None,
+        retries: int = 1,
+        timeout: float | None = None,
+    ) -> None:
+        _check_limits(workers, timeout, retries)
+        self.job, self.parameters, self.journal = job, parameters, journal
+        self.retries, self.timeout = retries, timeout
+        self.study, self.stack, self.stopped = uuid.uuid4().hex, ExitStack(), False
+        self.run: Callable[[Row], Outcome] | None = None  # If threads simulate themselves.
+        self.busy: set[int] = set()  # These threads.
+        self.closing: Callable[[str], object] = release
+        count = process_count(max(runs, 1), workers)
+        self.executor: Executor | None = None
+        if isinstance(executor, str):
+            self.executor = self.stack.enter_context(_client(executor)).get_executor(pure=False)
+        elif executor is not None:
+            self.executor = executor
+            count = workers or getattr(executor, "_max_workers", None) or count
+        else:
+            if timeout is None and (count == 1 or getattr(job, "parallel", False)):
+                self.run = getattr(job, "run", None)
+            if count > 1 or self.run is None:
+                self.executor = threads = ThreadPoolExecutor(count)
+                self.stack.callback(threads.shutdown, cancel_futures=True)
+        self.threads: Callable[[], int] = lambda: count  # The present number of parallel runs.
+        client: Any = getattr(self.executor, "_client", None)  # Of Dask's ClientExecutor.
+        if client is not None:
+            self.closing = lambda study: client.run(release, study)
+            self.threads = lambda: workers or max(1, sum(client.nthreads().values()))
+        self.begin = time.monotonic()
+        self.recent: deque[float] = deque(maxlen=RECENT_RUNS)
+        self.running: dict[Future[Any], list[Point]] = {}
+        self.crashes: dict[Point, int] = {}  # Crashes of workers that ran a point.
+        self.suspects: deque[Point] = deque()
 
     def outcomes(self, points: Sequence[Point], progress: Progress | None = None) -> list[Outcome]:
         """Return the outcomes of points in their order; only those not in the journal are computed.
@@ -235,46 +191,29 @@ class Runner:
                 ctypes.c_ulong(thread), ctypes.py_object(Stopped)
             )
         with suppress(OSError, CancelledError):  # The scheduler may have ended.
-            self.pool.closing(self.study)
+            self.closing(self.study)
+        self.stack.close()
         if kind is KeyboardInterrupt and self.journal.kept:
             raise KeyboardInterrupt(f"interrupted; {self.journal.kept}") from None
 
-    def _row(self, point: Point) -> Row:
-        return dict(zip(self.parameters, point, strict=True))
-
-    def run(self, rows: Sequence[Row]) -> list[Outcome]:
+    def _run_here(self, rows: Sequence[Row]) -> list[Outcome]:
         """Simulate in this thread, until the study ends."""
-        run: Callable[[Row], Outcome] = self.job.run  # type: ignore[attr-defined]
+        assert self.run is not None
         thread = threading.get_ident()
         self.busy.add(thread)
         try:
-            return [run(row) for row in rows if not self.stopped]
+            return [self.run(row) for row in rows if not self.stopped]
         except Stopped:
             return []
         finally:
             self.busy.discard(thread)
 
     def _computed(self, points: Sequence[Point]) -> Iterator[tuple[Point, Outcome]]:
-        if self.pool.executor is None:
-            for point in points:
-                yield point, self.run([self._row(point)])[0]
-        elif points:
-            yield from _Batches(self, self.pool.executor).computed(points)
-
-
-class _Batches:
-    """Sends batches of points to an executor."""
-
-    def __init__(self, runner: Runner, executor: Executor) -> None:
-        self.runner, self.executor = runner, executor
-        self.begin = time.monotonic()
-        self.recent: deque[float] = deque(maxlen=RECENT_RUNS)
-        self.running: dict[Future[Any], list[Point]] = {}
-        self.crashes: dict[Point, int] = {}  # Crashes of workers that ran a point.
-        self.suspects: deque[Point] = deque()
-
-    def computed(self, points: Sequence[Point]) -> Iterator[tuple[Point, Outcome]]:
         """Yield points with their outcomes as they come."""
+        if self.executor is None:
+            for point in points:
+                yield point, self._run_here(self._rows([point]))[0]
+            return
         rest = deque(points)
         self._submit(rest)
         while self.running:
@@ -288,25 +227,32 @@ class _Batches:
                 self._send([self.suspects.popleft()])
 
     def _submit(self, rest: deque[Point]) -> None:
-        """Submit batches until there are :data:`BATCHES_PER_THREAD` per thread."""
-        threads = self.runner.pool.threads()
-        while rest and len(self.running) < BATCHES_PER_THREAD * threads:
-            self._send([rest.popleft() for _ in range(self._size(len(rest), threads))])
+        """Submit batches until there are :data:`BATCHES_PER_THREAD` per thread.
 
-    def _size(self, rest: int, threads: int) -> int:
-        """Return the number of points of the next batch, small at the start and at the end."""
-        if not self.recent:
-            return 1
-        seconds = min(max(BATCH_SHARE * (time.monotonic() - self.begin), BATCH_MIN), BATCH_MAX)
-        fair = math.ceil(rest / (BATCHES_PER_THREAD * threads))
-        return max(1, min(int(seconds / median(self.recent)), fair))
+        They are small at the start and at the end.
+        """
+        threads = self.threads()
+        while rest and len(self.running) < BATCHES_PER_THREAD * threads:
+            size = 1
+            if self.recent:
+                elapsed = time.monotonic() - self.begin
+                seconds = min(max(BATCH_SHARE * elapsed, BATCH_MIN), BATCH_MAX)
+                fair = math.ceil(len(rest) / (BATCHES_PER_THREAD * threads))
+                size = max(1, min(int(seconds / median(self.recent)), fair))
+            self._send([rest.popleft() for _ in range(size)])
+
+    def _rows(self, batch: Sequence[Point]) -> list[Row]:
+        return [dict(zip(self.parameters, point, strict=True)) for point in batch]
 
     def _send(self, batch: list[Point], given: bool = False) -> None:
-        runner = self.runner
-        job = (runner.job, runner.retries, runner.timeout) if given else None
-        rows = [runner._row(point) for point in batch]
-        call = (runner.run, rows) if runner.pool.here else (run_batch, runner.study, rows, job)
-        self.running[self.executor.submit(*call)] = batch
+        assert self.executor is not None
+        rows = self._rows(batch)
+        if self.run is not None:
+            future = self.executor.submit(self._run_here, rows)
+        else:
+            job = (self.job, self.retries, self.timeout) if given else None
+            future = self.executor.submit(run_batch, self.study, rows, job)
+        self.running[future] = batch
 
     def _outcomes(self, future: "Future[Any]", batch: list[Point]) -> list[Outcome]:
         """Return the outcomes of a batch; none if it has to be repeated."""
@@ -315,12 +261,12 @@ class _Batches:
         except Unusable as error:
             raise StudyError(f"the simulation cannot run: {error}") from None
         except CancelledError:
-            raise StudyError(f"the cluster has ended; {self.runner.journal.kept}") from None
+            raise StudyError(f"the cluster has ended; {self.journal.kept}") from None
         except Exception as error:
             if type(error).__name__ == "KilledWorker":  # Of Dask, which may not be installed.
                 return self._after_crash(batch)
             if isinstance(error, BrokenExecutor):
-                kept = self.runner.journal.kept
+                kept = self.journal.kept
                 raise StudyError(f"a process of the executor has ended early; {kept}") from None
             if MISSING_MODULE in str(error):
                 raise StudyError(
@@ -341,7 +287,7 @@ class _Batches:
         """
         for point in batch:
             self.crashes[point] = self.crashes.get(point, -1) + 1
-        if self.crashes[batch[0]] > self.runner.retries:
+        if self.crashes[batch[0]] > self.retries:
             return [Outcome(CRASHED, "every worker that ran this row crashed")]
         self.suspects.extend(batch)
         return []

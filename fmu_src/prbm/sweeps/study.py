@@ -53,7 +53,7 @@ from .journal import Journal
 from .mechanism import MechanismJob
 from .optimum import REFINEMENTS_EXPECTED, Constraint, Optimum, Samples, Search
 from .outputs import Outcome, parse_output
-from .runner import Runner, check_limits, pool
+from .runner import Runner
 
 STEPS = 4000  # Communication steps of a simulation, which resolve the vibration after impacts.
 RUNS_MAX = 100_000  # More simulations are a mistake in the number of samples.
@@ -235,22 +235,22 @@ def study(
     plan = _with_spread(plan, tolerances or {})
     if table is not None:
         check_file(Path(table))
-    check_limits(workers, timeout)
-    with pool(
-        workers, len(plan.points), here=timeout is None, parallel=plan.job.engine != PYTHON,
-        executor=executor,
-    ) as where:  # fmt: skip
-        if where.executor is not None:
+    journal = Journal(
+        None if table is None else Path(table), plan.settings, plan.columns, plan.texts
+    )
+    with (
+        Runner(
+            plan.job, plan.columns, journal, len(plan.points), workers=workers, executor=executor,
+            timeout=timeout,
+        ) as runner,
+        journal.opened(overwrite),
+    ):  # fmt: skip
+        if runner.executor is not None:
             _check_sources(plan.job.inputs)
-        journal = Journal(
-            None if table is None else Path(table), plan.settings, plan.columns, plan.texts
-        )
-        with journal.opened(overwrite):
-            with Runner(plan.job, plan.columns, journal, where, timeout=timeout) as runner:
-                found = _run(plan, runner, progress or (lambda fraction: None))
-            if table is not None:
-                write(table, csv_text(*found.table()).encode())
-            journal.remove()
+        found = _run(plan, runner, progress or (lambda fraction: None))
+        if table is not None:
+            write(table, csv_text(*found.table()).encode())
+        journal.remove()
     return found
 
 

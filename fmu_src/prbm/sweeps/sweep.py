@@ -25,6 +25,7 @@ from ..base.archives import UNPACKED_SIZE_MAX, check_unpacked_size
 from ..base.atomic import check_file, write
 from ..base.errors import ParameterError
 from ..base.names import proposal
+from ..base.processes import process_count
 from ..base.progress import Progress
 from ..runs.inputs import filled, placeholders, read_signal
 from ..runs.run import ROWS_MAX
@@ -32,7 +33,7 @@ from .design import drawn
 from .fmu import Job
 from .journal import Journal, Point, compare
 from .outputs import GOOD, Outcome, Output, parse_output
-from .runner import Runner, StudyError, check_limits, pool
+from .runner import Runner, StudyError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -143,18 +144,19 @@ def sweep(
     out = Path(out)
     _check_name(out)
     plan = _make_plan(fmu, table, outputs, values, inputs or {}, stop_time, step, tolerance)
-    check_limits(workers, timeout, retries)
+    # The check of a reset doubles the duration of a run, which may exceed a timeout.
+    many = len(plan.points) >= RESET_RUNS_MIN * process_count(len(plan.points), workers)
+    job = replace(plan.job, reuse=many and timeout is None)
     journal = Journal(out, plan.settings, plan.parameters, plan.outputs)
     journal.known |= _earlier(plan, journal, out, overwrite)
-    with journal.opened(overwrite, retry_failed):
-        rest = [point for point in plan.points if point not in journal.known]
-        with pool(workers, len(rest), executor=scheduler) as where:
-            # The check of a reset doubles the duration of a run, which may exceed a timeout.
-            reuse = timeout is None and len(rest) >= RESET_RUNS_MIN * where.threads()
-            with Runner(
-                replace(plan.job, reuse=reuse), plan.parameters, journal, where, retries, timeout
-            ) as runner:
-                found = _frame(plan, runner.outcomes(plan.points, progress))
+    with (
+        Runner(
+            job, plan.parameters, journal, len(plan.points), workers=workers, executor=scheduler,
+            retries=retries, timeout=timeout,
+        ) as runner,
+        journal.opened(overwrite, retry_failed),
+    ):  # fmt: skip
+        found = _frame(plan, runner.outcomes(plan.points, progress))
         write(out, _parquet(found, journal.settings))
         journal.remove()
     return found
