@@ -15,8 +15,8 @@ from prbm.fmu.parameter_sets import read_parameter_set
 from prbm.runs import inputs, result
 from prbm.runs.inputs import read_signal
 from prbm.runs.result import read_csv
-from prbm.sweeps import journal, sweep, table
-from prbm.sweeps.sweep import read_fmu
+from prbm.sweeps import fmu_model, journal, table
+from prbm.sweeps.fmu_model import read_fmu
 from prbm.systems.components import described
 
 UNPAIRED = "half\ud800.toml"  # No encoding of a file system has half of a pair of surrogates.
@@ -85,7 +85,7 @@ def test_a_pipe_is_not_replaced_by_a_file(tmp_path, write, linked):
         ("result", result, "FILE_SIZE_MAX"),
         ("parameter set", parameter_sets, "FILE_SIZE_MAX"),
         ("table", table, "FILE_SIZE_MAX"),
-        ("FMU of a sweep", sweep, "UNPACKED_SIZE_MAX"),
+        ("FMU of a sweep", fmu_model, "UNPACKED_SIZE_MAX"),
     ],
 )
 def test_no_more_of_an_endless_file_is_read_than_the_limit(monkeypatch, kind, module, limit):

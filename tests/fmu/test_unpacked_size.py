@@ -10,7 +10,7 @@ import pytest
 from prbm.base import archives
 from prbm.base.errors import PrbmError
 from prbm.fmu.unpack import unpacked
-from prbm.sweeps.sweep import read_fmu
+from prbm.sweeps.fmu_model import read_fmu
 from prbm.systems.components import described
 
 SIZE = 1 << 20  # bytes

@@ -202,11 +202,11 @@ def test_the_table_of_a_study_is_a_list_for_the_next_one(mechanisms, tmp_path):
 @pytest.mark.parametrize(
     ("content", "sentence"),
     [
-        ("", "write a column for each parameter"),
+        ("", "0 rows and 0 columns; write a column for each parameter"),
         ("stop.position\n", "write a column for each parameter"),
-        ("stop.position,stop.position\n1,2\n", "write a column"),
-        ("stop.position\n1,2\n", "row 0 must have 1 finite numbers"),
-        ("stop.position\n0\nnan\n", "row 1 must have 1 finite numbers"),
+        ("stop.position,stop.position\n1,2\n", "has the column .stop.position. twice"),
+        ("stop.position\n1,2\n", "row 0 has 2 cells, more than its head"),
+        ("stop.position\n0\nnan\n", "row 1 of the table: stop.position = nan must be a finite"),
         ("stop.positon\n0\n", "unknown variable 'stop.positon'; did you mean"),
         ("stop.position [kg]\n0\n", "another dimension"),
     ],

@@ -394,7 +394,7 @@ def test_a_study_has_a_short_text():
 
 def test_without_a_kernel_the_processes_are_given_the_python_engine(mechanisms, monkeypatch):
     """The reason is then logged once, and not by each process."""
-    monkeypatch.setattr(module, "kernel_available", lambda: False)
+    monkeypatch.setattr(simulations, "kernel_available", lambda: False)
     jobs = []
 
     def begun(job, *_, **more):

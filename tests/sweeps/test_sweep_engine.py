@@ -7,6 +7,7 @@ import pytest
 from prbm.base.errors import PrbmError
 from prbm.runs.quantities import QUANTITIES
 from prbm.runs.run import simulate
+from prbm.sweeps.study import study
 from prbm.sweeps.sweep import sweep
 
 pytestmark = [pytest.mark.fmu, pytest.mark.native]
@@ -29,6 +30,32 @@ def test_named_quantities_of_fmus_are_those_of_the_engine(native, mechanisms):
             assert found[name][row] == pytest.approx(quantity.compute(result.columns), rel=1e-6)
         largest = np.abs(result["shuttle.vx"]).max()
         assert found["max(abs(shuttle.vx))"][row] == pytest.approx(largest, rel=1e-6)
+
+
+def test_the_study_of_an_fmu_is_that_of_its_mechanism(native, mechanisms):
+    """Grid with units, optimum, condition and yield; the wall moves by the position of the stop."""
+    vary = {"stop.position": ["0 mm", "1 mm", "2 mm"], "stop.restitution": [0.2, 0.4]}
+    of_mechanism, of_fmu = (
+        study(
+            model, vary, ["impacts"], minimise="min(shuttle.x)", workers=1, stop_time=0.05,
+            step=1e-4, subject_to=["shuttle.x < 1 m"], tolerances={"stop.position": "1 um"},
+        )
+        for model in (mechanisms["PRBDM"], native["PRBDM", 2])
+    )  # fmt: skip
+    assert of_fmu.outputs["impacts"].tolist() == of_mechanism.outputs["impacts"].tolist()
+    for name, x in of_mechanism.outputs.items():
+        np.testing.assert_allclose(of_fmu.outputs[name], x, rtol=1e-5)
+    assert of_fmu.optimum.value == pytest.approx(of_mechanism.optimum.value, rel=1e-5)
+    assert of_fmu.share == of_mechanism.share
+    assert of_fmu.units == of_mechanism.units
+    assert of_fmu.table()[0] == of_mechanism.table()[0]
+
+
+def test_outputs_of_a_mechanism_alone_are_no_outputs_of_an_fmu(native):
+    with pytest.raises(PrbmError, match="output fundamental: needs a mechanism"):
+        study(native["PRBDM", 2], {"stop.position": [0.0, 1e-3]}, ["fundamental"])
+    with pytest.raises(PrbmError, match="an FMU has its own"):
+        study(native["PRBDM", 2], {"stop.position": [0.0, 1e-3]}, ["shuttle.x"], engine="python")
 
 
 @pytest.mark.slow
@@ -57,10 +84,10 @@ def test_inputs_over_time_of_fmus_are_those_of_the_engine(native, mechanisms, fm
 @pytest.mark.parametrize(
     ("inputs", "sentence"),
     [
-        ({"force.y": "step({hight} N)"}, r"\{hight\} in an input has no value; add a column hight"),
-        ({"forc.x": "step(1 N)"}, "the FMU has no input 'forc.x'; did you mean force"),
-        ({"stop.position": "step(1 mm)"}, "the FMU has no input 'stop.position'"),
-        ({"force.x": "step(1 N)"}, "force.x is given both as a start value and over time"),
+        ({"force.y": "step({hight} N)"}, r"\{hight\} in an input has no value; .* a column hight"),
+        ({"forc.x": "step(1 N)"}, "unknown variable 'forc.x'; did you mean force"),
+        ({"stop.position": "step(1 mm)"}, "stop.position is a parameter"),
+        ({"force.x": "step(1 N)"}, "force.x is given both as a constant and over time"),
         ({"force.y": "step(1 m)"}, "the unit 'm' has another dimension"),
     ],
 )

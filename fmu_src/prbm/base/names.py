@@ -27,4 +27,5 @@ def proposal(name: str, known: Mapping[str, object]) -> str:
     import difflib  # imported here because few runs need it
 
     near = difflib.get_close_matches(name, known, n=3, cutoff=SIMILARITY_MIN)
-    return f"did you mean {' or '.join(near)}?" if near else f"known names are {', '.join(known)}"
+    every = ", ".join(known) or "none"
+    return f"did you mean {' or '.join(near)}?" if near else f"known names are {every}"

@@ -2,11 +2,11 @@
 
 import argparse
 from collections.abc import Sequence
-from pathlib import Path
 
 from ..base.progress import reporter
 from ..files.settings import assigned, optional_quantity
-from ..sweeps.sweep import read_fmu, summary, sweep
+from ..sweeps.fmu_model import FmuModel
+from ..sweeps.sweep import summary, sweep
 from .duration import given_inputs
 
 
@@ -27,9 +27,4 @@ def run_sweep(options: argparse.Namespace) -> None:
 
 def _values(fmu: str, texts: Sequence[str]) -> dict[str, float]:
     """Read NAME=VALUE pairs of variables of an FMU."""
-    if not texts:
-        return {}
-    _, description = read_fmu(Path(fmu))
-    units = {v.name: v.unit or getattr(v.declaredType, "unit", None) or "" for v in
-             description.modelVariables}  # fmt: skip
-    return assigned(units, texts)
+    return assigned(FmuModel(fmu).units, texts) if texts else {}

@@ -83,8 +83,31 @@ def signals(
     UserMistake
         If a quantity has a wrong unit.
     """
-    units = input_units(mechanism)
-    parameters = {p.name for p in mechanism.parameters}
+    return driving(input_units(mechanism), mechanism.values(), inputs, constants)
+
+
+def driving(
+    units: Mapping[str, str],
+    parameters: Container[str],
+    inputs: Mapping[str, Source],
+    constants: Collection[str] = (),
+) -> dict[str, Signal]:
+    """Return the signals of inputs by name, as :func:`signals`, of a mechanism or an FMU.
+
+    Parameters
+    ----------
+    units : mapping
+        SI units of all inputs by name.
+    parameters : container of str
+        Names of variables that have one value per simulation.
+    inputs, constants
+        As for :func:`signals`.
+
+    Raises
+    ------
+    ParameterError, UserMistake
+        As :func:`signals`.
+    """
     found: dict[str, Signal] = {}
     for name, source in inputs.items():
         if name in parameters:

@@ -5,21 +5,16 @@ sequence of Sobol.  Drawn points give the share of good runs with its confidence
 Saltelli's design give first-order and total sensitivity indices.
 """
 
-import csv
-import io
 import itertools
 import math
-import re
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.stats import binomtest, norm, qmc, sobol_indices
 
-from ..base import reading
 from ..base.errors import ParameterError
 from ..mechanics.arrays import Real
 from ..mechanism.parameters import Tolerance
@@ -33,8 +28,6 @@ SIGMAS = 3.0  # Standard deviations in the half-width of a tolerance.
 CONFIDENCE = 0.95
 CONSTANT_RTOL = 1e-12  # Values that differ by less than this share of the largest are equal.
 RESAMPLES = 999  # Of the bootstrap that gives the confidence intervals of indices.
-FILE_SIZE_MAX = 1 << 28  # bytes of a list of parameters.
-HEAD = re.compile(r"([^\[\]]*)(?:\[([^\[\]]*)\])?")  # A name and a unit in brackets.
 
 
 def grid(samples: Mapping[str, Real]) -> Real:
@@ -46,43 +39,6 @@ def grid(samples: Mapping[str, Real]) -> Real:
     [[0.0, 2.0], [0.0, 3.0], [1.0, 2.0], [1.0, 3.0]]
     """
     return np.array(list(itertools.product(*samples.values())))
-
-
-def read_rows(path: Path) -> dict[str, tuple[Real, str]]:
-    """Return the columns of a CSV file of parameters by name, with the unit of each.
-
-    A unit may follow the name in the head, ``stop.position [mm]``; it is empty otherwise.
-
-    Raises
-    ------
-    ParameterError
-        If the file cannot be read, has no row, or a cell is no finite number.
-    """
-    try:
-        text = reading.text(path, FILE_SIZE_MAX, ParameterError).read()
-        rows = [row for row in csv.reader(io.StringIO(text)) if row]
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise ParameterError(f"{path} cannot be read as a table: {error}") from None
-    heads = [HEAD.fullmatch(cell.strip()) for cell in rows[0]] if rows else []
-    names = [head[1].strip() if head else "" for head in heads]
-    if len(rows) < 2 or not all(names) or len({*names}) < len(heads):
-        raise ParameterError(
-            f"{path}: write a column for each parameter, headed by its name, and a row for each "
-            "simulation"
-        )
-    table = []
-    for k, row in enumerate(rows[1:]):
-        try:
-            table.append([float(cell) for cell in row])
-            if len(row) != len(heads) or not np.isfinite(table[-1]).all():
-                raise ValueError
-        except ValueError:
-            raise ParameterError(
-                f"{path}: row {k} must have {len(heads)} finite numbers with a decimal "
-                "point, separated by commas"
-            ) from None
-    units = [(head[2] or "").strip() if head else "" for head in heads]
-    return dict(zip(names, zip(np.array(table).T, units, strict=True), strict=True))
 
 
 def drawn(distributions: Mapping[str, Any], n: int, seed: int, method: str) -> Real:

@@ -61,7 +61,7 @@ class Job:
     outputs : tuple of Output
         Recorded outputs.
     inputs : mapping
-        Texts and units of inputs over time by name.  Names in braces are columns of the table.
+        Inputs over time by name.  Names in braces in their texts are columns of the table.
     reuse : bool
         Reset the instance between runs if its reset works (default: True).
     content : bytes
@@ -74,9 +74,17 @@ class Job:
     tolerance: float | None
     values: Mapping[str, float]
     outputs: tuple[Output, ...]
-    inputs: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    inputs: Mapping[str, Any] = field(default_factory=dict)
     reuse: bool = True
     content: bytes = field(default=b"", repr=False)
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Times and tolerance, for the journal."""
+        return {
+            "start time [s]": self.start, "stop time [s]": self.stop, "step [s]": self.step,
+            "tolerance": self.tolerance,
+        }  # fmt: skip
 
     @contextmanager
     def placed(self) -> "Iterator[Callable[[], Callable[[Mapping[str, float]], Outcome]]]":
@@ -92,6 +100,19 @@ def _loaded(folder: Path, job: Job) -> Callable[[Mapping[str, float]], Outcome]:
         return Runner(folder, job).run
     except Exception as error:  # FMPy raises plain exceptions.
         raise RuntimeError(f"the FMU cannot be loaded: {error}") from None
+
+
+def input_units(description: Any) -> dict[str, str]:
+    """Return the units of the inputs of an FMU that can have signals, by name."""
+    return {
+        v.name: unit(v) for v in description.modelVariables
+        if v.causality == "input" and v.type in ("Real", "Float64") and not v.shape
+    }  # fmt: skip
+
+
+def unit(variable: Any) -> str:
+    """Return the unit of a variable, or that of its declared type; empty without one."""
+    return variable.unit or getattr(variable.declaredType, "unit", None) or ""
 
 
 def communication_points(start: float, stop: float, step: float) -> list[float]:
@@ -246,18 +267,15 @@ class Runner:
         if not self.job.inputs:
             return {**self.job.values, **row}, None
         from ..runs.driving import Driver  # imported here: few sweeps need it
-        from ..runs.inputs import filled, placeholders, read_signal, with_velocities
+        from ..runs.inputs import driving, filled, placeholders
 
-        texts = {name: text for name, (text, _) in self.job.inputs.items()}
-        within = placeholders(texts)
-        signals = {
-            name: read_signal(name, str(text), self.job.inputs[name][1])
-            for name, text in filled(texts, row).items()
-        }
+        within = placeholders(self.job.inputs)
         others = {name: x for name, x in row.items() if name not in within}
-        known = {v.name for v in self.description.modelVariables if v.causality == "input"}
-        constants = {*others, *self.job.values}
-        driver = Driver(with_velocities(signals, known, constants), self.job.start)
+        signals = driving(
+            input_units(self.description), (), filled(self.job.inputs, row),
+            {*others, *self.job.values},
+        )  # fmt: skip
+        driver = Driver(signals, self.job.start)
         return {**self.job.values, **driver.values(self.job.start), **others}, driver
 
     def _simulate(

@@ -17,6 +17,7 @@ import platform
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from math import nan
 from pathlib import Path
 from typing import IO, Any
 
@@ -122,8 +123,7 @@ class Journal:
             compare(f"{self.path} has the rows of a study", before, self.settings)
             if next(csv.reader(rows[:1])) != self.heads:
                 raise ValueError
-            for cells in csv.reader(rows[1:]):
-                self._read(cells)
+            self.known |= map(self.outcome, csv.reader(rows[1:]))
         except (ValueError, RecursionError, StopIteration, csv.Error) as error:
             if isinstance(error, ParameterError):
                 raise
@@ -132,14 +132,25 @@ class Journal:
         self.file.seek(len(complete))
         self._write(owner)
 
-    def _read(self, cells: Sequence[str]) -> None:
-        """Keep a row of the file."""
+    def row(self, point: Point, outcome: Outcome) -> list[Any]:
+        """Return the cells of a row."""
+        values = outcome.values or (nan,) * (len(self.heads) - self.width - 2)
+        return [*point, *values, outcome.status, " ".join(outcome.message.split())]
+
+    def outcome(self, cells: Sequence[Any]) -> tuple[Point, Outcome]:
+        """Return the parameters and the outcome of a row.
+
+        Raises
+        ------
+        ValueError
+            If the number of cells is wrong, or one of them is no number.
+        """
         if len(cells) != len(self.heads):
             raise ValueError
         *numbers, status, message = cells
-        point, values = map(float, numbers[: self.width]), map(float, numbers[self.width :])
-        failed = status not in GOOD
-        self.known[tuple(point)] = Outcome(status, message, values=() if failed else tuple(values))
+        point, values = numbers[: self.width], numbers[self.width :]
+        found = tuple(map(float, values)) if status in GOOD else ()
+        return tuple(map(float, point)), Outcome(status, message, values=found)
 
     def _write(self, *lines: str) -> None:
         assert self.file is not None
@@ -160,10 +171,7 @@ class Journal:
         self.known[point] = outcome
         self.empty = False
         if self.file is not None:
-            count = len(self.heads) - self.width - 2
-            values = outcome.values or ("nan",) * count
-            message = " ".join(outcome.message.split())
-            self._write(_line([*point, *values, outcome.status, message]))
+            self._write(_line(self.row(point, outcome)))
 
     def _close(self) -> None:
         if self.file is not None:

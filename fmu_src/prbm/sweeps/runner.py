@@ -24,6 +24,7 @@ from concurrent.futures import (
     wait,
 )
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import replace
 from statistics import median
 from typing import Any, Self
 
@@ -37,6 +38,7 @@ from .outputs import CRASHED, Outcome
 BATCH_MIN, BATCH_MAX = 1.0, 30.0  # Limits of the duration of a batch [s].
 BATCH_SHARE = 0.02  # Duration of a batch, as a share of the time so far.
 BATCHES_PER_THREAD = 2  # Batches submitted per thread, so that no thread waits for work.
+RESET_RUNS_MIN = 20  # Runs per process from which on a check of an FMU's reset pays off.
 RECENT_RUNS = 50  # Runs whose median duration determines the size of the next batch.
 CONNECTION_TIMEOUT = 10.0  # Longest wait for a scheduler and its workers [s].
 MISSING_MODULE = "No module named"  # Python's message for a package that is not installed.
@@ -139,6 +141,9 @@ class Runner:
         self.busy: set[int] = set()  # These threads.
         self.closing: Callable[[str], object] = release
         count = process_count(max(runs, 1), workers)
+        if hasattr(job, "reuse"):  # The check of a reset doubles the duration of a run.
+            many = runs >= RESET_RUNS_MIN * count
+            self.job = replace(job, reuse=many and timeout is None)  # type: ignore[type-var]
         self.executor: Executor | None = None
         if isinstance(executor, str):
             self.executor = self.stack.enter_context(_client(executor)).get_executor(pure=False)

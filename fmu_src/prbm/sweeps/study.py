@@ -6,14 +6,13 @@ The simulations run on all cores of this machine, or in another executor
 (:mod:`.runner`).  A simulation that fails is a row with its message.
 """
 
-import hashlib
 import math
 import re
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -22,21 +21,11 @@ from ..base.csv_text import csv_text
 from ..base.errors import ParameterError
 from ..base.names import proposal
 from ..base.progress import Progress
-from ..base.version import __version__
-from ..files.settings import in_si, in_unit
-from ..hybrid.configuration import checked_tolerance
-from ..hybrid.given import start_values
-from ..hybrid.simulation import Simulation
-from ..interface.tables import tables
-from ..interface.variables import variables
+from ..files.settings import in_unit
 from ..mechanics.arrays import Real
-from ..mechanics.stress import with_stress
 from ..mechanism.description import Mechanism
 from ..mechanism.parameters import Tolerance
-from ..runs.engine import PYTHON, check_engine, kernel_available
-from ..runs.experiment import experiment
-from ..runs.inputs import Source, filled, placeholders, signals
-from ..runs.run import communication_points
+from ..runs.inputs import Source, placeholders
 from ..runs.signals import Signal
 from .design import (
     SENSITIVITY,
@@ -45,23 +34,29 @@ from .design import (
     distribution,
     drawn,
     grid,
-    read_rows,
     sensitivity,
     yield_of,
 )
-from .journal import Journal
-from .mechanism import MechanismJob
+from .journal import Journal, Point
+from .mechanism import MechanismModel
 from .optimum import REFINEMENTS_EXPECTED, Constraint, Optimum, Samples, Search
-from .outputs import Outcome, parse_output
+from .outputs import GOOD, Outcome, parse_output
 from .runner import Runner
+from .table import check_separator, name_and_unit, numbers, read_table
 
-STEPS = 4000  # Communication steps of a simulation, which resolve the vibration after impacts.
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from .fmu_model import FmuModel
+
 RUNS_MAX = 100_000  # More simulations are a mistake in the number of samples.
 LAST_FRACTION = 0.99  # Reported progress while a refinement takes more simulations than usual.
 YIELD_RUNS = 256  # Simulations around an optimum that give its yield.
 YIELD_SEED = 1
 CONDITION = re.compile(r"(.*[^<>=])(<=|>=|<|>)([^<>=()]*)", re.DOTALL)  # "fundamental > 40 Hz".
-Vary = Mapping[str, Any] | str | Path | None
+Vary: TypeAlias = "Mapping[str, Any] | pd.DataFrame | str | Path | None"
+Outputs = Sequence[str] | Mapping[str, str]
+Model: TypeAlias = "MechanismModel | FmuModel"
 
 
 @dataclass(frozen=True, repr=False)
@@ -140,9 +135,9 @@ class Study:
 
 
 def study(
-    mechanism: Mechanism,
+    mechanism: Mechanism | str | Path,
     vary: Vary,
-    outputs: Sequence[str] = (),
+    outputs: Outputs = (),
     *,
     runs: int | None = None,
     method: str = "sobol",
@@ -158,10 +153,12 @@ def study(
     tolerance: float | None = None,
     workers: int | None = None,
     executor: Executor | str | None = None,
+    retries: int = 1,
     timeout: float | None = None,
     engine: str | None = None,
     table: str | Path | None = None,
     overwrite: bool = False,
+    retry_failed: bool = False,
     progress: Progress | None = None,
 ) -> Study:
     """Simulate a mechanism for many parameters, and find the optimum of an output.
@@ -172,21 +169,21 @@ def study(
 
     Parameters
     ----------
-    mechanism : Mechanism
-        The mechanism.
-    vary : mapping, str, Path or None
+    mechanism : Mechanism, str or Path
+        The mechanism, or the path of an FMU for co-simulation, which needs the extra ``sweep``.
+    vary : mapping, DataFrame, str, Path or None
         Increasing samples of parameters or inputs by name, numbers in SI or texts with a unit,
         ``"-4 mm"``, whose combinations are simulated; or of numbers that are written as ``{name}``
         in the texts of inputs.  With ``runs``, for each name (low, high), a distribution of
         ``scipy.stats``, or a tolerance such as ``"0.1 mm +- 2 %"`` or ``"+- 2 %"`` of the value of
         the mechanism: a normal distribution with three standard deviations in the half-width, or a
         uniform one, ``"+- 2 % uniform"``.  None: the tolerances of the mechanism.  Or the path of a
-        CSV file with a row for each simulation and a column for each name, in SI or with a unit in
-        the head, ``stop.position [mm]``.
-    outputs : sequence of str
+        CSV or Parquet file, or a DataFrame, with a row for each simulation and a column for each
+        name, in SI or with a unit in the head, ``stop.position [mm]``.
+    outputs : sequence of str, or mapping of str to str
         Outputs as of :func:`prbm.sweeps.sweep.sweep`: ``settling``, ``max(abs(shuttle.vx))``; or,
         without a simulation, ``fundamental``, ``mode(2)`` and ``rest(shuttle.x)``.  If one of them
-        is a stress, all flexures have stress outputs.
+        is a stress, all flexures have stress outputs.  The keys of a mapping are their names.
     runs : int or None
         Number of points that are drawn; None: ``vary`` is a grid.
     method, seed : str, int
@@ -210,6 +207,8 @@ def study(
     executor : Executor, str or None
         A ``concurrent.futures`` executor, such as that of Dask's ``Client.get_executor()``, or the
         address of a Dask scheduler; None: this machine.
+    retries : int
+        Number of repetitions of a simulation whose process crashed.
     timeout : float or None
         Longest duration of a simulation [s]; None: no limit.
     table : str, Path or None
@@ -218,6 +217,8 @@ def study(
         there.
     overwrite : bool
         Forget the rows of an earlier study.
+    retry_failed : bool
+        Repeat the failed simulations of an earlier study.
     progress : callable or None
         Called with the completed fraction, from 0 to 1.
 
@@ -228,11 +229,12 @@ def study(
     UserMistake
         If a text is not a quantity of the right dimension.
     """
-    plan = _plan(
-        mechanism, vary, outputs, runs, (method, seed), _goal(minimise, maximise), subject_to,
-        values, inputs, (stop_time, step, tolerance, engine),
+    model = MechanismModel(mechanism) if isinstance(mechanism, Mechanism) else _fmu(mechanism)
+    plan = planned(
+        model, vary, outputs or model.outputs, runs, (method, seed), _goal(minimise, maximise),
+        subject_to, values, inputs, (stop_time, step, tolerance, engine),
     )  # fmt: skip
-    plan = _with_spread(plan, tolerances or {})
+    plan = _with_spread(plan, model, tolerances or {})
     if table is not None:
         check_file(Path(table))
     journal = Journal(
@@ -241,9 +243,9 @@ def study(
     with (
         Runner(
             plan.job, plan.columns, journal, len(plan.points), workers=workers, executor=executor,
-            timeout=timeout,
+            retries=retries, timeout=timeout,
         ) as runner,
-        journal.opened(overwrite),
+        journal.opened(overwrite, retry_failed),
     ):  # fmt: skip
         if runner.executor is not None:
             _check_sources(plan.job.inputs)
@@ -254,17 +256,25 @@ def study(
     return found
 
 
+def _fmu(path: str | Path) -> Model:
+    from .fmu_model import FmuModel  # imported here: an extra
+
+    return FmuModel(path)
+
+
 # --- plan -----------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A checked study.
+    """A checked study: a simulation and rows of parameters.
 
     Parameters
     ----------
-    job : MechanismJob
+    job : MechanismJob or Job
         The simulation.
+    identity : mapping
+        What identifies the mechanism or the FMU.
     varied : mapping
         Samples or distributions of the parameters.
     points : (n, p)
@@ -283,7 +293,8 @@ class Plan:
         Values of the parameters with a tolerance that are not varied.
     """
 
-    job: MechanismJob
+    job: Any
+    identity: Mapping[str, str]
     varied: Mapping[str, Any]
     points: Real
     goal: tuple[str, float] | None
@@ -303,33 +314,27 @@ class Plan:
         """Names of the varied parameters, and of those beside them."""
         return [*self.varied, *self.beside]
 
-    def rows(self, points: Real) -> Real:
+    def rows(self, points: Real) -> list[Point]:
         """Return the values of all columns at points (n, p)."""
-        beside = np.tile([*self.beside.values()], (len(points), 1))
-        return np.column_stack([points, beside])
+        beside = tuple(self.beside.values())
+        return [(*point, *beside) for point in points.tolist()]
 
     @property
     def texts(self) -> list[str]:
-        """Texts of the outputs."""
+        """Columns of the outputs."""
         return [output.column for output in self.job.outputs]
 
     @property
     def settings(self) -> dict[str, Any]:
         """All that the outputs depend on, except for the varied parameters, for the journal."""
         job = self.job
-        own = range(0)
-        described = tables(job.mechanism, (), "", own) + repr(job.mechanism.values()).encode()
         return {
-            "version": __version__,
-            "mechanism": hashlib.sha256(described).hexdigest(),
+            **self.identity,
             "parameters": self.columns,
-            "outputs": self.texts,
+            "outputs": {o.column: list(astuple(o)[1:]) for o in job.outputs},
             "values": dict(job.values),
             "inputs": {name: _described(source) for name, source in job.inputs.items()},
-            "stop time [s]": job.stop_time,
-            "step [s]": job.step,
-            "tolerance": job.tolerance,
-            "engine": job.engine,
+            **job.settings,
         }
 
 
@@ -346,72 +351,95 @@ def _goal(minimise: str | None, maximise: str | None) -> tuple[str, float] | Non
     return None if maximise is None else (maximise, -1.0)
 
 
-def _plan(
-    mechanism: Mechanism,
+def planned(
+    model: Model,
     vary: Vary,
-    outputs: Sequence[str],
-    runs: int | None,
-    drawing: tuple[str, int],
-    goal: tuple[str, float] | None,
-    subject_to: Sequence[str],
-    values: Mapping[str, float | str] | None,
-    inputs: Mapping[str, Source] | None,
-    options: tuple[Any, Any, Any, Any],
+    outputs: Outputs,
+    runs: int | None = None,
+    drawing: tuple[str, int] = ("", 0),
+    goal: tuple[str, float] | None = None,
+    subject_to: Sequence[str] = (),
+    values: Mapping[str, float | str] | None = None,
+    inputs: Mapping[str, Source] | None = None,
+    options: tuple[Any, Any, Any, Any] = (None,) * 4,
 ) -> Plan:
-    """Return the checked study."""
+    """Return the checked study of a model.
+
+    Parameters
+    ----------
+    model : MechanismModel or FmuModel
+        What is simulated.
+    vary, outputs, runs, subject_to, values, inputs
+        As for :func:`study`; the keys of a mapping of outputs are the names of their columns.
+    drawing, goal, options : tuple
+        Method and seed; the output to be optimised and 1 to minimise it or -1 to maximise it; stop
+        time, step, tolerance and engine.
+
+    Raises
+    ------
+    ParameterError, UserMistake
+        As :func:`study`.
+    """
     conditions = [_condition(text) for text in subject_to]
-    wanted = [*outputs, *([goal[0]] if goal else []), *(output for _, output, _, _ in conditions)]
-    if not wanted:
+    named = dict(outputs) if isinstance(outputs, Mapping) else {text: text for text in outputs}
+    further = [*([goal[0]] if goal else []), *(output for _, output, _, _ in conditions)]
+    named |= {text: text for text in further if text not in named}
+    if not named:
         raise ParameterError("no output is selected; name one, for instance settling")
-    mechanism = _with_stress(mechanism, wanted)
-    known = _units(mechanism)
-    listed = isinstance(vary, str | Path)
-    columns = _columns(vary, runs, mechanism, known)
-    _check_names(mechanism, columns, placeholders(inputs or {}))
-    given = in_si(mechanism, values)
-    if listed:
-        varied, points = dict(columns), np.column_stack([*columns.values()])
-        _check_count(len(points))
-    else:
-        varied, points = _points(columns, runs, drawing, known, {**mechanism.values(), **given})
-    kept = tuple(parse_output(text, known) for text in dict.fromkeys(wanted))
+    model = model.needing(named.values())
+    known = model.units
+    kept = tuple(parse_output(text, known, column) for column, text in named.items())
     for output in kept:
-        output.check(known, "the mechanism")
+        model.check_output(output)
+    sources = dict(inputs or {})
+    given = model.fixed(values)
+    columns = _columns(vary, runs, model)
+    _check_names(model, columns, placeholders(sources), given)
+    varied, points = _points(columns, runs, drawing, known, {**model.values, **given})
+    for name, x in zip(varied, points.T, strict=True):
+        model.check_column(name, x)
     shown = {n: known.get(n, "") for n in varied} | {o.column: o.unit(known) for o in kept}
     constraints = tuple(
         Constraint(text, name, relation, in_unit(f"constraint {name}", bound, shown[name]))
         for text, name, relation, bound in conditions
     )
-    for name in given.keys() & varied.keys():
-        raise ParameterError(f"{name} is varied and has a fixed value; remove one of them")
-    sources = dict(inputs or {})
     first = dict(zip(varied, points[0].tolist(), strict=True))
-    signals(mechanism, filled(sources, first), {**given, **first})  # Report mistakes.
-    job = MechanismJob(mechanism, kept, given, sources, *_options(mechanism, given, *options),
-                       tuple(known))  # fmt: skip
-    return Plan(
-        job, varied, points, goal, constraints, (runs is None and not listed, *drawing), shown
-    )
+    job = model.job(kept, given, sources, first, options)
+    whole = runs is None and isinstance(vary, Mapping)
+    return Plan(job, model.identity, varied, points, goal, constraints, (whole, *drawing), shown)
 
 
-def _columns(
-    vary: Vary, runs: int | None, mechanism: Mechanism, known: Mapping[str, str]
-) -> Mapping[str, Any]:
-    """Return what is given for each varied parameter; the columns of a file are in SI."""
+def _columns(vary: Vary, runs: int | None, model: Model) -> Mapping[str, Any]:
+    """Return what is given for each varied parameter: of a table its cells and their unit."""
     if vary is None:
-        if runs is None or not mechanism.tolerances:
+        if runs is None or not model.tolerances:
             raise ParameterError(
                 "no parameter is varied; give vary, or runs for a mechanism with tolerances"
             )
-        return mechanism.tolerances
+        return model.tolerances
     if isinstance(vary, Mapping):
         return vary
     if runs is not None:
-        raise ParameterError("runs are drawn from ranges, not from a file; omit one of them")
-    return {
-        name: x * (in_unit(name, f"1 {unit}", known.get(name, "")) if unit.strip("-") else 1.0)
-        for name, (x, unit) in read_rows(Path(vary)).items()
-    }
+        raise ParameterError("runs are drawn from ranges, not from a table; omit one of them")
+    found = {}
+    for head, cells in read_table(vary).items():
+        name, unit = name_and_unit(head, model.units)
+        found[name] = _Cells(cells, unit)
+    return found
+
+
+@dataclass(frozen=True)
+class _Cells:
+    """The cells of a column of a table and the unit in its head."""
+
+    cells: Sequence[Any]
+    unit: str
+
+    def values(self, name: str, unit: str) -> Real:
+        """Return the numbers (n,) in the unit of the parameter."""
+        return numbers(name, self.cells) * (
+            in_unit(name, f"1 {self.unit}", unit) if self.unit else 1.0
+        )
 
 
 def _points(
@@ -421,67 +449,41 @@ def _points(
     known: Mapping[str, str],
     base: Mapping[str, float],
 ) -> tuple[dict[str, Any], Real]:
-    """Return samples or distributions of the parameters, and the points of a grid or drawn ones."""
+    """Return samples or distributions, and the points of a table, of a grid, or drawn ones."""
+    if any(isinstance(given, _Cells) for given in vary.values()):
+        varied = {n: x.values(n, known.get(n, "")) for n, x in vary.items()}
+        return varied, np.column_stack([*varied.values()])
     if runs is None:
         varied = {n: _samples(n, x, known) for n, x in vary.items()}
         count = math.prod(map(len, varied.values()))
     else:
         varied = {n: _distribution(n, x, known, base) for n, x in vary.items()}
         count = runs * (len(varied) + 2 if drawing[0] == SENSITIVITY else 1)
-    _check_count(count)
+    if count > RUNS_MAX:
+        raise ParameterError(f"the study has {count} simulations; reduce them to {RUNS_MAX}")
     return varied, grid(varied) if runs is None else drawn(varied, runs, drawing[1], drawing[0])
 
 
-def _check_count(count: int) -> None:
-    if count > RUNS_MAX:
-        raise ParameterError(f"the study has {count} simulations; reduce them to {RUNS_MAX}")
-
-
-def _options(
-    mechanism: Mechanism,
-    values: Mapping[str, float],
-    stop_time: float | str | None,
-    step: float | str | None,
-    tolerance: float | None,
-    engine: str | None,
-) -> tuple[float, float, float | None, str | None]:
-    """Return duration, step, tolerance and engine of all simulations.
-
-    Raises
-    ------
-    ParameterError
-        If one of the values or arguments is invalid, so that every simulation would fail.
-    """
-    check_engine(engine)
-    if engine is None and not kernel_available():  # Compiled and reported here, not by workers.
-        engine = PYTHON
-    start_values(mechanism, values, 0.0)
-    if stop_time is None:
-        end = experiment(mechanism, values, engine).stop_time
-    else:
-        end = in_unit("stop_time", stop_time, "s")
-    spacing = end / STEPS if step is None else in_unit("step", step, "s")
-    communication_points(end, spacing)
-    if tolerance is not None:
-        tolerance = checked_tolerance(in_unit("tolerance", tolerance, ""))
-    return end, spacing, tolerance, engine
-
-
-def _check_names(mechanism: Mechanism, vary: Mapping[str, Any], within: set[str]) -> None:
-    """Reject unknown names, and placeholders without values."""
+def _check_names(
+    model: Model, vary: Mapping[str, Any], within: set[str], given: Mapping[str, float]
+) -> None:
+    """Reject unknown names, names with two values, and placeholders without one."""
     if not vary:
         raise ParameterError("0 parameters are varied; vary at least one")
-    settable = {**mechanism.values(), **Simulation(mechanism).given}
     for name in vary:
-        if name not in settable and name not in within:
-            raise ParameterError(f"unknown variable {name!r}; {proposal(name, settable)}")
-        if name in settable and name in within:
+        if name not in model.values and name not in within:
+            check_separator(name)
+            raise ParameterError(model.refusal(name))
+        if name in model.values and name in within:
             raise ParameterError(
                 f"{{{name}}} in an input is also a parameter; choose another name in braces"
             )
-    for name in sorted(within):
-        if name not in vary:
-            raise ParameterError(f"{{{name}}} in an input has no value; vary {name}")
+        if name in given:
+            raise ParameterError(f"{name} is varied and has a fixed value; remove one of them")
+    for name in sorted(within - vary.keys()):
+        raise ParameterError(
+            f"{{{name}}} in an input has no value; vary {name}, or add a column {name}"
+        )
 
 
 def _samples(name: str, sequence: Any, known: Mapping[str, str]) -> Real:
@@ -512,7 +514,7 @@ def _distribution(
         if nominal is not None:
             base = {name: nominal}
     if isinstance(given, Tolerance):
-        if name not in base:
+        if not math.isfinite(base.get(name, math.nan)):
             raise ParameterError(f"{name} has a tolerance, but no value; write it before +-")
         return _law(name, base[name], given)
     if hasattr(given, "ppf"):
@@ -523,7 +525,7 @@ def _distribution(
     return float(ends[0]), float(ends[1])
 
 
-def _with_spread(plan: Plan, given: Mapping[str, str | Tolerance]) -> Plan:
+def _with_spread(plan: Plan, model: Model, given: Mapping[str, str | Tolerance]) -> Plan:
     """Return the plan with the checked tolerances around an optimum under constraints."""
     from ..files.settings import tolerance  # imported here: pint
 
@@ -534,17 +536,14 @@ def _with_spread(plan: Plan, given: Mapping[str, str | Tolerance]) -> Plan:
                 "constraints, or vary the parameters within their tolerances"
             )
         return plan
-    mechanism = plan.job.mechanism
-    values = {**mechanism.values(), **plan.job.values}
-    units = {**{p.name: p.unit for p in mechanism.parameters}, **plan.units}
-    found = dict(mechanism.tolerances)
+    values = {**model.values, **plan.job.values}
+    found = dict(model.tolerances)
     for name, text in given.items():
         if name not in values and name not in plan.varied:
             every = dict.fromkeys([*plan.varied, *values])
             raise ParameterError(f"the tolerance of {name}: {proposal(name, every)}")
-        if isinstance(text, str):
-            text = tolerance(text, units[name], f"{name} =")[1]
-        found[name] = text
+        unit = model.units.get(name, "")
+        found[name] = tolerance(text, unit, f"{name} =")[1] if isinstance(text, str) else text
     beside = {name: values[name] for name in found if name not in plan.varied}
     for name, value in beside.items():
         _law(name, value, found[name])  # Report mistakes.
@@ -568,20 +567,6 @@ def _check_sources(inputs: Mapping[str, Source]) -> None:
             )
 
 
-def _units(mechanism: Mechanism) -> dict[str, str]:
-    """Return the units of all variables of a mechanism by name."""
-    every = variables(mechanism, Simulation(mechanism).outputs())
-    return {variable.name: variable.unit for variable in every}
-
-
-def _with_stress(mechanism: Mechanism, outputs: Sequence[str]) -> Mechanism:
-    """Return the mechanism with the stress outputs of all flexures if outputs need one of them."""
-    stressed = with_stress(mechanism)
-    known, every = _units(mechanism), _units(stressed)
-    needed = {name for text in outputs for name in parse_output(text, every).variables(every)}
-    return stressed if needed & (every.keys() - known.keys()) else mechanism
-
-
 def _condition(text: str) -> tuple[str, str, str, str]:
     """Return the text, output, relation and bound of a text such as ``fundamental > 40 Hz``."""
     found = CONDITION.fullmatch(text)
@@ -602,9 +587,9 @@ def _run(plan: Plan, runner: Runner, progress: Progress) -> Study:
     def report(done: float) -> None:
         progress(min(done / (count + extra), LAST_FRACTION) if extra else done / count)
 
-    outcomes = runner.outcomes(_tuples(plan.rows(points)), lambda share: report(share * count))
+    outcomes = runner.outcomes(plan.rows(points), lambda share: report(share * count))
     table = _table(outcomes, len(plan.texts))
-    messages = tuple(outcome.message for outcome in outcomes)
+    messages = tuple("" if x.status in GOOD else x.message for x in outcomes)
     whole, method, seed = plan.design
     columns = dict(zip(plan.names, points.T, strict=True))
     found: dict[str, Any] = {
@@ -624,7 +609,7 @@ def _run(plan: Plan, runner: Runner, progress: Progress) -> Study:
 
     best = _optimum(plan, runner, table, messages)
     if plan.spread:
-        rows = _tuples(_around(plan, best))
+        rows = [tuple(row) for row in _around(plan, best).tolist()]
         found["share"] = yield_of(_good(plan, _table(runner.outcomes(rows), len(plan.texts))))
     progress(1.0)
     return Study(**found, optimum=best, toleranced=tuple(plan.spread))
@@ -636,7 +621,7 @@ def _optimum(plan: Plan, runner: Runner, table: Real, messages: Sequence[str]) -
     (output, sign), points = plan.goal, plan.points
 
     def evaluate(x: Real) -> Real:
-        return _table(runner.outcomes(_tuples(plan.rows(x))), len(plan.texts))
+        return _table(runner.outcomes(plan.rows(x)), len(plan.texts))
 
     bounds = np.column_stack([points.min(axis=0), points.max(axis=0)])
     for k, given in enumerate(plan.varied.values()):
@@ -667,7 +652,7 @@ def _around(plan: Plan, best: Optimum) -> Real:
     """Return drawn values of all columns around an optimum, (n, columns)."""
     at = {**best.point, **plan.beside}
     laws = {n: distribution(at[n], x) for n, x in plan.spread.items() if x.at(at[n]) > 0.0}
-    rows = np.tile([at[name] for name in plan.columns], (YIELD_RUNS, 1))
+    rows: Real = np.tile([at[name] for name in plan.columns], (YIELD_RUNS, 1))
     if laws:
         rows[:, [plan.columns.index(name) for name in laws]] = drawn(
             laws, YIELD_RUNS, YIELD_SEED, "random"
@@ -680,10 +665,6 @@ def _good(plan: Plan, table: Real) -> Any:
     index = {text: k for k, text in enumerate(plan.texts)}
     held = [c.holds(table[:, index[c.output]]) for c in plan.constraints]
     return np.all([np.full(len(table), True), *held], axis=0)
-
-
-def _tuples(points: Real) -> list[tuple[float, ...]]:
-    return [tuple(point) for point in points.tolist()]
 
 
 def _table(outcomes: Sequence[Outcome], count: int) -> Real:

@@ -6,34 +6,24 @@ A row of the table is a run of the FMU, and a column is the start value of a var
 distributed over the cores of this machine, or over an executor or a Dask cluster (:mod:`.runner`).
 """
 
-import hashlib
 import importlib.util
 import io
 import json
-import math
 import os
-from collections.abc import Collection, Container, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import astuple, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import fmpy  # type: ignore[import-untyped]
-
-from ..base import reading
-from ..base.archives import UNPACKED_SIZE_MAX, check_unpacked_size
 from ..base.atomic import check_file, write
 from ..base.errors import ParameterError
-from ..base.names import proposal
-from ..base.processes import process_count
 from ..base.progress import Progress
-from ..runs.inputs import filled, placeholders, read_signal
-from ..runs.run import ROWS_MAX
 from .design import drawn
-from .fmu import Job
+from .fmu_model import FmuModel
 from .journal import Journal, Point, compare
-from .outputs import GOOD, Outcome, Output, parse_output
+from .outputs import GOOD, Outcome
 from .runner import Runner, StudyError
+from .study import Outputs, planned
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,14 +31,11 @@ if TYPE_CHECKING:
 EXTRA = ("pandas", "pyarrow")
 REMEDY = 'install the packages for sweeps with: python -m pip install "prbm-impact[sweep]"'
 
-RESET_RUNS_MIN = 20  # Runs per process from which on a check of the FMU's reset pays off.
-STEPS = 1000  # Communication steps for an FMU without a proposed step.
 FILES = (".csv", ".feather", ".h5", ".json", ".mat", ".ods", ".tsv", ".txt", ".xls", ".xlsx")
 """Suffixes rejected for the results, which are a Parquet file."""
-ROW, STATUS, MESSAGE = OWN = ("row", "status", "message")
+ROW, *_ = OWN = ("row", "status", "message")
 """Columns of every table; no parameter or output may have these names."""
 SETTINGS = b"prbm.settings"  # Key of the settings in the metadata of the Parquet file.
-Outputs = Sequence[str] | Mapping[str, str]
 
 
 def sweep(
@@ -143,20 +130,23 @@ def sweep(
     _check_packages("distributed" if isinstance(scheduler, str) else "pandas")
     out = Path(out)
     _check_name(out)
-    plan = _make_plan(fmu, table, outputs, values, inputs or {}, stop_time, step, tolerance)
-    # The check of a reset doubles the duration of a run, which may exceed a timeout.
-    many = len(plan.points) >= RESET_RUNS_MIN * process_count(len(plan.points), workers)
-    job = replace(plan.job, reuse=many and timeout is None)
-    journal = Journal(out, plan.settings, plan.parameters, plan.outputs)
-    journal.known |= _earlier(plan, journal, out, overwrite)
+    model = FmuModel(fmu)
+    plan = planned(
+        model, table, model.outputs if outputs is None else outputs, values=values,
+        inputs=inputs, options=(stop_time, step, tolerance, None),
+    )  # fmt: skip
+    _unambiguous([*plan.columns, *plan.texts, *OWN])
+    journal = Journal(out, plan.settings, plan.columns, plan.texts)
+    rows = plan.rows(plan.points)
+    journal.known |= _earlier(journal, rows, out, overwrite)
     with (
         Runner(
-            job, plan.parameters, journal, len(plan.points), workers=workers, executor=scheduler,
+            plan.job, plan.columns, journal, len(rows), workers=workers, executor=scheduler,
             retries=retries, timeout=timeout,
         ) as runner,
         journal.opened(overwrite, retry_failed),
     ):  # fmt: skip
-        found = _frame(plan, runner.outcomes(plan.points, progress))
+        found = _frame(journal, rows, runner.outcomes(rows, progress))
         write(out, _parquet(found, journal.settings))
         journal.remove()
     return found
@@ -196,28 +186,6 @@ def samples(
     return pd.DataFrame(drawn(distributions, n, seed, method), columns=[*distributions])
 
 
-# --- plan -------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Plan:
-    """A checked sweep.
-
-    ``settings`` are all that the results depend on except for the table; ``points`` are the values
-    of each run.
-    """
-
-    job: Job
-    settings: Mapping[str, Any]
-    parameters: tuple[str, ...]
-    points: list[Point]
-
-    @property
-    def outputs(self) -> list[str]:
-        """Columns of the outputs."""
-        return [output.column for output in self.job.outputs]
-
-
 def _check_packages(*names: str) -> None:
     """Check that packages of the extra ``sweep`` are installed.
 
@@ -231,169 +199,13 @@ def _check_packages(*names: str) -> None:
             raise StudyError(f"sweeps need the package {name}; {REMEDY}")
 
 
-def _make_plan(
-    fmu: str | Path,
-    table: "pd.DataFrame | str | Path",
-    outputs: Outputs | None,
-    values: Mapping[str, float] | None,
-    inputs: Mapping[str, str],
-    stop_time: float | None,
-    step: float | None,
-    tolerance: float | None,
-) -> Plan:
-    from .table import check_settable, checked, read_table
-
-    data, description = read_fmu(Path(fmu))
-    variables = {v.name: v for v in description.modelVariables}
-    within = placeholders(inputs)
-    frame = checked(read_table(table), variables, within)
-    fixed = {name: float(x) for name, x in (values or {}).items()}
-    for name, x in fixed.items():
-        check_settable(name, variables)
-        if name in frame:
-            raise ParameterError(f"{name} is in the table and among the values; remove one of them")
-        if not math.isfinite(x):
-            raise ParameterError(f"{name} = {x:g} among the values must be finite")
-    kept = _outputs(outputs, variables)
-    _unambiguous([*frame.columns], [output.column for output in kept])
-    times = _times(description, stop_time, step, tolerance)
-    first: dict[str, float] = frame.iloc[0].to_dict()  # type: ignore[assignment]
-    driven = _inputs(inputs, within, description, first, {*frame, *fixed})
-    job = Job(**times, values=fixed, outputs=kept, inputs=driven, content=data)
-    settings = {
-        "FMU": hashlib.sha256(data).hexdigest(),
-        "model": description.modelName,
-        "parameters": [*frame.columns],
-        "outputs": {o.column: list(astuple(o)[1:]) for o in kept},
-        "values": fixed,
-        "inputs": {name: text for name, (text, _) in driven.items()},
-        "start time [s]": job.start,
-        "stop time [s]": job.stop,
-        "step [s]": job.step,
-        "tolerance": job.tolerance,
-    }
-    points = [tuple(row) for row in frame.to_numpy(float).tolist()]
-    return Plan(job, settings, tuple(frame.columns), points)
-
-
-def _inputs(
-    inputs: Mapping[str, str],
-    within: Collection[str],
-    description: Any,
-    row: Mapping[str, float],
-    given: Container[str],
-) -> dict[str, tuple[str, str]]:
-    """Return checked texts and units of inputs over time by name."""
-    variables = {
-        v.name: v for v in description.modelVariables
-        if v.causality == "input" and v.type in ("Real", "Float64") and not v.shape
-    }  # fmt: skip
-    if inputs and not description.coSimulation.canHandleVariableCommunicationStepSize:
-        raise ParameterError(
-            "inputs over time need an FMU with variable communication steps; this one has fixed "
-            "steps: leave the inputs out"
-        )
-    for name in within:
-        if name not in row:
-            raise ParameterError(f"{{{name}}} in an input has no value; add a column {name}")
-    found = {}
-    for name, text in inputs.items():
-        if name not in variables:
-            raise ParameterError(f"the FMU has no input {name!r}; {proposal(name, variables)}")
-        if name in given:
-            raise ParameterError(
-                f"{name} is given both as a start value and over time; remove one of them"
-            )
-        unit = variables[name].unit or getattr(variables[name].declaredType, "unit", None) or ""
-        read_signal(name, str(filled({name: text}, row)[name]), unit)  # Report mistakes.
-        found[name] = text, unit
-    return found
-
-
-def read_fmu(path: Path) -> tuple[bytes, Any]:
-    """Return the bytes of an FMU and FMPy's model description.
-
-    Raises
-    ------
-    StudyError
-        If it cannot be read, or has no co-simulation of FMI 2.0 or 3.0.
-    """
-    data = reading.content(path, UNPACKED_SIZE_MAX, StudyError)
-    try:
-        check_unpacked_size(io.BytesIO(data))
-        description = fmpy.read_model_description(io.BytesIO(data), validate=False)
-    except Exception as error:  # FMPy raises plain exceptions.
-        reason = " ".join(str(error).split())
-        raise StudyError(f"{path} is not a readable FMU: {reason}") from None
-    if not description.fmiVersion.startswith(("2", "3")) or description.coSimulation is None:
-        raise StudyError(
-            f"{path} (FMI {description.fmiVersion}): must have co-simulation of FMI 2.0 or 3.0; "
-            "export such an FMU"
-        )
-    return data, description
-
-
-def _outputs(outputs: Outputs | None, variables: Mapping[str, Any]) -> tuple[Output, ...]:
-    from .table import check_outputs
-
-    if outputs is None:
-        plain = (v for v in variables.values() if v.causality == "output" and not v.shape)
-        outputs = [v.name for v in plain if v.type not in ("String", "Binary", "Clock")]
-    if isinstance(outputs, str):
-        outputs = [outputs]
-    pairs = outputs.items() if isinstance(outputs, Mapping) else ((text, text) for text in outputs)
-    kept = tuple(parse_output(text, variables, column) for column, text in pairs)
-    if not kept:
-        raise ParameterError("no output is selected; name one, as in outputs=['shuttle.x']")
-    check_outputs(kept, variables)
-    return kept
-
-
-def _unambiguous(parameters: Sequence[str], outputs: Sequence[str]) -> None:
-    names = [*parameters, *outputs, *OWN]
+def _unambiguous(names: Sequence[str]) -> None:
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise ParameterError(
             f"the results would have the column {twice[0]!r} twice; give the output another name, "
             f"as outputs={{'{twice[0]}_': ...}}"
         )
-
-
-def _times(
-    description: Any, stop_time: float | None, step: float | None, tolerance: float | None
-) -> dict[str, Any]:
-    """Return start, stop, step and tolerance; None is replaced by the default experiment."""
-    default, co_simulation = description.defaultExperiment, description.coSimulation
-
-    def proposed(name: str) -> float | None:
-        value = getattr(default, name, None)
-        return None if value is None else float(value)
-
-    start = proposed("startTime") or 0.0
-    stop = stop_time if stop_time is not None else proposed("stopTime")
-    stop = start + 1.0 if stop is None else float(stop)
-    size = step if step is not None else proposed("stepSize")
-    if size is None and co_simulation.fixedInternalStepSize is not None:
-        size = float(co_simulation.fixedInternalStepSize)
-    size = (stop - start) / STEPS if size is None else float(size)
-    tolerance = tolerance if tolerance is not None else proposed("tolerance")
-    if not (math.isfinite(stop) and stop > start):
-        raise ParameterError(f"stop_time = {stop:g} s must be finite and after {start:g} s")
-    for name, x, unit in (("step", size, " s"), ("tolerance", tolerance, "")):
-        if x is not None and not (math.isfinite(x) and x > 0.0):
-            raise ParameterError(f"{name} = {x:g}{unit} must be positive and finite")
-    steps = (stop - start) / size
-    if steps > ROWS_MAX:
-        raise ParameterError(
-            f"step = {size:g} s makes {steps:.0f} steps in {stop - start:g} s: choose a larger one"
-        )
-    odd = abs(steps - round(steps)) > 1e-9 * steps
-    if odd and not co_simulation.canHandleVariableCommunicationStepSize:
-        raise ParameterError(
-            f"stop_time = {stop:g} s: must be a multiple of step = {size:g} s, since the FMU has a "
-            "fixed step; choose a step that divides it"
-        )
-    return {"start": start, "stop": stop, "step": size, "tolerance": tolerance}
 
 
 def _check_name(out: Path) -> None:
@@ -409,16 +221,14 @@ def _check_name(out: Path) -> None:
 # --- results --------------------------------------------------------------------------------------
 
 
-def _frame(plan: Plan, outcomes: Sequence[Outcome]) -> "pd.DataFrame":
+def _frame(
+    journal: Journal, points: Sequence[Point], outcomes: Sequence[Outcome]
+) -> "pd.DataFrame":
     """Return the table of results."""
     import pandas as pd
 
-    nothing = (math.nan,) * len(plan.outputs)
-    rows = [
-        (k, *point, *(outcome.values or nothing), outcome.status, outcome.message)
-        for k, (point, outcome) in enumerate(zip(plan.points, outcomes, strict=True))
-    ]
-    return pd.DataFrame(rows, columns=[ROW, *plan.parameters, *plan.outputs, STATUS, MESSAGE])
+    rows = [(k, *journal.row(*pair)) for k, pair in enumerate(zip(points, outcomes, strict=True))]
+    return pd.DataFrame(rows, columns=[ROW, *journal.heads])
 
 
 def _parquet(found: "pd.DataFrame", settings: Mapping[str, Any]) -> bytes:
@@ -433,7 +243,9 @@ def _parquet(found: "pd.DataFrame", settings: Mapping[str, Any]) -> bytes:
     return content.getvalue()
 
 
-def _earlier(plan: Plan, journal: Journal, out: Path, overwrite: bool) -> dict[Point, Outcome]:
+def _earlier(
+    journal: Journal, points: Sequence[Point], out: Path, overwrite: bool
+) -> dict[Point, Outcome]:
     """Return the rows of a complete table of the same sweep, if there is one.
 
     Raises
@@ -463,18 +275,16 @@ def _earlier(plan: Plan, journal: Journal, out: Path, overwrite: bool) -> dict[P
     if overwrite:
         return {}
     compare(f"{out} contains a sweep", settings, journal.settings)
-    found = {}
-    for k, row in enumerate(table.to_pylist()):
-        point = tuple(row[name] for name in plan.parameters)
-        if k >= len(plan.points) or point != plan.points[k]:
+    rows = table.select(journal.heads).to_pylist()
+    found = [journal.outcome([*row.values()]) for row in rows]
+    for k, (point, _) in enumerate(found):
+        if k >= len(points) or point != points[k]:
             raise ParameterError(
                 f"{out} contains a sweep over another table: row {k} "
-                f"{'is missing now' if k >= len(plan.points) else 'has changed'}; give another "
+                f"{'is missing now' if k >= len(points) else 'has changed'}; give another "
                 "name for the results, or overwrite them (--overwrite)"
             )
-        values = tuple(row[name] for name in plan.outputs) if row[STATUS] in GOOD else ()
-        found[point] = Outcome(row[STATUS], row[MESSAGE], values=values)
-    return found
+    return dict(found)
 
 
 def summary(results: "pd.DataFrame", out: str | os.PathLike[str]) -> str:

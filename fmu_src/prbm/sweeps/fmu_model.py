@@ -1,0 +1,242 @@
+"""An FMU as the model of a study: its variables, times and inputs."""
+
+import hashlib
+import io
+import math
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Self
+
+import fmpy  # type: ignore[import-untyped]
+import numpy as np
+from fmpy.simulation import (  # type: ignore[import-untyped]
+    settable_in_initialization_mode,
+    settable_in_instantiated,
+)
+
+from ..base import reading
+from ..base.archives import UNPACKED_SIZE_MAX, check_unpacked_size
+from ..base.errors import ParameterError
+from ..base.names import proposal
+from ..files.settings import in_unit
+from ..mechanics.arrays import Real
+from ..mechanism.parameters import Tolerance
+from ..runs.inputs import Source, driving, filled
+from ..runs.run import ROWS_MAX
+from .fmu import Job, input_units, unit
+from .outputs import Output
+from .runner import StudyError
+from .table import number
+
+STEPS = 1000  # Communication steps for an FMU without a proposed step.
+NAMES_LISTED_MAX = 10  # Messages with more settable variables refer to "fmpy info" instead.
+NO_NUMBERS = ("String", "Binary", "Clock")  # Types of variables.
+RANGES = {"Boolean": 1, "Int8": 7, "Int16": 15, "Int32": 31, "Integer": 31, "Enumeration": 31,
+          "Int64": 53, "UInt8": 8, "UInt16": 16, "UInt32": 32, "UInt64": 53}  # fmt: skip
+"""Bits of FMI's integer types; a float represents 53 bits exactly."""
+
+
+def read_fmu(path: Path) -> tuple[bytes, Any]:
+    """Return the bytes of an FMU and FMPy's model description.
+
+    Raises
+    ------
+    StudyError
+        If it cannot be read, or has no co-simulation of FMI 2.0 or 3.0.
+    """
+    data = reading.content(path, UNPACKED_SIZE_MAX, StudyError)
+    try:
+        check_unpacked_size(io.BytesIO(data))
+        description = fmpy.read_model_description(io.BytesIO(data), validate=False)
+    except Exception as error:  # FMPy raises plain exceptions.
+        reason = " ".join(str(error).split())
+        raise StudyError(f"{path} is not a readable FMU: {reason}") from None
+    if not description.fmiVersion.startswith(("2", "3")) or description.coSimulation is None:
+        raise StudyError(
+            f"{path} (FMI {description.fmiVersion}): must have co-simulation of FMI 2.0 or 3.0; "
+            "export such an FMU"
+        )
+    return data, description
+
+
+class FmuModel:
+    """An FMU, a :class:`prbm.sweeps.study.Model`.
+
+    Raises
+    ------
+    StudyError
+        If it cannot be read, or has no co-simulation of FMI 2.0 or 3.0.
+    """
+
+    owner = "the FMU"
+    tolerances: Mapping[str, Tolerance] = {}
+
+    def __init__(self, path: str | Path) -> None:
+        self.content, self.description = read_fmu(Path(path))
+        self.variables = {v.name: v for v in self.description.modelVariables}
+        self.identity = {
+            "FMU": hashlib.sha256(self.content).hexdigest(), "model": self.description.modelName,
+        }  # fmt: skip
+        self.units = {name: unit(v) for name, v in self.variables.items()}
+
+    @cached_property
+    def values(self) -> dict[str, float]:
+        """The start values of all variables that can be set; NaN for those without."""
+        return {name: number(v.start) for name, v in self.variables.items() if _settable(v)}
+
+    @property
+    def outputs(self) -> list[str]:
+        """The outputs that are numbers."""
+        return [n for n, v in self.variables.items() if v.causality == "output" and _numeric(v)]
+
+    def needing(self, outputs: object) -> Self:
+        """Return the FMU, which has the same variables for all outputs."""
+        return self
+
+    def refusal(self, name: str) -> str:
+        """Return why a variable cannot be set before a run."""
+        hint = proposal(name, self.values)
+        if len(self.values) > NAMES_LISTED_MAX and hint.startswith("known"):
+            hint = "fmpy info lists the variables"
+        if name not in self.variables:
+            return f"the FMU has no variable {name!r}; {hint}"
+        variable = self.variables[name]
+        kind = f"{variable.causality or 'local'} variable of type {variable.type}"
+        shape = f" and shape {variable.shape}" if variable.shape else ""
+        return f"{name} ({kind}{shape}) cannot be set by a table; {hint}"
+
+    def check_output(self, output: Output) -> None:
+        """Reject an output that is not a number of the FMU.
+
+        Raises
+        ------
+        ParameterError
+            If a variable is unknown, an array, or not a number; or the output is that of a
+            mechanism.
+        """
+        if output.static:
+            raise ParameterError(f"output {output.column}: needs a mechanism; use prbm study")
+        output.check(self.variables, self.owner)
+        for variable in map(self.variables.__getitem__, output.variables(self.variables)):
+            if not _numeric(variable):
+                shape = f" and shape {variable.shape}" if variable.shape else ""
+                raise ParameterError(
+                    f"output {output.column}: {variable.name} is of type {variable.type}{shape}, "
+                    "not one number; leave it out"
+                )
+
+    def check_column(self, name: str, x: Real) -> None:
+        """Reject values (n,) that are not of the type of a variable.
+
+        Raises
+        ------
+        ParameterError
+            If one of them is not.
+        """
+        kind = self.variables[name].type if name in self.variables else ""
+        if kind not in RANGES:
+            return
+        high = 2.0 ** RANGES[kind]
+        low = 0.0 if kind[0] in "UB" else -high
+        wrong = (x != np.round(x)) | (x < low) | (x >= high)
+        if wrong.any():
+            row = int(wrong.argmax())
+            required = "0 or 1 (Boolean)" if kind == "Boolean" else f"a whole number ({kind})"
+            raise ParameterError(f"row {row} of the table: {name} = {x[row]:g} must be {required}")
+
+    def fixed(self, values: Mapping[str, float | str] | None) -> dict[str, float]:
+        """Return start values of all runs in the units of the FMU.
+
+        Raises
+        ------
+        ParameterError
+            If a variable cannot be set, or a value is not a finite number.
+        """
+        found = {}
+        for name, x in (values or {}).items():
+            if name not in self.values:
+                raise ParameterError(self.refusal(name))
+            found[name] = in_unit(name, x, self.units[name])
+            if not math.isfinite(found[name]):
+                raise ParameterError(f"{name} = {x} among the values must be finite")
+        return found
+
+    def job(
+        self,
+        outputs: tuple[Output, ...],
+        values: Mapping[str, float],
+        inputs: Mapping[str, Source],
+        row: Mapping[str, float],
+        options: tuple[Any, Any, Any, Any],
+    ) -> Job:
+        """Return the runs, from stop time, step, tolerance and engine, which must be None.
+
+        Raises
+        ------
+        ParameterError
+            If an option is invalid, or the signals with the numbers of the first row.
+        """
+        stop_time, step, tolerance, engine = options
+        if engine is not None:
+            raise ParameterError(f"engine = {engine!r}: an FMU has its own; omit it")
+        varies = self.description.coSimulation.canHandleVariableCommunicationStepSize
+        if inputs and not varies:
+            raise ParameterError(
+                "inputs over time need an FMU with variable communication steps; this one has "
+                "fixed steps: leave the inputs out"
+            )
+        units = input_units(self.description)
+        driving(units, self.values.keys() - units, filled(inputs, row), {*values, *row})
+        times = self._times(stop_time, step, tolerance, varies)
+        return Job(*times, values, outputs, inputs, content=self.content)
+
+    def _times(
+        self, stop_time: Any, step: Any, tolerance: Any, varies: bool
+    ) -> tuple[float, float, float, float | None]:
+        """Return start, stop, step and tolerance; None is replaced by the default experiment."""
+        proposed = {
+            name: None if x is None else float(x)
+            for name in ("startTime", "stopTime", "stepSize", "tolerance")
+            for x in [getattr(self.description.defaultExperiment, name, None)]
+        }
+        start, stop = proposed["startTime"] or 0.0, proposed["stopTime"]
+        stop = start + 1.0 if stop is None else stop
+        stop = stop if stop_time is None else in_unit("stop_time", stop_time, "s")
+        size = proposed["stepSize"]
+        if size is None:
+            size = float(self.description.coSimulation.fixedInternalStepSize or 0.0)
+        size = size or (stop - start) / STEPS
+        size = size if step is None else in_unit("step", step, "s")
+        if tolerance is None:
+            tolerance = proposed["tolerance"]
+        if not (math.isfinite(stop) and stop > start):
+            raise ParameterError(f"stop_time = {stop:g} s must be finite and after {start:g} s")
+        for name, x, of_unit in (("step", size, " s"), ("tolerance", tolerance, "")):
+            if x is not None and not (math.isfinite(x) and x > 0.0):
+                raise ParameterError(f"{name} = {x:g}{of_unit} must be positive and finite")
+        steps = (stop - start) / size
+        if steps > ROWS_MAX:
+            raise ParameterError(
+                f"step = {size:g} s makes {steps:.0f} steps in {stop - start:g} s: choose a larger "
+                "one"
+            )
+        if abs(steps - round(steps)) > 1e-9 * steps and not varies:
+            raise ParameterError(
+                f"stop_time = {stop:g} s: must be a multiple of step = {size:g} s, since the FMU "
+                "has a fixed step; choose a step that divides it"
+            )
+        return start, stop, size, tolerance
+
+
+def _numeric(variable: Any) -> bool:
+    return variable.type not in NO_NUMBERS and not variable.shape
+
+
+def _settable(variable: Any) -> bool:
+    """Return whether FMPy can set a variable to a number before or during initialization."""
+    if not _numeric(variable) or variable.causality in (
+        "structuralParameter", "calculatedParameter", "independent"
+    ):  # fmt: skip
+        return False
+    return bool(settable_in_instantiated(variable) or settable_in_initialization_mode(variable))
