@@ -32,6 +32,6 @@ def test_tables_of_sweeps_with_many_columns():
 
     def read(frame: object) -> object:
         read = table.read_table(frame)
-        return [table.numbers(name, cells) for name, cells in read.items()]
+        return [table.numbers(name, cells) for name, (cells, _) in read.items()]
 
     assert not grows(read, frame, 200, FACTOR, 1)

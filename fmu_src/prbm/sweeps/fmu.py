@@ -12,7 +12,6 @@ from contextlib import contextmanager
 from ctypes import c_uint
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import pairwise
 from math import isclose
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -174,13 +173,15 @@ class Runner:
             logger=self._log2 if self.two else self._log3,
             require_functions=False,
         )
-        named = {variable.name: variable for variable in variables}
+        self.named = {variable.name: variable for variable in variables}
+        self.time = job.start
+        self.ended: float | None = None  # The time at which the FMU ended the simulation [s].
         history, final = (
             {
-                name: named[name]
+                name: self.named[name]
                 for output in job.outputs
                 if (output.reduction == "final") == at_end
-                for name in output.variables(named)
+                for name in output.variables(self.named)
             }
             for at_end in (False, True)
         )
@@ -226,13 +227,10 @@ class Runner:
         texts = list(dict.fromkeys(worst or [text for _, text in self.messages]))[-MESSAGES_MAX:]
         return "; ".join(texts) or str(error) or type(error).__name__
 
-    def _log2(self, _: object, __: bytes, status: int, ___: bytes, text: bytes) -> None:
-        self._note(status, text)
+    def _log2(self, _: object, __: bytes, status: int, category: bytes, text: bytes) -> None:
+        self._log3(None, status, category, text)
 
     def _log3(self, _: object, status: int, __: bytes, text: bytes) -> None:
-        self._note(status, text)
-
-    def _note(self, status: int, text: bytes) -> None:
         self.logged += 1
         if status > 0:
             self.messages.append((status, (text or b"").decode(errors="replace").strip()))
@@ -282,22 +280,21 @@ class Runner:
         self, values: dict[str, float], driver: "Driver | None"
     ) -> tuple[str, str, tuple[float, ...]]:
         self._initialize(values)
-        driven = _Driven(self, self.job.start)
+        self.time, self.ended = self.job.start, None
         if driver is not None:
-            frequency = driven.frequency()
+            frequency = self._frequency()
             driver.sample(frequency, self.job.tolerance or SAMPLING_TOLERANCE, self.job.stop)
         times, rows = [self.points[0]], [self.history.read()]
         status, message = OK, ""
-        for begin, end in pairwise(self.points):
+        for end in self.points[1:]:
             if driver is None:
-                ended = self._step(begin, end - begin)
+                self.advance(end)
             else:
-                driver.advance(driven, end)
-                ended = driven.ended
-            times.append(end if ended is None else ended)
+                driver.advance(self, end)
+            times.append(end if self.ended is None else self.ended)
             rows.append(self.history.read())
-            if ended is not None:
-                status, message = ENDED, f"the FMU ended the run at t = {ended:.9g} s"
+            if self.ended is not None:
+                status, message = ENDED, f"the FMU ended the run at t = {self.ended:.9g} s"
                 break
         last = self.final.named(self.final.read())
         self.fmu.terminate()
@@ -326,21 +323,37 @@ class Runner:
         """Set the values that can be set in the present mode; return the others."""
         return apply_start_values(self.fmu, self.description, values, settable=when)  # type: ignore[no-any-return]
 
-    def _step(self, t: float, size: float) -> float | None:
-        """Take a step; return the time at which the FMU ended the simulation [s], or None."""
+    def _frequency(self) -> float:
+        """Return the fundamental frequency [Hz]; 0 if the FMU has no such variable."""
+        if FREQUENCY not in self.named:
+            return 0.0
+        get = self.fmu.getReal if self.two else self.fmu.getFloat64
+        return float(get([self.named[FREQUENCY].valueReference])[0])
+
+    def set(self, changes: Mapping[str, float]) -> None:
+        """Set inputs, unless the FMU has ended the simulation."""
+        if self.ended is None:
+            setter = self.fmu.setReal if self.two else self.fmu.setFloat64
+            setter([self.named[name].valueReference for name in changes], [*changes.values()])
+
+    def advance(self, time: float) -> None:
+        """Step to a time [s], unless the FMU has ended the simulation; ``ended`` is that time."""
+        if self.ended is not None:
+            return
+        begin, self.time = self.time, time
         if not self.two:
-            event, ended, _, last = self.fmu.doStep(t, size)
+            event, ended, _, last = self.fmu.doStep(begin, time - begin)
             if self.events and event and not ended:
                 self.fmu.enterEventMode()
                 ended = self._update()
-            return float(last) if ended else None
+            self.ended = float(last) if ended else None
+            return
         try:
-            self.fmu.doStep(t, size)
+            self.fmu.doStep(begin, time - begin)
         except FMICallException as error:
-            if error.status == DISCARD and self.fmu.getBooleanStatus(TERMINATED):
-                return float(self.fmu.getRealStatus(LAST_TIME))
-            raise
-        return None
+            if not (error.status == DISCARD and self.fmu.getBooleanStatus(TERMINATED)):
+                raise
+            self.ended = float(self.fmu.getRealStatus(LAST_TIME))
 
     def _update(self) -> bool:
         """Update discrete states, leave event mode; return whether the FMU ended the simulation."""
@@ -350,44 +363,6 @@ class Runner:
         if not ended:
             self.fmu.enterStepMode()
         return bool(ended)
-
-
-class _Driven:
-    """An FMU whose inputs change during a communication step.
-
-    Parameters
-    ----------
-    runner : Runner
-        The FMU.
-    time : float
-        Time at the start [s].
-    """
-
-    def __init__(self, runner: Runner, time: float) -> None:
-        self.runner, self.time = runner, time
-        self.ended: float | None = None
-        self.references = {v.name: v.valueReference for v in runner.description.modelVariables}
-
-    def frequency(self) -> float:
-        """Return the fundamental frequency [Hz]; 0 if the FMU has no such variable."""
-        if FREQUENCY not in self.references:
-            return 0.0
-        fmu, reference = self.runner.fmu, [self.references[FREQUENCY]]
-        found = fmu.getReal(reference) if self.runner.two else fmu.getFloat64(reference)
-        return float(found[0])
-
-    def set(self, changes: Mapping[str, float]) -> None:
-        """Set inputs."""
-        references, values = [self.references[name] for name in changes], list(changes.values())
-        if self.ended is None:
-            setter = self.runner.fmu.setReal if self.runner.two else self.runner.fmu.setFloat64
-            setter(references, values)
-
-    def advance(self, time: float) -> None:
-        """Step to a time [s], unless the FMU has ended the simulation."""
-        if self.ended is None:
-            self.ended = self.runner._step(self.time, time - self.time)
-            self.time = time
 
 
 class _Recorder:

@@ -266,22 +266,18 @@ class Search:
             which = " that satisfies the constraints" if self.constraints else ""
             raise ParameterError(f"no simulation has a value of {self.output}{which}")
         names = self.samples.names
-        if len(names) == 1:
-            ends = {names[0]: self._refined_range()}
-        else:
-            if self.constraints:
-                for k in np.argsort(self.costs[: self.count], kind="stable")[:STARTS]:
-                    self._descend(int(k))
-                for _ in range(ROUNDS_MAX):
-                    before = min(self.costs)
-                    self._descend(int(np.argmin(self.costs)), RESTART_RADIUS)
-                    if before - min(self.costs) <= REFINED_RTOL * abs(before):
-                        break
-            self._simplex()
-            ends = {name: self._along(j) for j, name in enumerate(names)}
+        refine = self._between_neighbours if len(names) == 1 else self._simplex
+        if self.constraints and len(names) > 1:
+            self._descend_from_best()
+        for _ in range(ROUNDS_MAX):
+            refine()
+            limit = self._limit()
+            ends = {n: [self._end(j, s, limit) for s in (-1.0, 1.0)] for j, n in enumerate(names)}
+            if len(names) > 1 or self._limit() == limit:
+                break  # Otherwise the output jumps, and the search for the ends met a better point.
         return self._result(ends)
 
-    def _result(self, ends: Mapping[str, tuple[tuple[float, bool], tuple[float, bool]]]) -> Optimum:
+    def _result(self, ends: Mapping[str, Sequence[tuple[float, bool]]]) -> Optimum:
         order = np.argsort(self.costs, kind="stable")
         k, names = int(order[0]), self.samples.names
         points, found = np.array(self.points), self.found[k]
@@ -301,9 +297,8 @@ class Search:
             self.sign * np.array(self.costs)[best],
             dict(zip(self.samples.outputs, map(float, found), strict=True)),
             dict(zip(names, self.samples.sizes.tolist(), strict=True)),
-            {n: (low, high) for n, (low, high) in zip(names, self.samples.bounds.tolist(),
-                                                      strict=True)},
-        )  # fmt: skip
+            dict(zip(names, map(tuple, self.samples.bounds.tolist()), strict=True)),
+        )
 
     def _distinct(self, order: Sequence[int] | Any) -> list[int]:
         """Return the best points that differ by more than :data:`DISTINCT` from better ones."""
@@ -333,22 +328,6 @@ class Search:
         best = min(self.costs)
         return best + FLAT_RTOL * abs(best)
 
-    # -- one parameter --
-
-    def _refined_range(self) -> tuple[tuple[float, bool], tuple[float, bool]]:
-        """Refine the best sample of one parameter, and return the range around the optimum.
-
-        The search for the ends of the range may meet a better point if the output jumps.  The
-        refinement is then repeated there.
-        """
-        for _ in range(ROUNDS_MAX):
-            self._between_neighbours()
-            limit, x = self._limit(), np.array(self.points)[:, 0]
-            ends = self._range(x, np.array(self.costs), int(np.argmin(self.costs)), limit)
-            if self._limit() == limit:
-                break
-        return ends
-
     def _between_neighbours(self) -> None:
         """Refine the best point of one parameter between its neighbours."""
         x, k = np.unique(self.points), float(self.points[int(np.argmin(self.costs))][0])
@@ -359,41 +338,33 @@ class Search:
             options={"xatol": float(REFINED_RTOL * (high - low)), "maxiter": REFINEMENTS_MAX},
         )  # fmt: skip
 
-    def _range(
-        self, x: Real, costs: Real, k: int, limit: float
-    ) -> tuple[tuple[float, bool], tuple[float, bool]]:
-        """Return the ends of the range around point k in which costs are below a limit.
+    def _end(self, j: int, sign: float, limit: float) -> tuple[float, bool]:
+        """Return an end of the range of parameter j in which costs are below a limit.
 
-        Each end is bisected between the last point inside and the first one outside; it is false
-        with the last sample if no point is outside.
+        The range is that around the best point.  The end is bisected between the last point inside
+        and the first one outside; it is false with the end of the samples if no point is outside.
         """
-        order = np.argsort(x, kind="stable")
-        x, outside = x[order], ~(costs[order] <= limit)
-        k = int(np.flatnonzero(order == k)[0])
-        above, below = np.flatnonzero(outside[k:]), np.flatnonzero(outside[: k + 1])
-        last = k + int(above[0]) - 1 if len(above) else len(x) - 1
-        first = int(below[-1]) + 1 if len(below) else 0
-        return (
-            self._edge(x[first], x[first - 1] if len(below) else None, limit),
-            self._edge(x[last], x[last + 1] if len(above) else None, limit),
-        )
+        points, costs = np.array(self.points), np.array(self.costs)
+        point = points[int(np.argmin(costs))]
+        on_line = (np.delete(points, j, 1) == np.delete(point, j)).all(axis=1)
+        x, outside = sign * points[on_line, j], ~(costs[on_line] <= limit)
+        last = max(sign * self.samples.bounds[j])
+        first = min(x[outside & (x > sign * point[j])], default=math.inf)  # Outside.
+        inside = max(x[~outside & (x < first)])
 
-    def _edge(
-        self, inside: float, outside: float | None, limit: float, j: int = 0
-    ) -> tuple[float, bool]:
-        """Return the end of a range along parameter j, and whether it lies inside the samples."""
-        if outside is None:
-            return float(inside), False
-        point = self.points[int(np.argmin(self.costs))].copy()
-        while abs(outside - inside) > EDGE_RTOL * self.samples.sizes[j]:
-            middle = point[j] = 0.5 * (inside + outside)
-            if self.value(point) <= limit:
-                inside = middle
-            else:
-                outside = middle
-        return float(inside), True
+        def good(value: float) -> bool:
+            point[j] = sign * value
+            return self.value(point) <= limit
 
-    # -- several parameters --
+        while math.isinf(first) and inside < last:
+            ahead = min(inside + self.samples.sizes[j], last)
+            inside, first = (ahead, first) if good(ahead) else (inside, ahead)
+        if math.isinf(first):
+            return float(sign * inside), False
+        while first - inside > EDGE_RTOL * self.samples.sizes[j]:
+            middle = 0.5 * (inside + first)
+            inside, first = (middle, first) if good(middle) else (inside, middle)
+        return float(sign * inside), True
 
     def _simplex(self) -> None:
         """Refine the best point by the simplex of Nelder and Mead, in units of the distances."""
@@ -415,6 +386,16 @@ class Search:
         """Return the sum of the relative violations of the constraints."""
         excess = [c.excess(values[self.index[c.output]]) for c in self.constraints]
         return sum(-min(x, 0.0) if math.isfinite(x) else 1e3 for x in excess)
+
+    def _descend_from_best(self) -> None:
+        """Search under constraints from the best samples, and again around the best point."""
+        for k in np.argsort(self.costs[: self.count], kind="stable")[:STARTS]:
+            self._descend(int(k))
+        for _ in range(ROUNDS_MAX):
+            before = min(self.costs)
+            self._descend(int(np.argmin(self.costs)), RESTART_RADIUS)
+            if before - min(self.costs) <= REFINED_RTOL * abs(before):
+                break
 
     def _descend(self, k: int, radius: float = 0.5) -> None:
         """Search under constraints from point k by COBYQA, in units of the distances."""
@@ -445,20 +426,3 @@ class Search:
             options={"maxfev": REFINEMENTS_MAX * len(sizes), "initial_tr_radius": radius,
                      "final_tr_radius": 0.1 * REFINED_RTOL},
         )  # fmt: skip
-
-    def _along(self, j: int) -> tuple[tuple[float, bool], tuple[float, bool]]:
-        """Return the range along parameter j in which the cost is within 5 % of the optimum."""
-        limit = self._limit()
-        best = self.points[int(np.argmin(self.costs))]
-        ends = []
-        for sign, end in ((-1.0, self.samples.bounds[j, 0]), (1.0, self.samples.bounds[j, 1])):
-            inside, point = float(best[j]), best.copy()
-            outside = None
-            while outside is None and sign * (end - inside) > 0.0:
-                point[j] = inside + sign * min(self.samples.sizes[j], sign * (end - inside))
-                if self.value(point) <= limit:
-                    inside = float(point[j])
-                else:
-                    outside = float(point[j])
-            ends.append(self._edge(inside, outside, limit, j))
-        return ends[0], ends[1]

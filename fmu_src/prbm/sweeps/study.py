@@ -42,7 +42,7 @@ from .mechanism import MechanismModel
 from .optimum import REFINEMENTS_EXPECTED, Constraint, Optimum, Samples, Search
 from .outputs import GOOD, Outcome, parse_output
 from .runner import Runner
-from .table import check_separator, name_and_unit, numbers, read_table
+from .table import check_separator, numbers, read_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -394,8 +394,9 @@ def planned(
     sources = dict(inputs or {})
     given = model.fixed(values)
     columns = _columns(vary, runs, model)
+    listed = not (vary is None or isinstance(vary, Mapping))
     _check_names(model, columns, placeholders(sources), given)
-    varied, points = _points(columns, runs, drawing, known, {**model.values, **given})
+    varied, points = _points(columns, listed, runs, drawing, known, {**model.values, **given})
     for name, x in zip(varied, points.T, strict=True):
         model.check_column(name, x)
     shown = {n: known.get(n, "") for n in varied} | {o.column: o.unit(known) for o in kept}
@@ -405,7 +406,7 @@ def planned(
     )
     first = dict(zip(varied, points[0].tolist(), strict=True))
     job = model.job(kept, given, sources, first, options)
-    whole = runs is None and isinstance(vary, Mapping)
+    whole = runs is None and not listed
     return Plan(job, model.identity, varied, points, goal, constraints, (whole, *drawing), shown)
 
 
@@ -421,37 +422,23 @@ def _columns(vary: Vary, runs: int | None, model: Model) -> Mapping[str, Any]:
         return vary
     if runs is not None:
         raise ParameterError("runs are drawn from ranges, not from a table; omit one of them")
-    found = {}
-    for head, cells in read_table(vary).items():
-        name, unit = name_and_unit(head, model.units)
-        found[name] = _Cells(cells, unit)
-    return found
-
-
-@dataclass(frozen=True)
-class _Cells:
-    """The cells of a column of a table and the unit in its head."""
-
-    cells: Sequence[Any]
-    unit: str
-
-    def values(self, name: str, unit: str) -> Real:
-        """Return the numbers (n,) in the unit of the parameter."""
-        return numbers(name, self.cells) * (
-            in_unit(name, f"1 {self.unit}", unit) if self.unit else 1.0
-        )
+    return read_table(vary, model.units)
 
 
 def _points(
     vary: Mapping[str, Any],
+    listed: bool,
     runs: int | None,
     drawing: tuple[str, int],
     known: Mapping[str, str],
     base: Mapping[str, float],
 ) -> tuple[dict[str, Any], Real]:
     """Return samples or distributions, and the points of a table, of a grid, or drawn ones."""
-    if any(isinstance(given, _Cells) for given in vary.values()):
-        varied = {n: x.values(n, known.get(n, "")) for n, x in vary.items()}
+    if listed:
+        varied = {
+            n: numbers(n, x, in_unit(n, f"1 {unit}", known.get(n, "")) if unit else 1.0)
+            for n, (x, unit) in vary.items()
+        }
         return varied, np.column_stack([*varied.values()])
     if runs is None:
         varied = {n: _samples(n, x, known) for n, x in vary.items()}

@@ -3,7 +3,7 @@
 import csv
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,61 +20,63 @@ HEAD = re.compile(r"([^\[\]]*)\[([^\[\]]*)\]")  # A name and a unit in brackets.
 Cells = Sequence[Any]
 
 
-def read_table(table: Any) -> dict[str, Cells]:
-    """Return the cells of a table by the heads of its columns.
+def read_table(table: Any, known: Container[str] = ()) -> dict[str, tuple[Cells, str]]:
+    """Return for each column of a table its cells, and the unit in its head.
 
     Parameters
     ----------
     table : DataFrame, str or Path
         The table, or the path of a CSV or Parquet file.
+    known : container of str
+        Names of variables, which may have brackets.  Other heads may have a unit, which is empty
+        otherwise: ``stop.position [mm]``.
 
     Raises
     ------
     ParameterError
         If the file cannot be read, or the table has no row, no column or two of one name.
     """
-    where = "the table"
-    if isinstance(table, str | Path):
-        where, table = str(table), Path(table)
-        if table.suffix.lower() not in (".parquet", ".pq"):
-            heads, *rows = _read_csv(table) or [[]]
-            columns = [[row[k] if k < len(row) else "" for row in rows] for k in range(len(heads))]
-            return _checked(where, heads, columns, len(rows))
-        table = _read_parquet(table)
-    return _checked(where, [*table.columns], [x.tolist() for _, x in table.items()], len(table))
-
-
-def _checked(where: str, heads: Cells, columns: Sequence[Cells], rows: int) -> dict[str, Cells]:
-    names = [str(head).strip() for head in heads]
-    if not (rows and names and all(names)):
+    path = Path(table) if isinstance(table, str | Path) else None
+    if path is not None and path.suffix.lower() not in (".parquet", ".pq"):
+        columns = _read_csv(path)
+    else:
+        frame = table if path is None else _read_parquet(path)
+        columns = [(str(head), column.tolist()) for head, column in frame.items()]
+    where, rows = path or "the table", len(columns[0][1]) if columns else 0
+    found: dict[str, tuple[Cells, str]] = {}
+    for head, cells in columns:
+        name, unit = head.strip(), ""
+        if name not in known and (parts := HEAD.fullmatch(name)):
+            name, unit = parts[1].strip(), parts[2].strip().strip("-")
+        if name in found:
+            raise ParameterError(f"{where} has the column {name!r} twice; keep one")
+        found[name] = cells, unit
+    if not rows or "" in found:
         raise ParameterError(
-            f"{where} has {rows} rows and {sum(map(bool, names))} columns; write a column for each "
+            f"{where} has {rows} rows and {len(columns)} columns; write a column for each "
             "parameter, headed by its name, and a row for each run"
         )
-    found = dict(zip(names, columns, strict=True))
-    if len(found) < len(names):
-        twice = next(name for name in sorted(names) if names.count(name) > 1)
-        raise ParameterError(f"{where} has the column {twice!r} twice; keep one")
     return found
 
 
-def _read_csv(path: Path) -> list[list[str]]:
+def _read_csv(path: Path) -> list[tuple[str, Cells]]:
     if not path.exists():
         raise ParameterError(
             f"{reading.shown(path)} does not exist; give a CSV or Parquet file of parameters"
         )
     try:
         text = reading.text(path, FILE_SIZE_MAX, ParameterError)
-        rows = [row for row in csv.reader(text, skipinitialspace=True) if row]
+        heads, *rows = [row for row in csv.reader(text, skipinitialspace=True) if row] or [[]]
     except (UnicodeDecodeError, csv.Error) as error:
         raise ParameterError(f"{path} cannot be read as a table: {error}") from None
-    for k, row in enumerate(rows[1:]):
-        if len(row) > len(rows[0]) and not {*SEPARATORS} & {*"".join(rows[0])}:
+    for k, row in enumerate(rows):
+        if len(row) > len(heads) and not {*SEPARATORS} & {*"".join(heads)}:
             raise ParameterError(
                 f"{path} cannot be read as a table: row {k} has {len(row)} cells, more than its "
                 "head has names; write numbers with a decimal point, and commas between them"
             )
-    return rows
+    return [(head, [row[k] if k < len(row) else "" for row in rows])
+            for k, head in enumerate(heads)]  # fmt: skip
 
 
 def _read_parquet(path: Path) -> Any:
@@ -87,20 +89,6 @@ def _read_parquet(path: Path) -> Any:
     except (OSError, ValueError) as error:  # Errors of pandas and pyarrow are subclasses.
         reason = " ".join(str(error).split()) or type(error).__name__
         raise ParameterError(f"{path} cannot be read as a table: {reason}") from None
-
-
-def name_and_unit(head: str, known: Mapping[str, str]) -> tuple[str, str]:
-    """Return the name and the unit in the head of a column, ``stop.position [mm]``.
-
-    The unit is empty if there is none; a known name may have brackets.
-
-    Examples
-    --------
-    >>> name_and_unit("x [mm]", {}), name_and_unit("x[1]", {"x[1]": "m"}), name_and_unit("x", {})
-    (('x', 'mm'), ('x[1]', ''), ('x', ''))
-    """
-    found = None if head in known else HEAD.fullmatch(head)
-    return (found[1].strip(), found[2].strip().strip("-")) if found else (head, "")
 
 
 def check_separator(name: str) -> None:
@@ -119,7 +107,7 @@ def check_separator(name: str) -> None:
             )
 
 
-def numbers(name: str, cells: Cells) -> Real:
+def numbers(name: str, cells: Cells, factor: float = 1.0) -> Real:
     """Return the cells of a column as numbers, (n,); the words true and false are 1 and 0.
 
     Raises
@@ -134,7 +122,7 @@ def numbers(name: str, cells: Cells) -> Real:
             f"row {row} of the table: {name} = {cells[row]!s} must be a finite number; correct it "
             "or leave the row out"
         )
-    return x
+    return factor * x
 
 
 def number(cell: Any) -> float:
