@@ -5,6 +5,7 @@ import re
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy import stats
 
@@ -197,6 +198,23 @@ def test_the_table_of_a_study_is_a_list_for_the_next_one(mechanisms, tmp_path):
     (tmp_path / "list.csv").write_text("\n".join(rows), encoding="utf-8")
     study(mechanisms["PRBDM"], tmp_path / "list.csv", ["impacts"], table=second, **SHORT)
     assert second.read_bytes() == first.read_bytes()
+
+
+def test_rows_are_added_to_a_table_in_parquet_with_the_same_bytes(mechanisms, tmp_path):
+    """The first row is not simulated again; a failed one is a row with its reason."""
+    rows = pd.DataFrame({"stop.position [mm]": [0.5, -30.0, 1.0], "stop.restitution": 0.5})
+    given, seen = {"table": tmp_path / "a.parquet", **SHORT}, list[float]()
+    study(mechanisms["PRBDM"], rows[:1], ["impacts"], **given)
+    study(mechanisms["PRBDM"], rows, ["impacts"], progress=seen.append, **given)
+    assert seen[0] == pytest.approx(1.0 / 3.0)
+    study(mechanisms["PRBDM"], rows, ["impacts"], **(given | {"table": tmp_path / "b.parquet"}))
+    assert (tmp_path / "a.parquet").read_bytes() == (tmp_path / "b.parquet").read_bytes()
+    found = pd.read_parquet(tmp_path / "a.parquet")
+    assert found["stop.position"].tolist() == [0.5e-3, -30e-3, 1e-3]
+    assert found["status"].tolist() == ["ok", "failed", "ok"]
+    assert "penetrated" in found["message"][1]
+    with pytest.raises(ParameterError, match=r"another table: row 1 has changed"):
+        study(mechanisms["PRBDM"], rows[::2], ["impacts"], **given)
 
 
 @pytest.mark.parametrize(

@@ -32,9 +32,10 @@ from prbm.commands.command_line import main
 from prbm.sweeps import runner
 from prbm.sweeps.fmu import Job, Runner
 from prbm.sweeps.outputs import Output, evaluate, parse_output, reduce
+from prbm.sweeps.results import OWN
+from prbm.sweeps.results import SETTINGS as KEY
 from prbm.sweeps.runner import StudyError
-from prbm.sweeps.sweep import OWN, samples, summary, sweep
-from prbm.sweeps.sweep import SETTINGS as KEY
+from prbm.sweeps.sweep import samples, summary, sweep
 from signals import interruptible
 from support import SUPPORT
 

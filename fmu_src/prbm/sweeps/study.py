@@ -42,7 +42,7 @@ from .mechanism import MechanismModel
 from .optimum import REFINEMENTS_EXPECTED, Constraint, Optimum, Samples, Search
 from .outputs import GOOD, Outcome, parse_output
 from .runner import Runner
-from .table import check_separator, numbers, read_table
+from .table import PARQUET, check_separator, numbers, read_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -137,7 +137,7 @@ class Study:
 def study(
     mechanism: Mechanism | str | Path,
     vary: Vary,
-    outputs: Outputs = (),
+    outputs: Outputs | None = (),
     *,
     runs: int | None = None,
     method: str = "sobol",
@@ -180,10 +180,11 @@ def study(
         uniform one, ``"+- 2 % uniform"``.  None: the tolerances of the mechanism.  Or the path of a
         CSV or Parquet file, or a DataFrame, with a row for each simulation and a column for each
         name, in SI or with a unit in the head, ``stop.position [mm]``.
-    outputs : sequence of str, or mapping of str to str
+    outputs : sequence of str, mapping of str to str, or None
         Outputs as of :func:`prbm.sweeps.sweep.sweep`: ``settling``, ``max(abs(shuttle.vx))``; or,
         without a simulation, ``fundamental``, ``mode(2)`` and ``rest(shuttle.x)``.  If one of them
         is a stress, all flexures have stress outputs.  The keys of a mapping are their names.
+        None: all outputs of an FMU.
     runs : int or None
         Number of points that are drawn; None: ``vary`` is a grid.
     method, seed : str, int
@@ -212,9 +213,10 @@ def study(
     timeout : float or None
         Longest duration of a simulation [s]; None: no limit.
     table : str, Path or None
-        Path of a table of the simulations (CSV), which is written at the end.  Completed rows are
-        in ``TABLE.partial`` beside it until then, and a study with the same settings continues from
-        there.
+        Path of a table of the simulations, which is written at the end: CSV, or Parquet as of
+        :func:`prbm.sweeps.sweep.sweep` if the name ends in ``.parquet``, to which rows can be
+        added.  Completed rows are in ``TABLE.partial`` beside it until then, and a study with the
+        same settings continues from there.
     overwrite : bool
         Forget the rows of an earlier study.
     retry_failed : bool
@@ -231,29 +233,16 @@ def study(
     """
     model = MechanismModel(mechanism) if isinstance(mechanism, Mechanism) else _fmu(mechanism)
     plan = planned(
-        model, vary, outputs or model.outputs, runs, (method, seed), _goal(minimise, maximise),
-        subject_to, values, inputs, (stop_time, step, tolerance, engine),
+        model, vary, model.outputs if outputs is None else outputs, runs, (method, seed),
+        _goal(minimise, maximise), subject_to, values, inputs,
+        (stop_time, step, tolerance, engine),
     )  # fmt: skip
     plan = _with_spread(plan, model, tolerances or {})
-    if table is not None:
-        check_file(Path(table))
-    journal = Journal(
-        None if table is None else Path(table), plan.settings, plan.columns, plan.texts
-    )
-    with (
-        Runner(
-            plan.job, plan.columns, journal, len(plan.points), workers=workers, executor=executor,
-            retries=retries, timeout=timeout,
-        ) as runner,
-        journal.opened(overwrite, retry_failed),
-    ):  # fmt: skip
-        if runner.executor is not None:
-            _check_sources(plan.job.inputs)
-        found = _run(plan, runner, progress or (lambda fraction: None))
-        if table is not None:
-            write(table, csv_text(*found.table()).encode())
-        journal.remove()
-    return found
+    return computed(
+        plan, table, parquet=Path(table or "").suffix.lower() in PARQUET, workers=workers,
+        executor=executor, retries=retries, timeout=timeout, overwrite=overwrite,
+        retry_failed=retry_failed, progress=progress,
+    )  # fmt: skip
 
 
 def _fmu(path: str | Path) -> Model:
@@ -563,6 +552,48 @@ def _condition(text: str) -> tuple[str, str, str, str]:
 
 
 # --- simulations ----------------------------------------------------------------------------------
+
+
+def computed(
+    plan: Plan,
+    table: str | Path | None,
+    *,
+    parquet: bool,
+    overwrite: bool,
+    retry_failed: bool,
+    progress: Progress | None,
+    **limits: Any,
+) -> Study:
+    """Compute the rows of a plan, its optimum and yield, and write its table, CSV or Parquet.
+
+    The other arguments are those of :func:`study`; ``limits`` are those of
+    :class:`prbm.sweeps.runner.Runner`.
+
+    Raises
+    ------
+    ParameterError, StudyError
+        As :func:`study` and :func:`prbm.sweeps.sweep.sweep`.
+    """
+    out = None if table is None else Path(table)
+    journal, rows = Journal(out, plan.settings, plan.columns, plan.texts), plan.rows(plan.points)
+    if out is not None:
+        check_file(out)
+        if parquet:
+            from . import results  # imported here: an extra
+
+            journal.known |= results.earlier(journal, rows, out, overwrite)
+    with (
+        Runner(plan.job, plan.columns, journal, len(rows), **limits) as runner,
+        journal.opened(overwrite, retry_failed),
+    ):
+        if runner.executor is not None:
+            _check_sources(plan.job.inputs)
+        found = _run(plan, runner, progress or (lambda fraction: None))
+        if out is not None:
+            text = csv_text(*found.table()).encode
+            write(out, results.parquet(journal, rows) if parquet else text())
+        journal.remove()
+    return found
 
 
 def _run(plan: Plan, runner: Runner, progress: Progress) -> Study:

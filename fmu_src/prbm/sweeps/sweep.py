@@ -7,23 +7,20 @@ distributed over the cores of this machine, or over an executor or a Dask cluste
 """
 
 import importlib.util
-import io
-import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from concurrent.futures import Executor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..base.atomic import check_file, write
+from ..base.atomic import check_file
 from ..base.errors import ParameterError
 from ..base.progress import Progress
 from .design import drawn
 from .fmu_model import FmuModel
-from .journal import Journal, Point, compare
-from .outputs import GOOD, Outcome
-from .runner import Runner, StudyError
-from .study import Outputs, planned
+from .outputs import GOOD
+from .runner import StudyError
+from .study import Outputs, computed, planned
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,9 +30,6 @@ REMEDY = 'install the packages for sweeps with: python -m pip install "prbm-impa
 
 FILES = (".csv", ".feather", ".h5", ".json", ".mat", ".ods", ".tsv", ".txt", ".xls", ".xlsx")
 """Suffixes rejected for the results, which are a Parquet file."""
-ROW, *_ = OWN = ("row", "status", "message")
-"""Columns of every table; no parameter or output may have these names."""
-SETTINGS = b"prbm.settings"  # Key of the settings in the metadata of the Parquet file.
 
 
 def sweep(
@@ -135,21 +129,13 @@ def sweep(
         model, table, model.outputs if outputs is None else outputs, values=values,
         inputs=inputs, options=(stop_time, step, tolerance, None),
     )  # fmt: skip
-    _unambiguous([*plan.columns, *plan.texts, *OWN])
-    journal = Journal(out, plan.settings, plan.columns, plan.texts)
-    rows = plan.rows(plan.points)
-    journal.known |= _earlier(journal, rows, out, overwrite)
-    with (
-        Runner(
-            plan.job, plan.columns, journal, len(rows), workers=workers, executor=scheduler,
-            retries=retries, timeout=timeout,
-        ) as runner,
-        journal.opened(overwrite, retry_failed),
-    ):  # fmt: skip
-        found = _frame(journal, rows, runner.outcomes(rows, progress))
-        write(out, _parquet(found, journal.settings))
-        journal.remove()
-    return found
+    computed(
+        plan, out, parquet=True, workers=workers, executor=scheduler, retries=retries,
+        timeout=timeout, overwrite=overwrite, retry_failed=retry_failed, progress=progress,
+    )  # fmt: skip
+    import pandas as pd
+
+    return pd.read_parquet(out)
 
 
 def samples(
@@ -199,15 +185,6 @@ def _check_packages(*names: str) -> None:
             raise StudyError(f"sweeps need the package {name}; {REMEDY}")
 
 
-def _unambiguous(names: Sequence[str]) -> None:
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise ParameterError(
-            f"the results would have the column {twice[0]!r} twice; give the output another name, "
-            f"as outputs={{'{twice[0]}_': ...}}"
-        )
-
-
 def _check_name(out: Path) -> None:
     if out.suffix.lower() in FILES:
         raise ParameterError(
@@ -216,75 +193,6 @@ def _check_name(out: Path) -> None:
             "CSV file of it"
         )
     check_file(out)
-
-
-# --- results --------------------------------------------------------------------------------------
-
-
-def _frame(
-    journal: Journal, points: Sequence[Point], outcomes: Sequence[Outcome]
-) -> "pd.DataFrame":
-    """Return the table of results."""
-    import pandas as pd
-
-    rows = [(k, *journal.row(*pair)) for k, pair in enumerate(zip(points, outcomes, strict=True))]
-    return pd.DataFrame(rows, columns=[ROW, *journal.heads])
-
-
-def _parquet(found: "pd.DataFrame", settings: Mapping[str, Any]) -> bytes:
-    """Return the content of a Parquet file of results and their settings."""
-    import pyarrow as pa  # type: ignore[import-untyped]
-    import pyarrow.parquet as pq  # type: ignore[import-untyped]
-
-    table = pa.Table.from_pandas(found, preserve_index=False)
-    notes = {**table.schema.metadata, SETTINGS: json.dumps(settings).encode()}
-    content = io.BytesIO()
-    pq.write_table(table.replace_schema_metadata(notes), content)
-    return content.getvalue()
-
-
-def _earlier(
-    journal: Journal, points: Sequence[Point], out: Path, overwrite: bool
-) -> dict[Point, Outcome]:
-    """Return the rows of a complete table of the same sweep, if there is one.
-
-    Raises
-    ------
-    ParameterError
-        If the file has no sweep; or, unless it is to be overwritten, another one or other rows.
-    """
-    if not out.exists():
-        return {}
-    import pyarrow.parquet as pq
-
-    try:
-        table = pq.read_table(out)
-        settings = json.loads((table.schema.metadata or {})[SETTINGS])
-    except KeyError:
-        raise ParameterError(
-            f"{out} exists but contains no sweep; give another name for the results"
-        ) from None
-    except (OSError, ValueError, RecursionError) as error:  # Errors of pyarrow are subclasses.
-        if overwrite:
-            return {}
-        reason = (str(error).splitlines() or [type(error).__name__])[0]
-        raise ParameterError(
-            f"{out} cannot be read ({reason}); give another name for the results, or overwrite "
-            "them (--overwrite)"
-        ) from None
-    if overwrite:
-        return {}
-    compare(f"{out} contains a sweep", settings, journal.settings)
-    rows = table.select(journal.heads).to_pylist()
-    found = [journal.outcome([*row.values()]) for row in rows]
-    for k, (point, _) in enumerate(found):
-        if k >= len(points) or point != points[k]:
-            raise ParameterError(
-                f"{out} contains a sweep over another table: row {k} "
-                f"{'is missing now' if k >= len(points) else 'has changed'}; give another "
-                "name for the results, or overwrite them (--overwrite)"
-            )
-    return dict(found)
 
 
 def summary(results: "pd.DataFrame", out: str | os.PathLike[str]) -> str:

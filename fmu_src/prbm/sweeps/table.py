@@ -14,6 +14,7 @@ from ..base.errors import ParameterError
 from ..mechanics.arrays import Real
 
 SEPARATORS = {";": "semicolons", "\t": "tabs"}  # Separators of CSV dialects that are rejected.
+PARQUET = (".parquet", ".pq")  # Suffixes.
 WORDS = {"true": 1.0, "false": 0.0}
 FILE_SIZE_MAX = 1 << 30  # bytes of a table in CSV; a million rows of 50 columns have 900 MB.
 HEAD = re.compile(r"([^\[\]]*)\[([^\[\]]*)\]")  # A name and a unit in brackets.
@@ -37,7 +38,7 @@ def read_table(table: Any, known: Container[str] = ()) -> dict[str, tuple[Cells,
         If the file cannot be read, or the table has no row, no column or two of one name.
     """
     path = Path(table) if isinstance(table, str | Path) else None
-    if path is not None and path.suffix.lower() not in (".parquet", ".pq"):
+    if path is not None and path.suffix.lower() not in PARQUET:
         columns = _read_csv(path)
     else:
         frame = table if path is None else _read_parquet(path)
