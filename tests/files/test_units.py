@@ -13,7 +13,7 @@ from prbm.commands.command_line import main
 from prbm.files import settings, units
 from prbm.files.mechanism_file import read_mechanism, shipped
 from prbm.runs.inputs import read_signal
-from prbm.sweeps import study
+from prbm.sweeps import plan
 from prbm.sweeps.table import read_table
 
 NUMBERS = [
@@ -65,7 +65,7 @@ def test_a_number_too_large_for_a_double_is_rejected():
         (lambda x: read_signal("force.x", x, "N"), "half-sine(0,5 N, 2 ms)", "0.5 N"),
         (lambda x: read_signal("force.x", x, "N"), "pulse(1 N, 1,5 ms)", "1.5 ms"),
         (lambda x: read_signal("force.x", x, "N"), "0,5 N", "0.5 N"),
-        (lambda x: study._condition(x) and settings.in_unit("constraint", x[14:], "Hz"),
+        (lambda x: plan._condition(x) and settings.in_unit("constraint", x[14:], "Hz"),
          "fundamental > 40,5 Hz", "40.5 Hz"),
     ],
 )  # fmt: skip

@@ -61,7 +61,7 @@ def read_fmu(path: Path) -> tuple[bytes, Any]:
 
 
 class FmuModel:
-    """An FMU, a :class:`prbm.sweeps.study.Model`.
+    """An FMU, a :class:`prbm.sweeps.plan.Model`.
 
     Raises
     ------

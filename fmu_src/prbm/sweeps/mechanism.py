@@ -33,7 +33,7 @@ STEPS = 4000  # Communication steps of a simulation, which resolve the vibration
 
 
 class MechanismModel:
-    """A mechanism, a :class:`prbm.sweeps.study.Model`."""
+    """A mechanism, a :class:`prbm.sweeps.plan.Model`."""
 
     owner = "the mechanism"
     outputs = ()

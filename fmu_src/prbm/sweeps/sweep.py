@@ -19,8 +19,9 @@ from ..base.progress import Progress
 from .design import drawn
 from .fmu_model import FmuModel
 from .outputs import GOOD
+from .plan import Outputs, planned
 from .runner import StudyError
-from .study import Outputs, computed, planned
+from .study import computed
 
 if TYPE_CHECKING:
     import pandas as pd
