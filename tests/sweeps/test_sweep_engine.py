@@ -1,10 +1,14 @@
 """Sweeps over FMUs of this project, compared with the engine: quantities, inputs over time."""
 
+import hashlib
+import json
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from prbm.base.errors import PrbmError
+from prbm.commands.command_line import main
 from prbm.runs.quantities import QUANTITIES
 from prbm.runs.run import simulate
 from prbm.sweeps.study import study
@@ -45,6 +49,21 @@ def test_the_study_of_an_fmu_is_that_of_its_mechanism(native, mechanisms):
         np.testing.assert_allclose(of_fmu.outputs[name], x, rtol=1e-5)
     assert of_fmu.units == of_mechanism.units
     assert of_fmu.table()[0] == of_mechanism.table()[0]
+
+
+def test_the_command_studies_an_fmu(native, tmp_path, capsys):
+    """The record has the name and the hash of the FMU, the table the heads of a mechanism's."""
+    words = ["study", str(native["PRBDM", 2]), "--vary", "stop.position=1:2mm:2", "--of", "impacts"]
+    assert main([*words, "--set", "stop.restitution=50%", "--stop-time", "50ms",
+                 "--out", str(tmp_path)]) == 0  # fmt: skip
+    assert "2 simulations, 0 failed" in capsys.readouterr().out
+    heads, *rows = (tmp_path / "PRBDM-study.csv").read_text(encoding="utf-8").splitlines()
+    assert heads == "stop.position [m],impacts [-],error"
+    assert [row.split(",")[0] for row in rows] == ["0.001", "0.002"]
+    record = json.loads((tmp_path / "PRBDM-study-run.json").read_text(encoding="utf-8"))
+    content = native["PRBDM", 2].read_bytes()
+    assert record["mechanism"]["sha256"] == hashlib.sha256(content).hexdigest()
+    assert record["arguments"]["values"] == {"stop.restitution": 0.5}
 
 
 @pytest.mark.slow

@@ -310,7 +310,7 @@ def _build(plan: BuildPlan, records: Mapping[Path, Record]) -> tuple[list[Path],
                 path = plan.path(flavour, mechanism.name)
                 record, platforms = records[path], [*plan.platforms] if flavour.native else []
                 arguments = {**asdict(flavour), "platforms": platforms, "values": plan.changes}
-                text = record.text(mechanism, arguments)
+                text = record.text(mechanism.name, arguments)
                 _write(path, {path: fmus[flavour], path.with_name(record.name): text.encode()})
                 written.append(path)
     return written, next((missing for _, missing in done.values() if missing), "")

@@ -466,7 +466,7 @@ def _study(commands: Commands) -> None:
             '      --of settling --subject-to "settling < 0.3 s" --stop-time 1',
         ),
     )  # fmt: skip
-    mechanism_argument(parser)
+    parser.add_argument("mechanism", metavar="MECHANISM", help=f"{MECHANISM}, or FMU FILE.fmu")
     study_arguments(parser)
     set_argument(parser, "value of a parameter or input in all simulations")
     input_argument(parser)

@@ -18,7 +18,6 @@ from typing import Any
 from ..base import reading
 from ..base.version import __version__
 from ..files.settings import UserMistake
-from ..mechanism.description import Mechanism
 
 SIZE_MAX = 1 << 24  # bytes; the record of a study over 100,000 samples has 2 MB.
 
@@ -58,15 +57,13 @@ class Record:
             "with --out, or another name in one of the files"
         ]
 
-    def text(
-        self, mechanism: Mechanism, arguments: Mapping[str, Any], files: Iterable[str] = ()
-    ) -> str:
+    def text(self, mechanism: str, arguments: Mapping[str, Any], files: Iterable[str] = ()) -> str:
         """Return the text of the record.
 
         Parameters
         ----------
-        mechanism : Mechanism
-            The mechanism.
+        mechanism : str
+            Name of the mechanism.
         arguments : mapping
             Arguments of the function in Python; arrays become lists.
         files : iterable of str
@@ -76,7 +73,7 @@ class Record:
         content = {
             "version": __version__,
             "mechanism": {
-                "name": mechanism.name, "file": self.file.name, "sha256": _hash(self.file),
+                "name": mechanism, "file": self.file.name, "sha256": _hash(self.file),
             },
             "arguments": arguments,
             **({"files": read} if read else {}),

@@ -71,7 +71,7 @@ def run_simulation(options: argparse.Namespace) -> None:
     output.table(f"{mechanism.name}-impacts.csv", heads(units), rows)
     output.figure(f"{mechanism.name}.png", lambda: _figure(result))
     arguments = _arguments(result, values, inputs, step, tolerance)
-    output.text(record.name, record.text(mechanism, arguments, files_of(inputs)))
+    output.text(record.name, record.text(mechanism.name, arguments, files_of(inputs)))
     output.write()
     for sentence in [*record.notes(), *_notes(result.mechanism, values)]:
         print(sentence)

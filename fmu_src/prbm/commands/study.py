@@ -15,13 +15,12 @@ from ..base.unit_text import prefixed_unit
 from ..files.mechanism_file import file_of, load
 from ..files.settings import (
     UserMistake,
+    assigned,
     has_unit,
     is_tolerance,
     optional_quantity,
     pairs,
     quantity,
-    settings,
-    units_of,
 )
 from ..fmu.parameter_sets import parameter_set
 from ..fmu.start import interface
@@ -31,7 +30,8 @@ from ..runs.engine import KERNEL
 from ..runs.inputs import files_of, placeholders
 from ..sweeps.design import SENSITIVITY, Yield
 from ..sweeps.optimum import EDGE_RTOL, FLAT_RTOL, Optimum
-from ..sweeps.study import Study, study
+from ..sweeps.plan import Model
+from ..sweeps.study import Study, model_of, study
 from .duration import given_inputs
 from .output import Output, aligned
 from .record import Record
@@ -58,16 +58,19 @@ SHARES_HEAD = ["output", "parameter", "alone", "alone, low", "alone, high",
 
 def run_study(options: argparse.Namespace) -> None:
     """Run a study, print its table and its optimum."""
-    mechanism = load(options.mechanism)
-    values = settings(mechanism, options.set)
+    path = Path(options.mechanism)
+    mechanism = None if path.suffix.lower() == ".fmu" else load(path)
+    model = model_of(mechanism or path)
+    units = {name: model.units.get(name, "").removeprefix("1") for name in model.values}
+    values = assigned(units, options.set)
     output = Output(options.out)
     inputs = given_inputs(options)
-    table, figure, best, shares, run = (f"{mechanism.name}-{end}" for end in FILES)
+    table, figure, best, shares, run = (f"{model.name}-{end}" for end in FILES)
     output.check(table, figure, best, shares, run)
-    record = Record(options.out, run, file_of(options.mechanism))
-    arguments = _arguments(options, mechanism, values, inputs)
+    record = Record(options.out, run, path if mechanism is None else file_of(path))
+    arguments = _arguments(options, model, units, values, inputs)
     found = study(
-        mechanism, **arguments, workers=options.workers, executor=options.scheduler,
+        mechanism or path, **arguments, workers=options.workers, executor=options.scheduler,
         timeout=optional_quantity(options.timeout, "s", "--timeout"),
         table=None if options.out is None else options.out / table,
         overwrite=options.overwrite, progress=reporter(),
@@ -82,7 +85,8 @@ def run_study(options: argparse.Namespace) -> None:
             _print_best(found.optimum, found.units)
         for line in _optimum_lines(found.optimum, found.units, verb):
             print(line)
-        output.text(best, _best_set(mechanism, found.optimum, values))
+        if mechanism is not None:
+            output.text(best, _best_set(mechanism, found.optimum, values))
     if found.share is not None:
         print(_yield_line(found.share, options.subject_to, found.toleranced))
     elif options.subject_to:
@@ -90,10 +94,10 @@ def run_study(options: argparse.Namespace) -> None:
         print(
             f"{good} of {len(found.points)} simulations satisfy {' and '.join(options.subject_to)}"
         )
-    output.figure(figure, lambda: _figure(mechanism, found))
+    output.figure(figure, lambda: _figure(model.title, found))
     if options.out is not None:
         print(options.out / table)
-    output.text(run, record.text(mechanism, arguments | _times(found), _files(arguments)))
+    output.text(run, record.text(model.name, arguments | _times(found), _files(arguments)))
     output.write()
     for sentence in record.notes():
         print(sentence)
@@ -101,14 +105,15 @@ def run_study(options: argparse.Namespace) -> None:
 
 def _arguments(
     options: argparse.Namespace,
-    mechanism: Mechanism,
+    model: Model,
+    units: Mapping[str, str],
     values: Mapping[str, float],
     inputs: Mapping[str, str],
 ) -> dict[str, Any]:
     """Return the arguments of the study that its results depend on."""
-    names = {**units_of(mechanism), **dict.fromkeys(placeholders(inputs), "")}
+    names = {**units, **dict.fromkeys(placeholders(inputs), "")}
     return {
-        "vary": _vary(options, names, mechanism), "outputs": options.of or [],
+        "vary": _vary(options, names, model), "outputs": options.of or [],
         "runs": options.runs, "method": options.method, "seed": options.seed,
         "minimise": options.minimise, "maximise": options.maximise,
         "subject_to": options.subject_to,
@@ -126,7 +131,7 @@ def _times(found: Study) -> dict[str, Any]:
     known = found.settings
     return {
         "stop_time": known["stop time [s]"], "step": known["step [s]"],
-        "tolerance": known["tolerance"], "engine": known["engine"] or KERNEL,
+        "tolerance": known["tolerance"], "engine": known.get("engine", "FMU") or KERNEL,
     }  # fmt: skip
 
 
@@ -156,12 +161,12 @@ def _print_simulations(options: argparse.Namespace, found: Study) -> None:
 
 
 def _vary(
-    options: argparse.Namespace, units: Mapping[str, str], mechanism: Mechanism
+    options: argparse.Namespace, units: Mapping[str, str], model: Model
 ) -> dict[str, Any] | Path | None:
     """Return the parameters: samples, ranges, tolerances, or the path of a list."""
     if options.table is not None and options.vary is None:
         return Path(options.table)
-    if options.table is None and options.vary is None and options.runs and mechanism.tolerances:
+    if options.table is None and options.vary is None and options.runs and model.tolerances:
         return None  # Drawn within the tolerances of the mechanism.
     if options.table is not None or options.vary is None:
         raise UserMistake(
@@ -369,26 +374,22 @@ def _best_set(mechanism: Mechanism, optimum: Optimum, values: Mapping[str, float
     ).decode()  # fmt: skip
 
 
-def _figure(mechanism: Mechanism, found: Study) -> "Figure":
+def _figure(title: str, found: Study) -> "Figure":
     from ..plots.study import curves, maps, scatter  # imported here: it takes a second
 
     best = found.optimum
     if not found.whole_grid or len(found.varied) > 2:
         point = None if best is None else (best.point, best.others)
-        return scatter(
-            mechanism.title, found.parameters, found.outputs, found.units, found.satisfied, point
-        )
+        return scatter(title, found.parameters, found.outputs, found.units, found.satisfied, point)
     if len(found.varied) == 2:
         marked = None if best is None else (best.output, [*best.point.values()], best.value)
-        return maps(
-            mechanism.title, found.varied, found.outputs, found.units, found.satisfied, marked
-        )
+        return maps(title, found.varied, found.outputs, found.units, found.satisfied, marked)
     ((name, samples),) = found.varied.items()
     further, shown = {}, None
     if best is not None:
         further = {best.output: (best.points[:, 0], best.values)}
         shown = (best.output, best.point[name], best.value, best.flat[name])
     return curves(
-        mechanism.title, (name, samples), found.outputs, found.units, found.satisfied, further,
+        title, (name, samples), found.outputs, found.units, found.satisfied, further,
         shown,
     )  # fmt: skip

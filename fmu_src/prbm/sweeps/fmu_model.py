@@ -74,6 +74,7 @@ class FmuModel:
 
     def __init__(self, path: str | Path) -> None:
         self.content, self.description = read_fmu(Path(path))
+        self.name, self.title = Path(path).stem, self.description.modelName
         self.variables = {v.name: v for v in self.description.modelVariables}
         self.identity = {
             "FMU": hashlib.sha256(self.content).hexdigest(), "model": self.description.modelName,

@@ -39,7 +39,7 @@ class MechanismModel:
     outputs = ()
 
     def __init__(self, mechanism: Mechanism) -> None:
-        self.mechanism = mechanism
+        self.mechanism, self.name, self.title = mechanism, mechanism.name, mechanism.title
         self.tolerances: Mapping[str, Tolerance] = mechanism.tolerances
 
     @cached_property

@@ -210,7 +210,7 @@ def study(
     UserMistake
         If a text is not a quantity of the right dimension.
     """
-    model = MechanismModel(mechanism) if isinstance(mechanism, Mechanism) else _fmu(mechanism)
+    model = model_of(mechanism)
     plan = planned(
         model, vary, model.outputs if outputs is None else outputs, runs, (method, seed),
         _goal(minimise, maximise), subject_to, values, inputs,
@@ -232,10 +232,19 @@ def _goal(minimise: str | None, maximise: str | None) -> tuple[str, float] | Non
     return None if maximise is None else (maximise, -1.0)
 
 
-def _fmu(path: str | Path) -> Model:
+def model_of(mechanism: Mechanism | str | Path) -> Model:
+    """Return the model of a mechanism, or of the path of an FMU.
+
+    Raises
+    ------
+    StudyError
+        If the FMU cannot be read.
+    """
+    if isinstance(mechanism, Mechanism):
+        return MechanismModel(mechanism)
     from .fmu_model import FmuModel  # imported here: an extra
 
-    return FmuModel(path)
+    return FmuModel(mechanism)
 
 
 def _check_sources(inputs: Mapping[str, Source]) -> None:
