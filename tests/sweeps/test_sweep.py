@@ -191,6 +191,12 @@ def test_a_variable_name_takes_precedence_over_a_reduction():
     assert parse_output("first(a < b)", {"a < b"}).variable == "a < b"
 
 
+def test_an_output_may_be_a_text_and_a_value_a_truth_value(mishap, log):
+    table = pd.DataFrame({"x": [2.0]})
+    results = sweep(mishap, table, outputs="max(y)", values={"trouble": False}, workers=1)
+    assert results["max(y)"].tolist() == [2.0]
+
+
 def test_a_mapping_of_outputs_names_the_columns(native):
     outputs = {"end [m]": "shuttle.x", "longest [m]": "max(shuttle.x)"}
     results = sweep(native["PRBDM", 2], GRID[:1], outputs=outputs, stop_time=0.01, workers=1)

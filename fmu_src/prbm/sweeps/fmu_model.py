@@ -158,7 +158,7 @@ class FmuModel:
         for name, x in (values or {}).items():
             if name not in self.values:
                 raise ParameterError(self.refusal(name))
-            found[name] = in_unit(name, x, self.units[name])
+            found[name] = in_unit(name, x, self.units[name]) if isinstance(x, str) else float(x)
             if not math.isfinite(found[name]):
                 raise ParameterError(f"{name} = {x} among the values must be finite")
         return found

@@ -142,7 +142,8 @@ def planned(
         As :func:`study`.
     """
     conditions = [_condition(text) for text in subject_to]
-    named = dict(outputs) if isinstance(outputs, Mapping) else {text: text for text in outputs}
+    texts = [outputs] if isinstance(outputs, str) else outputs
+    named = dict(texts) if isinstance(texts, Mapping) else {text: text for text in texts}
     further = [*([goal[0]] if goal else []), *(output for _, output, _, _ in conditions)]
     named |= {text: text for text in further if text not in named}
     if not named:
