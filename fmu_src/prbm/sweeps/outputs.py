@@ -205,35 +205,33 @@ def parse_output(text: str, known: Container[str], column: str | None = None) ->
     >>> parse_output("max(abs(shuttle.x))", {"shuttle.x"}).absolute
     True
     """
-    name = text if column is None else column
-    static = None if text in known else _STATIC.fullmatch(text.strip())
-    if text.strip() == FUNDAMENTAL and text not in known:
+    name, text = text if column is None else column, text if text in known else text.strip()
+    if text in known:
+        return Output(name, text)
+    if text == FUNDAMENTAL:
         return Output(name, FUNDAMENTAL, MODE)
-    if static is not None:
+    if static := _STATIC.fullmatch(text):
         return Output(name, (static[2] or static[4]).strip(), static[1] or static[3])
-    if text not in known and text.strip() in QUANTITIES:
-        return Output(name, text.strip(), QUANTITY)
-    call = None if text in known else _REDUCTION.fullmatch(text.strip())
-    if call is None:
-        return _absolute(Output(name, text), known)
-    reduction, inner = call[1], call[2].strip()
-    condition = _CONDITION.fullmatch(inner)
-    if reduction not in TIMES or inner in known or condition is None:
-        return _absolute(Output(name, inner, reduction), known)
-    limit = condition[3].strip()
-    try:
-        bound = float(limit)
-    except ValueError:
-        raise ParameterError(
-            f"output {text}: bound {limit!r} must be a number, as in first(shuttle.x > 0.001)"
-        ) from None
-    return _absolute(Output(name, condition[1].rstrip(), reduction, condition[2], bound), known)
-
-
-def _absolute(output: Output, known: Container[str]) -> Output:
-    """Return an output with ``abs(...)`` removed from its variable."""
-    call = None if output.variable in known else _ABSOLUTE.fullmatch(output.variable.strip())
-    return output if call is None else replace(output, variable=call[1].strip(), absolute=True)
+    if text in QUANTITIES:
+        return Output(name, text, QUANTITY)
+    call = _REDUCTION.fullmatch(text)
+    output = Output(name, call[2].strip(), call[1]) if call else Output(name, text)
+    condition = _CONDITION.fullmatch(output.variable)
+    if condition and output.reduction in TIMES and output.variable not in known:
+        try:
+            bound = float(condition[3])
+        except ValueError:
+            raise ParameterError(
+                f"output {text}: bound {condition[3].strip()!r} must be a number, as in "
+                "first(shuttle.x > 0.001)"
+            ) from None
+        output = replace(
+            output, variable=condition[1].rstrip(), relation=condition[2], bound=bound
+        )  # fmt: skip
+    absolute = _ABSOLUTE.fullmatch(output.variable)
+    if absolute and output.variable not in known:
+        return replace(output, variable=absolute[1].strip(), absolute=True)
+    return output
 
 
 def evaluate(
