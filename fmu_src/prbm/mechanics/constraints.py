@@ -135,11 +135,18 @@ def factor_saddle(kkt: Real, n: int, length: float, scale: Real) -> Factors:
         If the matrix is singular: two constraints contradict or repeat each other, a constraint
         does not depend on the position, or a motion has no mass.
     """
-    lu, pivots, _ = _lapack().dgetrf(kkt * scale * scale[:, None], overwrite_a=True)
-    if not _regular(lu.diagonal()):
-        scale = scales(kkt, n, length)
-        lu, pivots, _ = _lapack().dgetrf(kkt * scale * scale[:, None], overwrite_a=True)
-        _check_pivots(lu.diagonal())
+    factors = _factored(kkt, scale)
+    if not _regular(factors.lu.diagonal()):
+        factors = _factored(kkt, scales(kkt, n, length))
+        _check_pivots(factors.lu.diagonal())
+    return factors
+
+
+def _factored(kkt: Real, scale: Real) -> Factors:
+    """Return the factors of a matrix with scales, regular or not."""
+    scaled = kkt * scale
+    scaled *= scale[:, None]
+    lu, pivots, _ = _lapack().dgetrf(scaled, overwrite_a=True)
     return Factors(lu, pivots, scale)
 
 

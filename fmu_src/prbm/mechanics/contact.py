@@ -77,7 +77,9 @@ def response(M: Real, held: Real, rows: Real, length: float) -> Real:
     n, k = len(M), len(rows)
     right = np.zeros((n + len(held), k), order="F")
     right[:n] = rows.T
-    return constraints.solve(constraints.saddle(M, held, held), right, n, length)[:n]
+    kkt = constraints.saddle(M, held, held)
+    factors = constraints.factor_saddle(kkt, n, length, constraints.scales(kkt, n, length))
+    return constraints.solve_saddle(factors, right)[:n]
 
 
 def least_mobilities(M: Real, rows: Real, length: float) -> Real:

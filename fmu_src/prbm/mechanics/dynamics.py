@@ -23,7 +23,7 @@ from .compliant_stops import CompliantState, CompliantStops, Pressure
 from .contact_state import ContactMode, ContactState
 from .elements import Elements
 from .inputs import Inputs
-from .kinetics import kinetic_energy, mass_accelerations, turned_moments
+from .kinetics import kinetic_energy, mass_accelerations
 from .system import FIXED, Rows, System
 
 
@@ -145,6 +145,7 @@ class Equations:
             self.rows.c[self.first_hold + k] += self.inputs.walls[i].position
             self.rows.c[self.first_hold + k] += self.contacts.depth(i)
         self.positions = self.rows.first(self.first_stick)
+        self.terms = np.vstack([system.H, self.rows.repeated, self.w])
 
     def _scale(self) -> Real:
         """Return scales with which the elements of the equations are at most near one, (n + r,)."""
@@ -172,6 +173,10 @@ class Equations:
     def evaluate(self, t: float, q: Real, v: Real, extras: Real | None = None) -> Evaluation:
         """Return accelerations, multipliers, mass matrix and factors.
 
+        With F = diag(e) Phi, the products of H, of the rows B and of the loads w with [F, e w^2]
+        contain all terms: M and the quadratic velocity terms are the real and imaginary part of
+        F^H H [F, e w^2] (:func:`prbm.mechanics.kinetics.inertia`).
+
         Parameters
         ----------
         t : float
@@ -186,12 +191,18 @@ class Equations:
         SimulationError
             If the equations are singular.
         """
-        system, e, w = self.system, self.system.directions(q), self.system.turning(v)
-        Hq = turned_moments(system.H, e)
-        M = system.Phi.congruence(Hq.real) + system.inertia
-        Q = system.Phi.to_coordinates(forces.generalised(self.w, e) + Hq.dot(w * w).imag)
+        system, n, d = self.system, self.n, len(self.w)
+        e, w = system.directions(q), system.turning(v)
+        moved = np.empty((d, n + 1), complex)
+        moved[:, :n], moved[:, n] = system.Phi.Phi, w * w
+        moved *= e[:, None]
+        terms = self.terms.dot(moved)
+        moments = moved[:, :n].conj().T.dot(terms[:d])
+        M = moments.real[:, :n] + system.inertia
+        Q = moments.imag[:, n] + terms.real[-1, :n]
         Q += self.elements.motion_force(q, e, v, self.beta)
-        R, bent = self.rows.terms(e, v)
+        R, bent = -terms.imag[d:-1, :n], terms.real[d:-1, n]
+        self.rows.carry(R, bent, e, v)
         kkt = constraints.saddle(M, R, R)
         if self.moving_walls:
             bent[self.first_hold : self.first_stick] -= self.held_motions(t)[2]

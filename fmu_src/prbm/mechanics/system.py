@@ -206,15 +206,11 @@ class Rows:
             result[self.carried] = self._carried_convective(e, v)
         return result
 
-    def terms(self, e: Complex, v: Real) -> tuple[Real, Real]:
-        """Return :meth:`jacobian` and :meth:`convective` for rates v (n,) of the coordinates."""
-        w = self.system.turning(v)
-        turned = self.repeated * e
-        slopes, bent = -turned.imag, turned.dot(w * w).real
+    def carry(self, slopes: Real, bent: Real, e: Complex, v: Real) -> None:
+        """Replace the :meth:`jacobian` and the :meth:`convective` terms of the carried rows."""
         if len(self.carried):
-            slopes[self.carried] = self._carried_by_direction(e)
+            slopes[self.carried] = self.system.Phi.to_coordinates(self._carried_by_direction(e))
             bent[self.carried] = self._carried_convective(e, v)
-        return self.system.Phi.to_coordinates(slopes), bent
 
     def _carried_convective(self, e: Complex, v: Real) -> Real:
         """Return the convective terms of the carried rows [m/s^2]."""
