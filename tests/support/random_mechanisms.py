@@ -201,7 +201,9 @@ def build(
         ),
         flexure_types=tuple(b.types),
         flexures=tuple(b.flexures),
-        joints=tuple(_torsion(b, joint) if torsion else joint for joint in b.joints),
+        joints=tuple(
+            _torsion(b, joint, damped=damping) if torsion else joint for joint in b.joints
+        ),
         springs=tuple(coils),
         guides=tuple(ways),
         stops=tuple(walls),
@@ -228,11 +230,11 @@ def _spring(b: _Builder, i: int, names: list[str]) -> Spring:
     )  # fmt: skip
 
 
-def _torsion(b: _Builder, joint: Joint) -> Joint:
+def _torsion(b: _Builder, joint: Joint, *, damped: bool) -> Joint:
     """Return a joint with a soft torsion spring, with a moment in the drawn shape, and a damper."""
     stiffness = b.choose((None, b.real(1e-3, 2e-2)))
     free = None if stiffness is None else b.choose((None, b.real(-0.1, 0.1)))
-    damping = b.choose((None, b.real(1e-6, 2e-5)))
+    damping = b.choose((None, b.real(1e-6, 2e-5))) if damped else None
     return replace(joint, stiffness=stiffness, free_angle=free, damping=damping)
 
 
