@@ -15,6 +15,7 @@ COMMANDS = {
     "desk": "--short",
     "flexure_cost": "--short --runs 1",
     "native": "--only overhead profile --runs 1",
+    "python_engine": f"{ROOT} {ROOT} --runs 1 --model PRBDM",
     "scaling": "--largest 1 --runs 1",
     "speed": "--dist dist/python --runs 1",
     "sweep": "--runs 4 --loops 1 --workers 1 --stop-time 0.001",
