@@ -31,6 +31,7 @@ MORE = {
     ),
     "mechanics/stress": ("core/sections",),
     "hybrid/runge_kutta": ("core/runge_kutta",),
+    "hybrid/spring_phases": ("hybrid/spring_guards",),
 }
 """C files that are counterparts of a module, beside the one of the same name."""
 

@@ -54,9 +54,17 @@ def test_springs_have_mirror_images_and_repeated_copies(tmp_path):
     assert len(reading(tmp_path, row).springs) == 3
 
 
+def test_springs_and_their_copies_act_on_a_side(tmp_path):
+    pulling = ("damping =", 'acts = "tension"\nmirror = "x = 0"\ndamping =')
+    assert [s.side for s in reading(tmp_path, pulling).springs] == [1, 1]
+    (both,) = reading(tmp_path, ("damping =", 'acts = "both"\ndamping =')).springs
+    assert (both.acts, both.side) == ("both", 0)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
+        (("damping =", 'acts = "pull"\ndamping ='), "acts .* = 'pull'"),
         (('"block.left"', '"block.lefts"'), "left_coil refers to the point 'block.lefts'"),
         (('"ground.left"', '"block.right"'), "spring left_coil joins block to itself"),
         (('["-50 mm", 0]', '["-10 mm", 0]'), r"has the length 0 m, so that its direction"),

@@ -10,7 +10,7 @@ from fmpy.validation import validate_fmu
 from fmu_host import simulate_fmu
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanism.parts import Stop
-from springs import web
+from springs import one_sided
 from support import own_fmu
 
 END, STEP = 0.2, 2e-3
@@ -21,25 +21,36 @@ OUTPUTS = (
 )  # fmt: skip
 
 
-def walled():
+BOTH = ("both",) * 5
+MIXED = ("tension", "compression", "tension", "both", "compression")
+KINDS = [
+    *(("fmi3", BOTH), ("fmi3", MIXED), ("fmi2", MIXED)),
+    *(pytest.param(x, marks=pytest.mark.slow) for x in (("fmi2", BOTH), ("python", BOTH))),
+    pytest.param(("python", MIXED), marks=pytest.mark.slow),
+]
+
+
+def walled(sides):
     """Return the web of springs with a wall."""
     stop = Stop("wall", "plate", (-0.04, 0.0), 180.0, 4e-3, restitution=0.6)
-    return replace(web(), stops=(stop,))
+    return replace(one_sided(sides), stops=(stop,))
 
 
-@pytest.fixture(
-    scope="module",
-    params=["fmi3", *(pytest.param(x, marks=pytest.mark.slow) for x in ("fmi2", "python"))],
-)
-def fmu(request, tmp_path_factory):
+@pytest.fixture(scope="module", params=KINDS, ids=lambda x: f"{x[0]}-{x[1][0]}")
+def kind(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def fmu(kind, tmp_path_factory):
     path = tmp_path_factory.mktemp("springs") / "Web.fmu"
-    path.write_bytes(own_fmu(request.param, walled()))
+    path.write_bytes(own_fmu(kind[0], walled(kind[1])))
     return path
 
 
 @pytest.fixture(scope="module")
-def expected():
-    simulation, rows = Simulation(walled(), STARTS), []
+def expected(kind):
+    simulation, rows = Simulation(walled(kind[1]), STARTS), []
     for k in range(round(END / STEP) + 1):
         simulation.advance(k * STEP)
         rows.append(simulation.outputs())
@@ -59,6 +70,15 @@ def test_springs_are_parameters_and_outputs(fmu):
         assert (listed[name].causality, listed[name].unit) == ("output", unit)
     assert listed["one.length_rate"].derivative is listed["one.length"]
     assert "between ground.left and plate.a" in listed["one.force"].description
+
+
+def test_one_sided_springs_have_event_indicators(kind, fmu):
+    """There are three of the wall and one of each spring, and as many variables."""
+    description = read_model_description(str(fmu))
+    if description.modelExchange is None:
+        pytest.skip("co-simulation only")
+    names = [v.name for v in description.modelVariables if v.name.endswith("_indicator")]
+    assert description.numberOfEventIndicators == len(names) == 3 + 5 - kind[1].count("both")
 
 
 def test_the_fmu_equals_the_engine_with_other_start_values(fmu, expected):

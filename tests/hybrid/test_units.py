@@ -17,7 +17,7 @@ from prbm.fmu.start import interface
 from prbm.hybrid.simulation import Simulation
 from random_mechanisms import seeded
 from scaled import Units, unbounded
-from springs import web
+from springs import one_sided, web
 from support import CASES, each_shipped, mechanism, own_fmu
 
 TIMES = (0.0, 3e-3, 0.01, 0.02)
@@ -87,6 +87,13 @@ def test_the_motion_in_the_engine_is_the_same_in_all_units(model, factors, monke
 @each_change
 def test_the_motion_of_bodies_on_springs_is_the_same_in_all_units(factors, monkeypatch):
     assert_same_motion(Simulation, web(), factors, monkeypatch)
+
+
+@each_change
+def test_the_motion_on_springs_in_tension_is_the_same_in_all_units(factors, monkeypatch):
+    """The times are those of slack and acting springs."""
+    times = (0.0, 0.03, 0.1, 0.2)
+    assert_same_motion(Simulation, one_sided(("tension",) * 5), factors, monkeypatch, times)
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -282,6 +282,7 @@ class Comparison:
             assert r.text() == spring.name
             self.between(spring)
             assert r.take("I") == (spring.free_length is not None)
+            assert r.take("I") == 1 + spring.side
             self.fields(spring)
         for guide in m.guides:
             assert r.text() == guide.name

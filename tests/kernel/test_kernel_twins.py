@@ -59,13 +59,19 @@ from prbm.mechanics import (
 from prbm.mechanics import inputs as input_data
 from prbm.mechanics import start as starts
 from prbm.mechanics import system as system_arrays
-from prbm.mechanics.contact_state import ContactMode, ContactPhase, ContactState, Phase
+from prbm.mechanics.contact_state import (
+    ContactMode,
+    ContactPhase,
+    ContactState,
+    Phase,
+    SpringPhase,
+)
 from prbm.mechanism import flexure
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.expressions import Affine
 from prbm.mechanism.parameters import Parameter
 from prbm.mechanism.parts import POSITIONS, FlexureType, Release
-from springs import oscillator, web
+from springs import one_sided, oscillator, web
 from support import ROOT, SHIPPED, SUPPORT, mechanism
 
 TWINS = {}
@@ -911,8 +917,8 @@ def test_forces_and_energies_are_the_same(name):
 )  # fmt: skip
 def test_laws_of_springs_are_the_same():
     rng = np.random.default_rng(0)
-    for _ in range(10):
-        law, x = elements.SpringLaw(*rng.normal(size=5)), float(rng.normal())
+    for k in range(12):
+        law, x = elements.SpringLaw(*rng.normal(size=5), side=k % 3 - 1), float(rng.normal())
         ours = structures()["SpringLaw"](*law)
         for name in ("spring_tension", "spring_slope", "spring_energy"):
             assert getattr(kernel(), name)(ours, x) == getattr(elements, name)(law, x)
@@ -1449,8 +1455,12 @@ class KernelEquations:
         for to, one in zip(self.touching, contacts.touching, strict=False):
             if one:
                 to.phase, to.reference_speed, to.depth = astuple(one)
+        self.coils = np.array(contacts.springs, np.int32)
         state = structures()["ContactState"](
-            self.modes.ctypes.data, ctypes.addressof(self.touching), self.sides.ctypes.data
+            self.modes.ctypes.data,
+            ctypes.addressof(self.touching),
+            self.sides.ctypes.data,
+            self.coils.ctypes.data,
         )
         kernel().set_equations(self.structure, self.inputs, state, omega)
 
@@ -1505,6 +1515,25 @@ def contact_states(system):
             sticking = contacts.modes.count(ContactMode.STICK)
             if len(system.loops) + len(contacts.held) + sticking < system.n:
                 yield contacts
+
+
+def test_accelerations_and_losses_with_one_sided_springs_are_the_same_in_every_phase():
+    """Springs of both sides, acting, slack and lagging, at random states."""
+    model = one_sided(("tension", "compression", "tension", "both", "compression"))
+    system, rng = assembly.assemble(model, model.values()), np.random.default_rng(0)
+    ours = KernelSystem(model, system.n)
+    ours.assemble(model.values())
+    for phases in itertools.product(SpringPhase, repeat=2):
+        springs = (*phases, SpringPhase.ACTING, SpringPhase.ACTING, SpringPhase.SLACK)
+        contacts = replace(ContactState.free(0, 0), springs=springs)
+        inputs = input_data.Inputs((0j,), (0.0,), 0j, (), ())
+        theirs = dynamics.Equations(system, inputs, contacts, 0.0)
+        mine = KernelEquations(ours, inputs, contacts, 0.0)
+        q, v = random_state(system, rng)
+        y = np.concatenate([q, v, np.zeros(2)])
+        expected = theirs.rate(0.0, y)
+        assert_same(mine.rate(0.0, y), expected, scale=np.abs(expected).max())
+        assert expected[2 * system.n] >= 0.0 or SpringPhase.LAGGING in phases
 
 
 def random_inputs(system, e, rng, driven):

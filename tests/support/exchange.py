@@ -23,10 +23,11 @@ def put(kernel, time, x, values):
     kernel.exchange_set(time, x)
 
 
-def moving(guide, parameters, inputs, discrete, rng, contact=None):
+def moving(guide, parameters, inputs, discrete, rng, contact=None, coils=()):
     """Return a kernel in a discrete state, and the states of a random motion.
 
-    ``contact`` has phase, reference speed and depth of the contact at the first stop.
+    ``contact`` has phase, reference speed and depth of the contact at the first stop, ``coils`` the
+    phases of springs.
     """
     kernel = KernelSimulation(guide, parameters, exchange=True)
     x, count = kernel.exchange_get(), len(independent(guide))
@@ -39,6 +40,8 @@ def moving(guide, parameters, inputs, discrete, rng, contact=None):
         kernel.set_modes(contact_modes(guide, discrete))
     if contact:
         kernel.set_contact(0, *contact)
+    if coils:
+        kernel.set_coils(coils)
     put(kernel, 0.0, x, inputs)
     if contact:
         kernel.begin()
@@ -46,14 +49,14 @@ def moving(guide, parameters, inputs, discrete, rng, contact=None):
     return kernel, x
 
 
-def assert_directional(guide, parameters, inputs, discrete, contact=None):
+def assert_directional(guide, parameters, inputs, discrete, contact=None, coils=()):
     """Compare directional derivatives with differences, for random changes of states and inputs.
 
     The error of differences of fourth order is 1e-8.  It is larger for a nearly singular pair of
     constraints (closed stop and sticking friction).
     """
     rng = np.random.default_rng(0)
-    kernel, x = moving(guide, parameters, inputs, discrete, rng, contact)
+    kernel, x = moving(guide, parameters, inputs, discrete, rng, contact, coils)
     count = len(independent(guide))
     names, given = list(kernel.slots), np.array([inputs.get(n, 0.0) for n in input_names(guide)])
 

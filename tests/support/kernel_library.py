@@ -51,6 +51,7 @@ ENUMERATIONS = (
     "BranchCode",
     "ContactMode",
     "Phase",
+    "SpringPhase",
 )  # Those that are types of arguments or of structure members.
 SCALARS |= dict.fromkeys(ENUMERATIONS, ctypes.c_int)
 DTYPES |= dict.fromkeys(ENUMERATIONS, np.int32)

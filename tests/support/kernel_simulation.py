@@ -123,6 +123,8 @@ class KernelSimulation:
         self.library = library(changes)
         self.sentence = ctypes.create_string_buffer(SENTENCE)
         self.stops, self.points = mechanism.stops, len(mechanism.rubbing)
+        phased = any(spring.side for spring in mechanism.springs)
+        self.springs = len(mechanism.springs) if phased else 0
         chosen = independent(mechanism)
         self.slots = slots(mechanism, chosen)
         data = tables(mechanism, interface(mechanism, {}), "token", chosen)
@@ -194,6 +196,27 @@ class KernelSimulation:
         at = self._mode_places()[stop] + per_stop + 3  # Behind three maxima.
         state[at : at + 3] = phase, speed, depth
         self.restore(state)
+
+    def coils(self) -> list[int]:
+        """Return the phases of all springs, if one acts on one side."""
+        return [int(phase) for phase in self.state[self._coil_places()]]
+
+    def set_coils(self, phases: list[int]) -> None:
+        """Set the phases of all springs."""
+        state = self.state
+        state[self._coil_places()] = phases
+        self.restore(state)
+
+    def _coil_places(self) -> list[int]:
+        """Return the places of the phases of springs in the saved state."""
+        at = ([_sizes()[0], *self._stop_ends()])[-1] + self.points
+        return [*range(at, at + self.springs)]
+
+    def _stop_ends(self) -> list[int]:
+        """Return the places behind the numbers of each stop in the saved state."""
+        at, per_stop, per_contact = _sizes()
+        sizes = [per_stop + (per_contact if stop.compliant else 0) for stop in self.stops]
+        return [at + sum(sizes[: k + 1]) for k in range(len(sizes))]
 
     def _mode_places(self) -> list[int]:
         """Return the places of the modes in the saved state."""

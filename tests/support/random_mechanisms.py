@@ -29,6 +29,7 @@ from prbm.mechanism.description import Mechanism
 from prbm.mechanism.flexure import CLAMP, FREE, PIN
 from prbm.mechanism.parts import (
     GROUND,
+    SIDES,
     Body,
     Flexure,
     FlexureType,
@@ -227,6 +228,7 @@ def _spring(b: _Builder, i: int, names: list[str]) -> Spring:
     return Spring(
         f"coil{i}", b.point(other, start), b.point(body, end), b.real(5.0, 40.0), free,
         b.choose((0.0, b.real(1e3, 1e5))), b.choose((0.0, b.real(0.01, 0.2))),
+        b.choose(tuple(SIDES)),
     )  # fmt: skip
 
 

@@ -1,5 +1,7 @@
 """Mechanisms with coil springs and with torsion at joints."""
 
+from dataclasses import replace
+
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.parts import Body, Force, Joint, Probe, Release, Spring
 
@@ -76,3 +78,10 @@ def four_bar(**torsion):
         ),
         forces=(Force("push", "bc"),), release=Release("ab", angle=0.3),
     )  # fmt: skip
+
+
+def one_sided(sides, gravity=(0.3, -2.0)):
+    """Return the web with springs that act on these sides."""
+    model = web(gravity)
+    springs = (replace(s, acts=acts) for s, acts in zip(model.springs, sides, strict=True))
+    return replace(model, springs=tuple(springs))

@@ -91,6 +91,7 @@ IMPACT_COUNT_MAX = 2147483647  # Largest Integer of FMI.
 # --- springs -----------------------------------------------------------------------------------
 SPRING_LENGTH_RTOL = 1e-9  # Of the size: length of a spring whose ends coincide.
 SPRING_APART_RTOL = 1e-6  # Of the size: smallest distance of the ends of a spring as drawn.
+SPRING_FREE_RTOL = 1e-12  # Of the length as drawn: a spring that is shorter by less still acts.
 SPRING_IDLE_RTOL = 1e-9  # Of the stiffest: that of a body on springs in directions without any.
 
 # --- compliant stops ---------------------------------------------------------------------------

@@ -1,6 +1,6 @@
 """Tables of joints, springs and guides, which connect points, and their conversion to parts."""
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, StrictBool
 
@@ -46,6 +46,9 @@ class SpringTable(Named):
         parts.Spring.cubic_stiffness
     )
     damping: Annotated[Quantity, measured(parts.Spring, "damping")] = parts.Spring.damping
+    acts: Literal["both", "tension", "compression"] = Field(
+        "both", description="Side of the free length on which the spring has a force"
+    )
     mirror: LineOrLines = mirror_key()
     repeat: RepeatTable | None = repeat_key()
 

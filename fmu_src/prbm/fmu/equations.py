@@ -21,6 +21,11 @@ TORSION = (
     f"<code>stiffness</code>, <code>free_angle</code> {inline('phi_0')} and <code>damping</code>."
     "</p>\n"
 )
+ONE_SIDED = (
+    f"<p>A spring that acts in tension or compression only has the force "
+    f"{inline('s max(0, s (k x + k_3 x^3 + c dot(l)))')} where {inline('s x > 0')}, with "
+    f"{inline('s = 1')} in tension and {inline('s = -1')} in compression, and none elsewhere.</p>\n"
+)
 FLOATING = (
     "where a body that nothing connects to the ground has e = x + i y, its displacement, and its "
     "derivatives by x and y in place of i e, "
@@ -103,6 +108,7 @@ def equations(mechanism: Mechanism) -> str:
         f"{inline('g')} has the rate {inline('dot(g) = G v + w')}, with {inline('w')} the velocity "
         f"of the wall.</p>\n{''.join(STOP_LAWS[law] for law in laws)}"
         f"{SPRINGS if mechanism.springs else ''}"
+        f"{ONE_SIDED if any(s.side for s in mechanism.springs) else ''}"
         f"{TORSION if any(joint.elastic for joint in mechanism.joints) else ''}"
         f"{GUIDES if mechanism.guides else ''}"
         f"{RUBBING if any(g.friction is not None for g in mechanism.guides) else ''}"

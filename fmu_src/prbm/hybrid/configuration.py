@@ -266,8 +266,9 @@ class Configuration:
 
 
 def contact_names(mechanism: Mechanism, contacts: Iterable[int]) -> str:
-    """Return the names of contacts, in their order, without repetition."""
-    names = [part.name for part in (*mechanism.stops, *mechanism.rubbing)]
+    """Return the names of contacts and springs, in their order, without repetition."""
+    parts = (*mechanism.stops, *mechanism.rubbing, *mechanism.springs)
+    names = [part.name for part in parts]
     return ", ".join(names[c] for c in sorted(set(contacts)))
 
 

@@ -16,6 +16,7 @@ from ..base.tolerances import (
 )
 from ..mechanics.contact_state import ContactMode, ContactState
 from ..mechanics.dynamics import Equations
+from . import spring_phases
 from .configuration import Configuration, Scales, contact_names
 from .front import Front
 from .rest import RestForces, rest_forces, sticking
@@ -53,6 +54,11 @@ def slip(configuration: Configuration, front: Front, contact: int) -> Front:
     return choose_modes(configuration, front, slipped=contact)
 
 
+def act(configuration: Configuration, front: Front, spring: int) -> Front:
+    """Return the front after a spring has begun or ceased to act."""
+    return choose_modes(configuration, spring_phases.switched(front, spring))
+
+
 def reverse(configuration: Configuration, front: Front, contact: int) -> Front:
     """Return the front after the sliding velocity of a contact has fallen to zero."""
     return choose_modes(configuration, front, reversing=contact)
@@ -81,11 +87,14 @@ def choose_modes(
     reversing : int or None
         A contact whose sliding velocity has fallen to zero.
 
+    The phases of springs follow the rates, which an impact changes.
+
     Raises
     ------
     SimulationError
         If no forces satisfy the laws of all contacts, or the equations are singular.
     """
+    front = spring_phases.rephased(configuration, front)
     turning = {} if reversing is None else {reversing: _slide_acceleration(front, reversing)}
     candidates, before = _candidates(configuration, front, resting), None
     for _ in range(MODE_ITERATIONS_MAX):

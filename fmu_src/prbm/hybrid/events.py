@@ -6,7 +6,7 @@ from enum import IntEnum
 
 from ..base.errors import SimulationError
 from ..base.tolerances import EVENT_WINDOW_RTOL, EVENTS_MAX
-from . import compliant, contact_modes, guards, impacts
+from . import compliant, contact_modes, guards, impacts, spring_phases
 from .configuration import Configuration, contact_names
 from .front import Front
 from .guards import Guard, StepView
@@ -32,13 +32,18 @@ class EventKind(IntEnum):
     """The phase of a contact at a compliant stop changes, see :class:`.contact_state.Phase`."""
     SEPARATION = 6
     """The indentation of a compliant stop falls to zero: the contact ends."""
-    IMPACT = 7
+    ACTION = 7
+    """A spring that acts on one side begins or ceases to act, see :mod:`.spring_phases`."""
+    IMPACT = 8
     """The gap of an open stop closes: an impact or a capture, or the first touch of a contact."""
 
 
 @dataclass(frozen=True)
 class Event:
-    """An event of a contact at a time [s]; see :mod:`prbm.mechanics.contact_state`."""
+    """An event of a contact at a time [s]; see :mod:`prbm.mechanics.contact_state`.
+
+    The springs are numbered after the contacts.
+    """
 
     kind: EventKind
     contact: int
@@ -106,6 +111,10 @@ TRANSITIONS = (
         compliant.separate,
     ),
     Transition(
+        EventKind.ACTION, spring_phases.action, spring_phases.watched, spring_phases.action_time,
+        _choosing_modes(contact_modes.act),
+    ),
+    Transition(
         EventKind.IMPACT, guards.gap, guards.open_stops, guards.closing_time, impacts.impact,
     ),
 )  # fmt: skip
@@ -152,8 +161,8 @@ def apply(configuration: Configuration, front: Front, event: Event) -> tuple[Fro
 class EventWindow:
     """The number of events since a time [s], by which a simulation that chatters is rejected.
 
-    A change of the phase at a compliant stop does not count: force and motion are continuous there,
-    and the steps are counted, see :mod:`prbm.hybrid.effort`.
+    A change of the phase of a compliant stop or of a spring does not count: the motion is
+    continuous there, and the steps are counted, see :mod:`prbm.hybrid.effort`.
     """
 
     since: float
@@ -168,7 +177,7 @@ class EventWindow:
             If there are more than ``EVENTS_MAX`` within ``EVENT_WINDOW_RTOL`` of the period.
         """
         window = self
-        if event.kind is EventKind.SWITCH:
+        if event.kind in (EventKind.SWITCH, EventKind.ACTION):
             return window
         if event.time - window.since > EVENT_WINDOW_RTOL * configuration.scales.time:
             window = EventWindow(event.time)

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 
+import numpy as np
+
 from ..base.errors import SimulationError
 from ..base.tolerances import (
     CONSTRAINT_RTOL,
@@ -72,6 +74,28 @@ def switching_margin(equations: Equations, stop: int, rate: float) -> float:
     if touching.phase is Phase.FREE:
         return PHASE_RTOL - ratio
     return min(PHASE_RTOL + ratio, 1.0 + REFERENCE_SPEED_RTOL - rate / touching.reference_speed)
+
+
+def strain(equations: Equations, spring: int, t: float, y: Real) -> float:
+    """Return the elongation of a spring to the side on which it acts [m]."""
+    k = spring - len(equations.contacts.modes)
+    springs = equations.elements.springs
+    assert springs is not None
+    lengths = springs.lengths(equations.system.directions(y[: equations.n]))[1]
+    return springs.laws[k].side * (float(lengths[k]) - springs.laws[k].free_length)
+
+
+def slackness(equations: Equations, spring: int, t: float, y: Real) -> float:
+    """Return the distance of a slack spring from its free length [m]."""
+    return -strain(equations, spring, t, y)
+
+
+def strain_rate(equations: Equations, spring: int, t: float, y: Real) -> float:
+    """Return the rate of the elongation of a spring to the side on which it acts [m/s]."""
+    n, k, springs = equations.n, spring - len(equations.contacts.modes), equations.elements.springs
+    assert springs is not None
+    rates = springs.length_rates(equations.system.directions(y[:n]), y[n : 2 * n])
+    return springs.laws[k].side * float(rates[k])
 
 
 def stop_force(equations: Equations, stop: int, t: float, y: Real) -> float:
@@ -175,7 +199,11 @@ class StepView:
         return result
 
     def closing(self, guard: Guard, stop: int) -> tuple[Real, Real]:
-        """Return the gap of a stop, or its indentation, at the samples, and its rate there."""
+        """Return a gap, an indentation or a strain at the samples, and its rate there."""
+        if guard in (strain, slackness):
+            times, y = self.arc.samples()
+            at = [(self.equations, stop, t, row) for t, row in zip(times, y, strict=True)]
+            return np.array([guard(*x) for x in at]), np.array([RATES[guard](*x) for x in at])
         gaps, rates = self.gaps_and_rates
         sign = 1.0 if guard is gap else -1.0
         return sign * gaps[:, stop], sign * rates[:, stop]
@@ -232,6 +260,8 @@ def releasing_stops(view: StepView) -> Sequence[int]:
 def closing_time(view: StepView, guard: Guard, stop: int) -> float | None:
     """Return when a gap or, at the end of a contact, an indentation closes: z > 0 -> z <= 0.
 
+    Springs that act on one side have strains for gaps.
+
     A gap that is opening at the start of an interval can close only after its apex.  Therefore the
     last impact, after which the gap is round-off of either sign, is not found again.  A gap that
     dips below zero within an interval is found by the signs of its rates.
@@ -251,7 +281,7 @@ def _closing_time_between(view: StepView, guard: Guard, stop: int, j: int) -> fl
     z, depth = view.along(guard, stop), view.scales.touching
     a, b = view.samples[0][j : j + 2].tolist()
     (gap_a, gap_b), (rate_a, rate_b) = (x[j : j + 2] for x in view.closing(guard, stop))
-    closing_rate = _gap_rate if guard is gap else indentation_rate
+    closing_rate = RATES[guard]
     if abs(rate_a) <= view.scales.zero_speed and gap_a <= _round_off(view):
         # The stop was released too early, and is pressed again.
         pressed = gap_b < min(gap_a - _round_off(view), -depth)
@@ -297,6 +327,17 @@ def indentation_rate(equations: Equations, stop: int, t: float, y: Real) -> floa
     return -_gap_rate(equations, stop, t, y)
 
 
+def slackness_rate(equations: Equations, spring: int, t: float, y: Real) -> float:
+    """Return the rate of the distance of a slack spring from its free length [m/s]."""
+    return -strain_rate(equations, spring, t, y)
+
+
+RATES: dict[Guard, Guard] = {
+    gap: _gap_rate, indentation: indentation_rate, strain: strain_rate, slackness: slackness_rate,
+}  # fmt: skip
+"""Rates of the guards whose zeros :func:`closing_time` finds."""
+
+
 def _corrected_time(view: StepView, guard: Guard, stop: int, t: float, earliest: float) -> float:
     """Return the time at which a gap closes, from the approximate time t by the dense output.
 
@@ -305,7 +346,7 @@ def _corrected_time(view: StepView, guard: Guard, stop: int, t: float, earliest:
     effect and be located again and again.
     """
     equations = view.equations
-    closing_rate = _gap_rate if guard is gap else indentation_rate
+    closing_rate = RATES[guard]
     if t <= view.arc.start:
         return t
     cut = view.located(stop, t)

@@ -127,7 +127,7 @@ def _springs(equations: Equations, e: Complex, v: Real) -> dict[str, float]:
     if springs is None:
         return out
     now, rates = springs.state(e), springs.length_rates(e, v)
-    force = now.tension + springs.dampers * rates
+    force = springs.forces(now, rates)
     for i, spring in enumerate(equations.system.mechanism.springs):
         out[f"{spring.name}.force"] = float(force[i])
         out[f"{spring.name}.length"] = float(now.length[i])

@@ -7,6 +7,7 @@ from ..mechanics.contact_state import ContactState
 from ..mechanics.inputs import Inputs
 from ..mechanics.positions import start_velocity
 from ..mechanics.start import start_shape
+from . import spring_phases
 from .compliant import preloaded, rephased
 from .configuration import Configuration
 from .contact_modes import choose_modes
@@ -69,6 +70,7 @@ def released(configuration: Configuration, inputs: Inputs, time: float) -> Front
     equations = configuration.equations(inputs, contacts)
     y = np.concatenate([q, velocity, np.zeros(2 + equations.compliant.size)])
     front = Front(time, y, equations, (Latched(),) * stops, (None,) * stops).projected()
+    front = spring_phases.begun(configuration, front)
     check_walls(configuration, front)
     gaps, rates = front.gaps_and_rates()
     for i in equations.compliant.stops:

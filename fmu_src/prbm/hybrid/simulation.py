@@ -528,6 +528,10 @@ class Simulation:
         self._output_cache = None
 
 
+CUT = (EventKind.IMPACT, EventKind.SEPARATION, EventKind.ACTION)
+"""Events at which a step ends with the accuracy of the method, not of its dense output."""
+
+
 def _cut(configuration: Configuration, event: Event, view: StepView) -> tuple[Event, Arc, Real]:
     """Return an event, the step up to it, and the state at its end.
 
@@ -535,7 +539,7 @@ def _cut(configuration: Configuration, event: Event, view: StepView) -> tuple[Ev
     unique there.
     """
     arc, equations = view.arc, view.equations
-    if event.kind in (EventKind.IMPACT, EventKind.SEPARATION) and event.time > arc.start:
+    if event.kind in CUT and event.time > arc.start:
         arc = view.cut(event.contact, event.time)
     try:
         y = closed(configuration, equations, event.time, arc.at(event.time))

@@ -12,7 +12,7 @@ import numpy as np
 from ..base.errors import ParameterError
 from ..base.tolerances import EVENTS_MAX, IMPACT_COUNT_MAX, TOLERANCE_MIN, TOLERANCE_USED_MAX
 from ..mechanics.arrays import Real
-from ..mechanics.contact_state import ContactMode, ContactPhase, ContactState, Phase
+from ..mechanics.contact_state import ContactMode, ContactPhase, ContactState, Phase, SpringPhase
 from ..mechanics.inputs import Inputs, Wall
 from .arc import Arc, Node
 from .configuration import Configuration
@@ -63,6 +63,7 @@ def plain_front(front: Front) -> Plain:
         "modes": [int(mode) for mode in front.contacts.modes],
         "touching": [asdict(one) if one else None for one in front.contacts.touching],
         "sides": list(front.contacts.sides),
+        "springs": [int(phase) for phase in front.contacts.springs],
         "latched": [asdict(latched) for latched in front.latched],
         "touches": [asdict(touch) if touch else None for touch in front.touches],
     }
@@ -76,7 +77,8 @@ def front_of(plain: Mapping[str, Any], configuration: Configuration) -> Front:
         for one in plain["touching"]
     )
     stops, sides = len(configuration.mechanism.stops), tuple(plain["sides"])
-    contacts = ContactState(modes, stops, touching, sides)
+    springs = tuple(SpringPhase(phase) for phase in plain["springs"])
+    contacts = ContactState(modes, stops, touching, sides, springs)
     return Front(
         plain["time"],
         np.array(plain["y"]),
@@ -313,11 +315,12 @@ def _conditions(found: Mapping[str, Any]) -> dict[str, bool]:
     arc, event = found["arc"], found["pending"]
     n, mechanism = configuration.system.n, configuration.mechanism
     stops, modes, sides = len(mechanism.stops), front.contacts.modes, front.contacts.sides
-    points = len(mechanism.frictions)
+    points, phases = len(mechanism.frictions), front.contacts.springs
     allowed = {
         EventKind.SLIP: range(len(modes)),
         EventKind.REVERSAL: range(len(modes)),
         EventKind.SIDE: range(stops + points, len(modes)),
+        EventKind.ACTION: range(len(modes), len(modes) + len(phases)),
     }
     begun = zip(mechanism.stops, front.contacts.touching, front.touches, strict=True)
     return {
@@ -328,6 +331,10 @@ def _conditions(found: Mapping[str, Any]) -> dict[str, bool]:
         "latched": all(0 <= x.impact_count <= IMPACT_COUNT_MAX for x in front.latched),
         "window": 0 <= found["window"].count <= EVENTS_MAX,
         "pending": event is None or event.contact in allowed.get(event.kind, range(stops)),
+        "springs": all(
+            spring.side or phase is SpringPhase.ACTING
+            for spring, phase in zip(mechanism.springs, phases, strict=False)
+        ),
         "controller": found["controller"].h >= 0.0,
         "tolerance": TOLERANCE_MIN <= configuration.tolerance <= TOLERANCE_USED_MAX,
         "frequency": configuration.frequency >= 0.0,
@@ -336,6 +343,14 @@ def _conditions(found: Mapping[str, Any]) -> dict[str, bool]:
         "arc": arc is None or (arc.h > 0.0 and arc.n == n and _before(arc) <= arc.start),
         "time": front.time >= found["time"],
     }
+
+
+def _event_range(event: Event | None, contacts: ContactState) -> tuple[int, int]:
+    """Return the first number of what may have an event of its kind, and the one after the last."""
+    modes, kind = len(contacts.modes), event.kind if event else None
+    if kind is EventKind.ACTION:
+        return modes, modes + len(contacts.springs)
+    return 0, modes if kind in (EventKind.SLIP, EventKind.REVERSAL) else contacts.stops
 
 
 def _shaped(size: int, n: int, arc: Arc | None, k1: Real | None, fastest: FastestMode) -> bool:

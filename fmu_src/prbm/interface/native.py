@@ -29,6 +29,7 @@ INDICATOR_DESCRIPTIONS = {
     "release": "Event indicator of the release from rest on {name}",
     "slip": "Event indicator of the beginning and the end of sliding at {name}",
     "side": "Event indicator of the change of the side to which {name} pushes",
+    "action": "Event indicator of {name}, which begins or ceases to act",
 }
 
 
@@ -173,6 +174,7 @@ def _indicators(mechanism: Mechanism) -> Iterator[Variable]:
     kinds = [(stop.name, kind) for stop in mechanism.stops for kind in INDICATORS]
     kinds += [(part.name, "slip") for part in mechanism.rubbing]
     kinds += [(guide.name, "side") for guide in mechanism.guides if guide.friction is not None]
+    kinds += [(spring.name, "action") for spring in mechanism.springs if spring.side]
     for name, kind in kinds:
         yield Variable(
             f"{name}.{kind}_indicator",

@@ -201,6 +201,7 @@ def _groups(mechanism: Mechanism, independent: Sequence[int]) -> dict[str, Itera
             *(f"{stop}.{kind}_indicator" for stop in stops for kind in INDICATORS),
             *(f"{part.name}.slip_indicator" for part in mechanism.rubbing),
             *(f"{g.name}.side_indicator" for g in mechanism.guides if g.friction is not None),
+            *(f"{spring.name}.action_indicator" for spring in mechanism.springs if spring.side),
         ],
         "time": ["time"],
     }
@@ -280,7 +281,7 @@ class _Writer:
             yield _u32(*flags) + self._fields(joint)
         for spring in m.springs:
             yield _text(spring.name) + self._between(spring)
-            yield _u32(spring.free_length is not None) + self._fields(spring)
+            yield _u32(spring.free_length is not None, 1 + spring.side) + self._fields(spring)
         for guide in m.guides:
             yield _text(guide.name) + self._between(guide, "point", "start")
             yield self._point(m.point(guide.end, guide.name)) + _u32(not guide.turning)

@@ -75,6 +75,7 @@ enum { EVENTS_AT_ONCE_MAX = 16 };
 enum { IMPACT_COUNT_MAX = 2147483647 };
 #define SPRING_LENGTH_RTOL 1e-09
 #define SPRING_APART_RTOL 1e-06
+#define SPRING_FREE_RTOL 1e-12
 #define SPRING_IDLE_RTOL 1e-09
 #define DAMPING_ELASTIC_MIN 0.9999
 #define DAMPING_PLASTIC_MAX 0.03
@@ -178,6 +179,11 @@ typedef enum {
     PHASE_FREE = 3,
     PHASE_FROZEN = 4,
 } Phase;
+typedef enum {
+    COIL_SLACK = 0,
+    COIL_ACTING = 1,
+    COIL_LAGGING = 2,
+} SpringPhase;
 
 /* --- prbm.hybrid.events ------------------------------------------------------------------------- */
 
@@ -189,8 +195,9 @@ typedef enum {
     EVENT_SIDE = 4,
     EVENT_SWITCH = 5,
     EVENT_SEPARATION = 6,
-    EVENT_IMPACT = 7,
-    EVENT_KINDS = 8,
+    EVENT_ACTION = 7,
+    EVENT_IMPACT = 8,
+    EVENT_KINDS = 9,
 } EventKind;
 
 /* --- prbm.mechanism.flexure --------------------------------------------------------------------- */

@@ -38,7 +38,7 @@ from ..interface.variables import (
     STRETCH_OUTPUTS,
 )
 from ..mechanics.compliant_stops import COMPLIANT_STATES, CompliantState
-from ..mechanics.contact_state import ContactMode, Phase
+from ..mechanics.contact_state import ContactMode, Phase, SpringPhase
 from ..mechanics.inputs import BASE_AXES, INPUT_GROUPS, LOADS, WALL_INPUTS
 from ..mechanism.flexure import (
     ENDS,
@@ -74,6 +74,7 @@ def header() -> str:
             [
                 _enumeration("ContactMode", "CONTACT", {m.name: m for m in ContactMode}),
                 _enumeration("Phase", "PHASE", {"NONE": 0} | {p.name: p for p in Phase}),
+                _enumeration("SpringPhase", "COIL", {p.name: p for p in SpringPhase}),
             ],
         ),
         _section(

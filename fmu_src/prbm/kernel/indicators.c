@@ -7,6 +7,7 @@
 #include "hybrid/contact_peaks.h"
 #include "hybrid/events.h"
 #include "hybrid/guards.h"
+#include "hybrid/spring_guards.h"
 #include "hybrid/walls.h"
 #include "indicators.h"
 
@@ -27,9 +28,13 @@ PRBM int indicator_place(const Simulation *sim, EventKind kind, int contact) {
         [EVENT_IMPACT] = INDICATOR_IMPACT,
     };
     const System *system = system_of(sim);
-    int s = system->s, points = system->mechanism->friction_count;
+    const Mechanism *m = system->mechanism;
+    int s = system->s, points = m->friction_count, slips = STOP_INDICATORS * s + system->f;
     if (kind == EVENT_SIDE) {
-        return STOP_INDICATORS * s + system->f + contact - s - points;
+        return slips + contact - s - points;
+    }
+    if (kind == EVENT_ACTION) {
+        return slips + system->f - points + m->coils[contact - contact_count(sim)].one_sided;
     }
     return contact < s ? STOP_INDICATORS * contact + PLACE[kind]
                        : STOP_INDICATORS * s + contact - s;
@@ -135,12 +140,34 @@ static double switch_indicator(const Simulation *sim, const Instant *at, int i) 
     return lesser(phase, turn_indicator(sim, at, i).value);
 }
 
+PRBM CoilIndicators coil_indicators(const Simulation *sim, const Instant *at, int contact) {
+    const Equations *eq = &sim->equations;
+    const Scales *scales = &sim->configuration.scales;
+    CoilGuards guards = coil_guards(eq, contact);
+    CoilIndicators found = {1.0, 1.0, 0.0};
+    if (guards.strain) {
+        double sign = eq->contacts.coils[contact - contact_count(sim)] == COIL_SLACK ? -1.0 : 1.0;
+        found.rate = sign * strain_rate_guard(eq, at, contact);
+        double ahead = INDICATOR_LEAD_RTOL * scales->time * greater(found.rate, 0.0);
+        double x = guards.strain->value(eq, at, contact);
+        found.strain = (x + ahead) / scales->length + GAP_CLOSED_RTOL;
+    }
+    if (guards.force) {
+        found.force = guards.force->value(eq, at, contact) / guard_scale(sim, EVENT_ACTION);
+    }
+    return found;
+}
+
 static double indicator(const Simulation *sim, const Instant *at, EventKind kind, int contact) {
     switch (kind) {
     case EVENT_IMPACT:
     case EVENT_SEPARATION: return closing_indicator(sim, at, kind, contact);
     case EVENT_RELEASE: return release_indicator(sim, at, contact);
     case EVENT_SWITCH: return switch_indicator(sim, at, contact);
+    case EVENT_ACTION: {
+        CoilIndicators coil = coil_indicators(sim, at, contact);
+        return lesser(coil.strain, coil.force);
+    }
     default: return lifted_guard(sim, at, kind, contact) / guard_scale(sim, kind);
     }
 }
@@ -151,7 +178,8 @@ PRBM void event_indicators(const Simulation *sim, const Instant *at, double *z) 
         z[i] = 1.0;
     }
     for (EventKind kind = EVENT_NONE + 1; kind < EVENT_KINDS; kind++) {
-        for (int contact = 0; contact < contact_count(sim); contact++) {
+        ContactRange range = contacts_of(sim, kind);
+        for (int contact = range.first; contact < range.end; contact++) {
             if (transition(kind)->watched(&sim->equations, contact)) {
                 z[indicator_place(sim, kind, contact)] = indicator(sim, at, kind, contact);
             }

@@ -12,6 +12,13 @@ typedef struct {
     bool of_force;
 } Turn;
 
+/* The indicators of a spring by its strain and by its force, 1 if its phase does not end by them, and
+ * the rate of the guard of its strain. */
+typedef struct {
+    double strain, force, rate;
+} CoilIndicators;
+
+PRBM CoilIndicators coil_indicators(const Simulation *sim, const Instant *at, int contact);
 /* Store the signs of the rates of indentation and force of all pressed stops; at has an evaluation.
  * The next change of a sign is a state event. */
 PRBM void watch_turns(Simulation *sim, const Instant *at);

@@ -313,6 +313,12 @@ static bool opens_here(const Simulation *sim, const Instant *at, int stop) {
            gap_rate(&sim->equations, stop, at->time, at->e, at->v, at->extra) > 0.0;
 }
 
+/* Whether a spring begins or ceases to act at this state. */
+static bool acts_here(const Simulation *sim, const Instant *at, int contact) {
+    CoilIndicators coil = coil_indicators(sim, at, contact);
+    return (coil.strain <= 0.0 && coil.rate < 0.0) || coil.force <= 0.0;
+}
+
 /* Whether an event is due at this state.  A stop that has been struck is not struck again. */
 static bool due(const Simulation *sim, const Instant *at, const bool *struck, EventKind kind,
                 int contact) {
@@ -322,6 +328,7 @@ static bool due(const Simulation *sim, const Instant *at, const bool *struck, Ev
     switch (kind) {
     case EVENT_IMPACT: return !struck[contact] && closes_here(sim, at, contact);
     case EVENT_SEPARATION: return opens_here(sim, at, contact);
+    case EVENT_ACTION: return acts_here(sim, at, contact);
     default: return lifted_guard(sim, at, kind, contact) <= 0.0;
     }
 }
@@ -330,7 +337,8 @@ static bool due(const Simulation *sim, const Instant *at, const bool *struck, Ev
 static Event due_here(const Simulation *sim, const Instant *at, const bool *struck) {
     Event event = {EVENT_NONE, 0, at->time};
     for (EventKind kind = EVENT_NONE + 1; kind < EVENT_KINDS; kind++) {
-        for (int contact = 0; contact < contact_count(sim); contact++) {
+        ContactRange range = contacts_of(sim, kind);
+        for (int contact = range.first; contact < range.end; contact++) {
             if (due(sim, at, struck, kind, contact)) {
                 event.kind = kind;
                 event.contact = contact;
@@ -374,7 +382,7 @@ static bool too_many_events(const Simulation *sim, const Event *event, Problem *
                 "more than %d events (last: %s of %s) at t = %.9g s: the contact chatters; "
                 "raise rest_speed or damping.beta, lower the restitution, or give the body room "
                 "between its walls",
-                EVENTS_AT_ONCE_MAX * contact_count(sim), transition(event->kind)->guard.event,
+                EVENTS_AT_ONCE_MAX * contacts_of(sim, EVENT_ACTION).end, transition(event->kind)->guard.event,
                 contact_name(sim->configuration.mechanism, event->contact), sim->state.time);
 }
 
@@ -389,7 +397,7 @@ static bool apply_due_events(Simulation *sim, Moment *now, Problem *problem) {
         if (event.kind == EVENT_NONE) {
             return true;
         }
-        if (i == EVENTS_AT_ONCE_MAX * contact_count(sim)) {
+        if (i == EVENTS_AT_ONCE_MAX * contacts_of(sim, EVENT_ACTION).end) {
             return too_many_events(sim, &event, problem);
         }
         if (event.kind == EVENT_IMPACT) {

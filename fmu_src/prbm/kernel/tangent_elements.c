@@ -8,24 +8,28 @@
 typedef struct {
     Complex u, du;
     double rate, tension, force; /* tension: without the damper */
-    double dlength, drate, dforce;
+    double dlength, drate, dtension, dforce;
 } SpringMotion;
 
 static SpringMotion spring_motion(const Tangent *t, int k) {
     const System *system = t->eq->system;
     const Complex *A = system->spans + k * system->d;
     const SpringLaw *law = &system->laws[k];
+    SpringPhase phase = coil_phase(system, t->eq->contacts.coils, k);
+    SpringLaw both = two_sided(law);
     SpringState now = spring_state(system, k, t->e, 1.0);
     Complex moved = along_arms(system->d, A, t->dE);
     Complex speed = times_i(along_arms(system->d, A, t->swing));
     Complex dspeed = times_i(along_arms(system->d, A, t->dswing));
-    SpringMotion x = {scaled(1.0 / now.length, now.along), {0.0, 0.0}, 0.0, now.tension, 0.0, 0.0, 0.0, 0.0};
+    SpringMotion x = {scaled(1.0 / now.length, now.along), {0.0, 0.0}, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
     x.rate = product(conjugate(x.u), speed).re;
-    x.force = now.tension + law->damping * x.rate;
+    x.tension = coil_elastic(law, &now, phase);
+    x.force = coil_force(law, &now, x.rate, phase);
     x.dlength = product(conjugate(x.u), moved).re;
     x.du = scaled(1.0 / now.length, minus(moved, scaled(x.dlength, x.u)));
     x.drate = product(conjugate(x.du), speed).re + product(conjugate(x.u), dspeed).re;
-    x.dforce = spring_slope(law, now.elongation) * x.dlength + law->damping * x.drate;
+    x.dtension = phase == COIL_SLACK ? 0.0 : spring_slope(&both, now.elongation) * x.dlength;
+    x.dforce = phase == COIL_ACTING ? x.dtension + law->damping * x.drate : 0.0;
     return x;
 }
 
@@ -84,8 +88,7 @@ PRBM double element_energy_change(const Tangent *t) {
         sum += torsion->stiffness * twist * turn_of(torsion, t->dq);
     }
     for (int k = 0; k < system->coil_count; k++) {
-        SpringMotion x = spring_motion(t, k);
-        sum += x.tension * x.dlength;
+        sum += spring_state(system, k, t->e, 1.0).tension * spring_motion(t, k).dlength;
     }
     return sum;
 }
@@ -106,9 +109,19 @@ PRBM double element_loss_change(const Tangent *t) {
     }
     for (int k = 0; k < system->coil_count; k++) {
         SpringMotion x = spring_motion(t, k);
-        sum += 2.0 * system->laws[k].damping * x.rate * x.drate;
+        sum += (x.dforce - x.dtension) * x.rate + (x.force - x.tension) * x.drate;
     }
     return sum;
+}
+
+PRBM CoilChange coil_change(const Tangent *t, int k) {
+    const SpringLaw *law = &t->eq->system->laws[k];
+    SpringLaw both = two_sided(law);
+    SpringState now = spring_state(t->eq->system, k, t->e, 1.0);
+    SpringMotion x = spring_motion(t, k);
+    double dforce = spring_slope(&both, now.elongation) * x.dlength + law->damping * x.drate;
+    CoilChange change = {law->side * x.dlength, law->side * x.drate, law->side * dforce};
+    return change;
 }
 
 PRBM void spring_changes(const Tangent *t, double *out) {

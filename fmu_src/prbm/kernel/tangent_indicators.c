@@ -5,6 +5,7 @@
 #include "hybrid/events.h"
 #include "indicators.h"
 #include "tangent_contact.h"
+#include "tangent_elements.h"
 #include "tangent_indicators.h"
 
 /* Change of |x|; at zero, the mean of both one-sided derivatives. */
@@ -62,12 +63,27 @@ static double reversal_indicator_change(const Tangent *t, int contact) {
            guard_scale(t->sim, EVENT_REVERSAL);
 }
 
+static double action_indicator_change(const Tangent *t, int contact) {
+    const Scales *scales = &t->sim->configuration.scales;
+    int k = contact - contact_count(t->sim);
+    SpringPhase phase = t->eq->contacts.coils[k];
+    CoilIndicators now = coil_indicators(t->sim, t->at, contact);
+    CoilChange change = coil_change(t, k);
+    if (now.force < now.strain) {
+        double sign = phase == COIL_LAGGING ? -1.0 : 1.0;
+        return sign * change.force / guard_scale(t->sim, EVENT_ACTION);
+    }
+    double ahead = now.rate > 0.0 ? INDICATOR_LEAD_RTOL * scales->time * change.rate : 0.0;
+    return (phase == COIL_SLACK ? -1.0 : 1.0) * (change.strain + ahead) / scales->length;
+}
+
 static double indicator_change(const Tangent *t, EventKind kind, int contact) {
     switch (kind) {
     case EVENT_IMPACT: return impact_indicator_change(t, contact);
     case EVENT_RELEASE: return release_indicator_change(t, contact);
     case EVENT_SWITCH: return switch_indicator_change(t, contact);
     case EVENT_SEPARATION: return separation_indicator_change(t, contact);
+    case EVENT_ACTION: return action_indicator_change(t, contact);
     case EVENT_SLIP: return slip_indicator_change(t, contact);
     case EVENT_SIDE:
         return side_force(t->eq, t->dlam, contact) / guard_scale(t->sim, EVENT_SIDE);
@@ -77,7 +93,8 @@ static double indicator_change(const Tangent *t, EventKind kind, int contact) {
 
 PRBM void indicator_changes(const Tangent *t, double *out) {
     for (EventKind kind = EVENT_NONE + 1; kind < EVENT_KINDS; kind++) {
-        for (int contact = 0; contact < contact_count(t->sim); contact++) {
+        ContactRange range = contacts_of(t->sim, kind);
+        for (int contact = range.first; contact < range.end; contact++) {
             if (transition(kind)->watched(t->eq, contact)) {
                 out[indicator_place(t->sim, kind, contact)] = indicator_change(t, kind, contact);
             }

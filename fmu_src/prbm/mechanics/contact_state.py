@@ -77,9 +77,20 @@ class ContactPhase:
     depth: float = 0.0
 
 
+class SpringPhase(IntEnum):
+    """The phase of a spring, which changes only if it acts on one side; see :mod:`.elements`."""
+
+    SLACK = 0
+    """There is no force: the spring is on the other side of its free length."""
+    ACTING = 1
+    """The force follows the law."""
+    LAGGING = 2
+    """There is no force: the spring is strained, but its damper holds it back from its ends."""
+
+
 @dataclass(frozen=True)
 class ContactState:
-    """The modes of all contacts.
+    """The modes of all contacts, and the phases of springs.
 
     Parameters
     ----------
@@ -92,6 +103,8 @@ class ContactState:
     sides : (f,) tuple of int
         The side to which a guide pushes while it slips: 1 to the left of its line, -1 to the right.
         It is 1 at friction points.
+    springs : (c,) tuple of SpringPhase
+        Phases of all springs; empty if none acts on one side, or if they follow from the lengths.
 
     Examples
     --------
@@ -104,6 +117,7 @@ class ContactState:
     stops: int
     touching: tuple[ContactPhase | None, ...] = ()
     sides: tuple[int, ...] = ()
+    springs: tuple[SpringPhase, ...] = ()
 
     def __post_init__(self) -> None:
         if len(self.touching) != self.stops:
@@ -172,6 +186,12 @@ class ContactState:
         elif touching.phase is Phase.FREE or not mode.closed:
             mode = ContactMode.FRICTIONLESS
         return replace(self, touching=tuple(every)).with_mode(stop, mode)
+
+    def with_spring(self, spring: int, phase: SpringPhase) -> "ContactState":
+        """Return the state in which one spring has another phase."""
+        springs = list(self.springs)
+        springs[spring] = phase
+        return replace(self, springs=tuple(springs))
 
     def held_with(self, stop: int, mode: ContactMode) -> "ContactState":
         """Return the state in which a stop that touches is a constraint with a mode."""

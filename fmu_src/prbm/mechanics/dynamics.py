@@ -86,7 +86,7 @@ class Equations:
         self.system, self.inputs, self.contacts, self.omega = system, inputs, contacts, omega
         values, mechanism = system.values, system.mechanism
         self.n = system.n
-        self.elements = Elements(system)
+        self.elements = Elements(system, contacts.springs)
         self.beta = values["damping.beta"]
         self.mass_damping = 2.0 * values["damping.zeta"] * omega
         self.stop_friction = [value(s, "friction", values) for s in mechanism.stops]

@@ -16,6 +16,12 @@ coincide.  With the tension T = k x + k3 x^3, x = l - l0, the generalised forces
 and the stiffness is
 
     dT/dl g g^T + T (Re(dz/dq^H dz/dq) - g g^T)/l + (second derivatives of z).
+
+A spring that acts on the side s of its free length, s = 1 in tension and s = -1 in compression, has
+the force F = s max(0, s (T + c l')) where s x > 0, and none where s x < 0.  The potential of T is
+its energy; what does not act on its ends, (F - T) l' >= 0, is the loss of its damper.  In a motion,
+its phase says which part of the law holds (:class:`.contact_state.SpringPhase`), so that the law is
+smooth in every step: acting or slack, or lagging where s x > 0 and s (T + c l') < 0.
 """
 
 from collections.abc import Iterator
@@ -24,9 +30,10 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from ..base.tolerances import SPRING_LENGTH_RTOL
+from ..base.tolerances import SPRING_FREE_RTOL, SPRING_LENGTH_RTOL
 from ..mechanism.parts import value
 from .arrays import Complex, Real, Whole
+from .contact_state import SpringPhase
 from .direction_map import DirectionMap
 from .forces import elastic_energy, springs
 from .system import Rows, System
@@ -177,6 +184,8 @@ class SpringLaw(NamedTuple):
         Coefficient c of viscous damping [N s/m].
     free_length, drawn_length : float
         Length without a force, and length as drawn [m].
+    side : int
+        Sign of the forces of a spring that acts on one side; 0: both.
     """
 
     stiffness: float
@@ -184,6 +193,14 @@ class SpringLaw(NamedTuple):
     damping: float
     free_length: float
     drawn_length: float
+    side: int = 0
+
+    def acts(self, x: float) -> bool:
+        """Return whether a spring has stiffness at an elongation x [m].
+
+        It has at its free length, although round-off may be on the other side.
+        """
+        return not self.side * x < -SPRING_FREE_RTOL * self.drawn_length
 
     def length_at(self, share: float) -> float:
         """Return the length without a force for a share of its difference from the drawing [m]."""
@@ -199,7 +216,11 @@ def spring_tension(law: SpringLaw, x: float) -> float:
     --------
     >>> spring_tension(SpringLaw(3.0, 4.0, 0.0, 1.0, 1.0), 0.5)
     2.0
+    >>> spring_tension(SpringLaw(3.0, 4.0, 0.0, 1.0, 1.0, side=-1), 0.5)
+    0.0
     """
+    if not law.acts(x):
+        return 0.0
     return (law.stiffness + law.cubic_stiffness * (x * x)) * x
 
 
@@ -211,6 +232,8 @@ def spring_slope(law: SpringLaw, x: float) -> float:
     >>> spring_slope(SpringLaw(3.0, 4.0, 0.0, 1.0, 1.0), 0.5)
     6.0
     """
+    if not law.acts(x):
+        return 0.0
     return law.stiffness + 3.0 * law.cubic_stiffness * (x * x)
 
 
@@ -222,6 +245,8 @@ def spring_energy(law: SpringLaw, x: float) -> float:
     >>> spring_energy(SpringLaw(3.0, 4.0, 0.0, 1.0, 1.0), 1.0)
     2.5
     """
+    if not law.acts(x):
+        return 0.0
     return (0.5 * law.stiffness + 0.25 * law.cubic_stiffness * (x * x)) * (x * x)
 
 
@@ -243,10 +268,18 @@ class SpringState(NamedTuple):
 
 
 class Springs:
-    """Coil springs and dampers between points."""
+    """Coil springs and dampers between points.
 
-    def __init__(self, system: System) -> None:
-        self.system = system
+    Parameters
+    ----------
+    system : System
+        The constant arrays.
+    phases : (c,) tuple of SpringPhase
+        Phases of the springs; empty: those without rates, which follow from the lengths.
+    """
+
+    def __init__(self, system: System, phases: tuple[SpringPhase, ...] = ()) -> None:
+        self.system, self.phases = system, phases
         self.rows = Rows(system, system.spans, system.spans_c)
         self.least = SPRING_LENGTH_RTOL * system.length
         drawn = self.lengths(system.directions(system.q0))[1].tolist()
@@ -257,11 +290,14 @@ class Springs:
                 value(s, "damping", system.values),
                 length if s.free_length is None else value(s, "free_length", system.values),
                 length,
+                s.side,
             )
             for s, length in zip(system.mechanism.springs, drawn, strict=True)
         ]
         self.dampers: Real = np.array([law.damping for law in self.laws])
         self.damped = bool(np.any(self.dampers))
+        self.one_sided = any(law.side for law in self.laws)
+        self.two_sided_laws = [law._replace(side=0) for law in self.laws]
 
     def lengths(self, e: Complex) -> tuple[Complex, Real]:
         """Return the vectors from start to end and the distances of the ends, (c,) [m]."""
@@ -293,30 +329,51 @@ class Springs:
         result: Real = (along.real * x[::2] + along.imag * x[1::2]) / length
         return result
 
+    def tensions(self, elongation: Real) -> Real:
+        """Return the elastic forces of the laws without sides, (c,) [N]."""
+        both = zip(self.two_sided_laws, elongation.tolist(), strict=True)
+        return np.array([spring_tension(law, x) for law, x in both])
+
+    def acting(self, elongation: Real) -> Real:
+        """Return 1 for the springs that act and 0 for the others, (c,)."""
+        if self.phases:
+            return np.array([float(phase is SpringPhase.ACTING) for phase in self.phases])
+        both = zip(self.laws, elongation.tolist(), strict=True)
+        return np.array([float(law.acts(x)) for law, x in both])
+
+    def forces(self, now: SpringState, rates: Real) -> Real:
+        """Return the forces F with those of damping, positive in tension, (c,) [N]."""
+        if not self.one_sided:
+            return now.tension + self.dampers * rates
+        forces = self.tensions(now.elongation) + self.dampers * rates
+        result: Real = np.where(self.acting(now.elongation) > 0.0, forces, 0.0)
+        return result
+
     def force(self, q: Real, e: Complex, share: float = 1.0) -> Real:
         """Return -T g."""
         result: Real = -self.state(e, share).tension @ self._gradients(e)[1]
         return result
 
     def motion_force(self, q: Real, e: Complex, v: Real, beta: float) -> Real:
-        """Return -(T + c l') g."""
+        """Return -F g; F = T + c l' for springs that act on both sides."""
         slopes = self._gradients(e)[1]
-        result: Real = -(self.state(e).tension + self.dampers * (slopes @ v)) @ slopes
+        result: Real = -self.forces(self.state(e), slopes @ v) @ slopes
         return result
 
     def tangent(self, e: Complex, share: float = 1.0) -> Real:
         """Return the derivatives of T g."""
         now, (moved, slopes) = self.state(e, share), self._gradients(e)
         across = now.tension / now.length
-        rise = np.array(self._rises(now)) - across
+        rise = np.array(self._rises(self.laws, now)) - across
         pulls = -across * now.along
         by_arms = np.column_stack([pulls.real, pulls.imag]).ravel() @ self.rows.B
         K: Real = (slopes.T * rise) @ slopes + ((moved.conj().T * across) @ moved).real
         return K + geometric_stiffness(by_arms * e, self.system.arm, self.system.Phi)
 
-    def _rises(self, now: SpringState) -> list[float]:
+    @staticmethod
+    def _rises(laws: list[SpringLaw], now: SpringState) -> list[float]:
         """Return dT/dl [N/m]."""
-        both = zip(self.laws, now.elongation.tolist(), strict=True)
+        both = zip(laws, now.elongation.tolist(), strict=True)
         return [spring_slope(law, x) for law, x in both]
 
     def energy(self, q: Real, e: Complex) -> float:
@@ -327,29 +384,45 @@ class Springs:
     def damping(self, e: Complex, beta: float) -> Real:
         """Return the sum of c g g^T; beta does not act on springs."""
         slopes = self._gradients(e)[1]
-        result: Real = (slopes.T * self.dampers) @ slopes
+        dampers = self.dampers * self.acting(self.state(e).elongation)
+        result: Real = (slopes.T * dampers) @ slopes
         return result
 
     def loss(self, e: Complex, v: Real, beta: float) -> float:
-        """Return the sum of c l'^2 [W]."""
+        """Return the sum of (F - T) l' [W]: c l'^2 of springs that act on both sides."""
+        if self.one_sided:
+            now, rates = self.state(e), self.length_rates(e, v)
+            elastic = self.tensions(now.elongation) * self._strained(now.elongation)
+            return float((self.forces(now, rates) - elastic) @ rates)
         return float(self.dampers @ self.length_rates(e, v) ** 2) if self.damped else 0.0
 
     def stiffness(self, e: Complex) -> Real:
-        """Return the stiffness along and across the springs, as far as they are positive."""
+        """Return the stiffness along and across the springs, as far as they are positive.
+
+        Slack springs have that along them with which they would act.
+        """
         now, (moved, slopes) = self.state(e), self._gradients(e)
         across = np.maximum(now.tension, 0.0) / now.length
-        rise = np.maximum(self._rises(now), 0.0) - across
+        rise = np.maximum(self._rises(self.two_sided_laws, now), 0.0) - across
         result: Real = (slopes.T * rise) @ slopes + ((moved.conj().T * across) @ moved).real
         return result
 
     def viscous(self, e: Complex) -> Real:
-        """Return the sum of c g g^T."""
-        return self.damping(e, 0.0)
+        """Return the sum of c g g^T, as if all springs acted."""
+        slopes = self._gradients(e)[1]
+        result: Real = (slopes.T * self.dampers) @ slopes
+        return result
+
+    def _strained(self, elongation: Real) -> Real:
+        """Return 1 for the springs that have elastic energy, (c,)."""
+        if self.phases:
+            return np.array([float(phase is not SpringPhase.SLACK) for phase in self.phases])
+        return self.acting(elongation)
 
     def pulls(self, e: Complex, v: Real | None = None) -> Iterator[tuple[str, complex]]:
         """Yield the forces on the bodies and the ground by name, without rates or with them [N]."""
         now = self.state(e)
-        force = now.tension if v is None else now.tension + self.dampers * self.length_rates(e, v)
+        force = now.tension if v is None else self.forces(now, self.length_rates(e, v))
         for spring, pull in zip(
             self.system.mechanism.springs, (force * now.along / now.length).tolist(), strict=True
         ):
@@ -364,11 +437,13 @@ class Elements:
     ----------
     system : System
         The constant arrays.
+    phases : tuple of SpringPhase
+        As for :class:`Springs`.
     """
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: System, phases: tuple[SpringPhase, ...] = ()) -> None:
         self.system = system
-        self.springs = Springs(system) if system.mechanism.springs else None
+        self.springs = Springs(system, phases) if system.mechanism.springs else None
         torsion = Torsion(system) if len(system.turns) else None
         self.parts: list[Element] = [Bending(system)]
         self.parts += [part for part in (torsion, self.springs) if part is not None]

@@ -204,7 +204,9 @@ def equilibrium(
         straight = np.concatenate([system.q0, np.zeros(r + holding)])
         state, done = _load_fully(system, from_straight, straight)
     if done < 1.0:
-        raise EquilibriumError(_unreachable(system, displacement, bool(loads), done))
+        reason = _unreachable(system, displacement, bool(loads), done)
+        one_sided = any(spring.side for spring in system.mechanism.springs)
+        raise EquilibriumError(reason + (_SLACK if one_sided else ""))
     force = unit * float(state[n + r]) if holding else 0.0
     return Equilibrium(state[:n], state[n : n + r], force, w)
 
@@ -487,6 +489,9 @@ def _holds(system: System, given: _Given, state: Real) -> bool:
     if held is None or not system.mechanism.release.turns or system.released_free:
         return True
     return abs(system.amount(state[: system.n]) - held) < STATICS_TURN_MAX
+
+
+_SLACK = "; springs that act on one side carry no load while they are slack"
 
 
 def _unreachable(system: System, displacement: float | None, loaded: bool, done: float) -> str:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from ..base.errors import MechanismError
 from .expressions import Quantity, affine
@@ -250,7 +250,8 @@ class Spring:
     """A coil spring and a damper side by side between two points, each ``body.point``.
 
     The spring pulls both points together with the force k x + k3 x^3 + c l', positive in tension,
-    for the elongation x = l - l0 of the distance l of the points.
+    for the elongation x = l - l0 of the distance l of the points.  A spring that acts on one side
+    has no force on the other side of l0, and never one of the other sign.
 
     Parameters
     ----------
@@ -266,6 +267,8 @@ class Spring:
         Coefficient k3 of the cube of the elongation [N/m^3]; negative if the spring softens.
     damping : Quantity
         Coefficient c of viscous damping [N s/m].
+    acts : str
+        A key of :data:`SIDES`: the sign of its force.
     """
 
     name: str
@@ -275,6 +278,19 @@ class Spring:
     free_length: Quantity | None = None
     cubic_stiffness: Quantity = 0.0
     damping: Quantity = 0.0
+    acts: str = "both"
+
+    def __post_init__(self) -> None:
+        if self.acts not in SIDES:
+            raise MechanismError(f"{self.name}.acts = {self.acts!r} must be {', '.join(SIDES)}")
+
+    @property
+    def side(self) -> int:
+        """Sign of the forces of a spring that acts on one side; 0: both."""
+        return SIDES[self.acts]
+
+
+SIDES = {"both": 0, "tension": 1, "compression": -1}
 
 
 @dataclass(frozen=True)
@@ -283,18 +299,15 @@ class Guide:
 
     Parameters
     ----------
-    name : str
-        Prefix of its outputs, for instance ``guide``.
-    point : str
-        The guided point, ``body.point``.
+    name, point : str
+        Prefix of its outputs, for instance ``guide``, and the guided point, ``body.point``.
     start, end : str
         Two points of the line, both on the ground or on one other body, which carries the line.
         The line is unlimited, and passes through the guided point as drawn.
     turning : bool
         Whether the guided body may turn; otherwise it keeps its angle relative to the carrier.
     friction : Quantity or None
-        Coefficient of friction along the line [-]; its normal force is the force of the guide.
-        None: the guide has no friction, and no such parameter.
+        Coefficient of friction along the line, with the force of the guide as normal force [-].
     """
 
     name: str
@@ -500,141 +513,136 @@ VELOCITIES = ("start_omega", "start_vx", "start_vy")
 MODE_MAX = 512  # Largest number of the mode of a release.
 
 
-def _meta(
-    unit: str,
-    description: str,
-    minimum: float = -math.inf,
-    maximum: float = math.inf,
-    nominal: float | None = None,
-    *,
-    tunable: bool = False,
-) -> tuple[str, str, float, float, float | None, bool]:
-    """Return the arguments of :class:`Parameter` after its name and value."""
-    return unit, description, minimum, maximum, nominal, tunable
+class Meta(NamedTuple):
+    """Arguments of :class:`Parameter` after its name and value."""
+
+    unit: str
+    description: str
+    minimum: float = -math.inf
+    maximum: float = math.inf
+    nominal: float | None = None
+    tunable: bool = False
 
 
-FIELDS: dict[type, dict[str, tuple[str, str, float, float, float | None, bool]]] = {
+FIELDS: dict[type, dict[str, Meta]] = {
     FlexureType: {
-        "thickness": _meta("m", "Thickness in the plane of motion", LENGTH_MIN, 1.0, 1e-4),
-        "width": _meta("m", "Width across the plane of motion", LENGTH_MIN, LENGTH_MAX, 1e-2),
-        "youngs_modulus": _meta("Pa", "Young's modulus", 1.0, 1e13, 1e11),
-        "density": _meta("kg/m3", "Density", 1.0, 1e5, 1e4),
-        "end_thickness": _meta(
+        "thickness": Meta("m", "Thickness in the plane of motion", LENGTH_MIN, 1.0, 1e-4),
+        "width": Meta("m", "Width across the plane of motion", LENGTH_MIN, LENGTH_MAX, 1e-2),
+        "youngs_modulus": Meta("Pa", "Young's modulus", 1.0, 1e13, 1e11),
+        "density": Meta("kg/m3", "Density", 1.0, 1e5, 1e4),
+        "end_thickness": Meta(
             "m", "Thickness at the end of a taper, or outside a notch", LENGTH_MIN, LENGTH_MAX, 1e-3
         ),
-        "end_width": _meta("m", "Width at the end of a taper", LENGTH_MIN, LENGTH_MAX, 1e-2),
-        "notch_radius": _meta(
+        "end_width": Meta("m", "Width at the end of a taper", LENGTH_MIN, LENGTH_MAX, 1e-2),
+        "notch_radius": Meta(
             "m", "Radius of a notch or its fillets, or half axis along the flexure",
             LENGTH_MIN, LENGTH_MAX, 1e-3,
         ),
-        "notch_depth": _meta(
+        "notch_depth": Meta(
             "m", "Half axis of an elliptic notch or its fillets across the flexure",
             LENGTH_MIN, LENGTH_MAX, 1e-3,
         ),
-        "waist_length": _meta(
+        "waist_length": Meta(
             "m", "Length of the waist between the fillets of a notch", LENGTH_MIN, LENGTH_MAX, 1e-2
         ),
-        "curvature": _meta(
+        "curvature": Meta(
             "1/m", "Curvature as drawn, positive if it turns left from the start to the end",
             -1e9, 1e9, 10.0,
         ),
-        "rise": _meta(
+        "rise": Meta(
             "m", "Distance of the parallel tangents at both ends as drawn, positive to the left",
             -LENGTH_MAX, LENGTH_MAX, 1e-3,
         ),
-        "initial_strain": _meta(
+        "initial_strain": Meta(
             "", "Strain without a force, positive if longer than drawn", -0.1, 0.1, 1e-3
         ),
     },
     Body: {
-        "mass": _meta("kg", "Mass", MASS_MIN, 1e6, 0.1),
-        "inertia": _meta(
+        "mass": Meta("kg", "Mass", MASS_MIN, 1e6, 0.1),
+        "inertia": Meta(
             "kg.m2", "Moment of inertia about the centre of mass", 1e-30, 1e9, 1e-4
         ),
-        "start_angle": _meta("rad", "Rotation at the start", -ANGLE_MAX, ANGLE_MAX, 0.1),
-        "start_x": _meta("m", "Displacement along x at the start", -LENGTH_MAX, LENGTH_MAX, 1e-2),
-        "start_y": _meta("m", "Displacement along y at the start", -LENGTH_MAX, LENGTH_MAX, 1e-2),
-        "start_omega": _meta("rad/s", "Angular velocity at the start", -1e6, 1e6, 1.0),
-        "start_vx": _meta("m/s", "Velocity along x at the start", -1e4, 1e4, 1.0),
-        "start_vy": _meta("m/s", "Velocity along y at the start", -1e4, 1e4, 1.0),
+        "start_angle": Meta("rad", "Rotation at the start", -ANGLE_MAX, ANGLE_MAX, 0.1),
+        "start_x": Meta("m", "Displacement along x at the start", -LENGTH_MAX, LENGTH_MAX, 1e-2),
+        "start_y": Meta("m", "Displacement along y at the start", -LENGTH_MAX, LENGTH_MAX, 1e-2),
+        "start_omega": Meta("rad/s", "Angular velocity at the start", -1e6, 1e6, 1.0),
+        "start_vx": Meta("m/s", "Velocity along x at the start", -1e4, 1e4, 1.0),
+        "start_vy": Meta("m/s", "Velocity along y at the start", -1e4, 1e4, 1.0),
     },
     Joint: {
-        "stiffness": _meta(
+        "stiffness": Meta(
             "N.m/rad", "Torsional stiffness", 0.0, 1e12, 1.0
         ),
-        "free_angle": _meta(
+        "free_angle": Meta(
             "rad", "Rotation of the end's body relative to the start's without a moment, from the "
             "drawn shape",
             -ANGLE_MAX, ANGLE_MAX, 0.1,
         ),
-        "damping": _meta(
+        "damping": Meta(
             "N.m.s/rad", "Coefficient of viscous damping of the rotation", 0.0, 1e12, 1e-3
         ),
     },
     Spring: {
-        "stiffness": _meta("N/m", "Stiffness", 0.0, 1e15, 1e3),
-        "free_length": _meta("m", "Length without a force", 0.0, LENGTH_MAX, 1e-2),
-        "cubic_stiffness": _meta(
+        "stiffness": Meta("N/m", "Stiffness", 0.0, 1e15, 1e3),
+        "free_length": Meta("m", "Length without a force", 0.0, LENGTH_MAX, 1e-2),
+        "cubic_stiffness": Meta(
             "N/m3", "Coefficient of the cube of the elongation in the force", -1e18, 1e18, 1e6
         ),
-        "damping": _meta("N.s/m", "Coefficient of viscous damping", 0.0, 1e12, 1.0),
+        "damping": Meta("N.s/m", "Coefficient of viscous damping", 0.0, 1e12, 1.0),
     },
     Guide: {
-        "friction": _meta("", "Coefficient of friction along the guide", 0.0, 100.0, tunable=True),
+        "friction": Meta("", "Coefficient of friction along the guide", 0.0, 100.0, tunable=True),
     },
     Stop: {
-        "position": _meta(
+        "position": Meta(
             "m", "Displacement of the hit point at contact, from the straight shape",
             -LENGTH_MAX, LENGTH_MAX, 1e-2, tunable=True,
         ),
-        "offset": _meta(
+        "offset": Meta(
             "m", "Shift of the hit point along the wall",
             -LENGTH_MAX, LENGTH_MAX, 1e-2, tunable=True,
         ),
-        "restitution": _meta(
+        "restitution": Meta(
             "", "Coefficient of restitution (energetic when there is friction)", 0.0, 1.0,
             tunable=True,
         ),
-        "friction": _meta("", "Coefficient of friction at the stop", 0.0, 100.0, tunable=True),
-        "rest_speed": _meta(
+        "friction": Meta("", "Coefficient of friction at the stop", 0.0, 100.0, tunable=True),
+        "rest_speed": Meta(
             "m/s", "Closing speed below which an impact ends in rest, if the body is then "
             "pressed against the wall",
             0.0, 1e3, 1e-3, tunable=True,
         ),
-        "stiffness": _meta(
+        "stiffness": Meta(
             "N/m", "Contact stiffness: force over indentation^exponent", 1e-6, 1e18, 1e6,
         ),
-        "exponent": _meta("", "Exponent of the contact force", 1.0, 10.0),
+        "exponent": Meta("", "Exponent of the contact force", 1.0, 10.0),
     },
     Friction: {
-        "coefficient": _meta("", "Coefficient of Coulomb friction", 0.0, 100.0, tunable=True),
-        "normal_force": _meta(
+        "coefficient": Meta("", "Coefficient of Coulomb friction", 0.0, 100.0, tunable=True),
+        "normal_force": Meta(
             "N", "Normal force at the straight shape", -1e9, 1e9, tunable=True
         ),
-        "normal_stiffness": _meta(
+        "normal_stiffness": Meta(
             "N/m", "Change of the normal force with the transverse displacement",
             -1e12, 1e12, 1e2, tunable=True,
         ),
     },
     Release: {
-        "displacement": _meta(
+        "displacement": Meta(
             "m", "Displacement from the straight shape at which the body is released",
             -LENGTH_MAX, LENGTH_MAX, 1e-2,
         ),
-        "angle": _meta(
+        "angle": Meta(
             "rad", "Rotation from the straight shape at which the body is released",
             -ANGLE_MAX, ANGLE_MAX, 0.1,
         ),
-        "amplitude": _meta(
+        "amplitude": Meta(
             "m", "Displacement along a mode, from the rest position, at which the body is released",
             -LENGTH_MAX, LENGTH_MAX, 1e-2,
         ),
-        "velocity": _meta("m/s", "Velocity at release", -1e4, 1e4),
+        "velocity": Meta("m/s", "Velocity at release", -1e4, 1e4),
     },
 }  # fmt: skip
-
-
-Meta = tuple[str, str, float, float, float | None, bool]
 
 
 def fields_of(part: Part) -> dict[str, Meta]:
@@ -648,19 +656,20 @@ def fields_of(part: Part) -> dict[str, Meta]:
     fields = {n: meta for n, meta in FIELDS[type(part)].items() if field_of(part, n) is not None}
     if isinstance(part, Stop) and part.compliant:
         fields |= _compliant_fields(part)
+    if isinstance(part, Spring) and part.side:  # A softening spring would push where it must pull.
+        fields["cubic_stiffness"] = fields["cubic_stiffness"]._replace(minimum=0.0)
     return fields
 
 
 def _compliant_fields(stop: Stop) -> dict[str, Meta]:
     """Return the fields of a compliant stop that differ from those of a rigid stop."""
-    restitution = _meta(
-        "", "Coefficient of restitution of a point mass", RESTITUTION_MIN, 1.0, tunable=True
-    )
+    about = "Coefficient of restitution of a point mass"
+    restitution = Meta("", about, RESTITUTION_MIN, 1.0, tunable=True)
     if stop.exponent == 1.0:
         return {"restitution": restitution}
-    _, description, minimum, maximum, nominal, tunable = FIELDS[Stop]["stiffness"]
-    stiffness = ("", f"{description} [N/m^exponent]", minimum, maximum, nominal, tunable)
-    return {"restitution": restitution, "stiffness": stiffness}
+    rigid = FIELDS[Stop]["stiffness"]
+    about = f"{rigid.description} [N/m^exponent]"
+    return {"restitution": restitution, "stiffness": rigid._replace(unit="", description=about)}
 
 
 def field_of(part: Part, name: str) -> Quantity | None:

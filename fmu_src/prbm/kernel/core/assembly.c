@@ -508,7 +508,7 @@ static bool add_coil(System *system, int k, Scratch scratch, Problem *problem) {
     }
     system->spans_c[k] = minus(end.c, start.c);
     SpringLaw law = {evaluate(coil->stiffness, values), evaluate(coil->cubic_stiffness, values),
-                     evaluate(coil->damping, values), 0.0, 0.0};
+                     evaluate(coil->damping, values), 0.0, 0.0, coil->side};
     system->laws[k] = law;
     law.drawn_length = spring_state(system, k, system->e0, 1.0).length;
     law.free_length =

@@ -21,6 +21,7 @@ typedef struct {
     ContactMode *modes; /* (s + f,) */
     ContactPhase *touching; /* (s,) */
     int *sides; /* (f,) to which a slipping guide pushes: 1 to the left of its line, or -1 */
+    SpringPhase *coils;     /* (coils,) phases of the springs, if one acts on one side */
 } ContactState;
 PRBM bool is_pressed(const ContactPhase *touching);
 PRBM bool is_held(const ContactState *contacts, int stop);

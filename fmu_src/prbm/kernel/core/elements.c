@@ -1,4 +1,5 @@
 /* Elements with energy: the twin of mechanics/elements.py. */
+#include <math.h>
 #include <string.h>
 
 #include "core/elements.h"
@@ -56,16 +57,48 @@ static void add_torsion_stiffness(const System *system, double *K) {
 
 /* --- springs ---------------------------------------------------------------------------------- */
 
+/* Whether a spring has stiffness at an elongation x.  It has at its free length, although round-off
+ * may be on the other side. */
+static bool acts(const SpringLaw *law, double x) {
+    return !(law->side * x < -SPRING_FREE_RTOL * law->drawn_length);
+}
+
 PRBM double spring_tension(const SpringLaw *law, double x) {
+    if (!acts(law, x)) {
+        return 0.0;
+    }
     return (law->stiffness + law->cubic_stiffness * (x * x)) * x;
 }
 
 PRBM double spring_slope(const SpringLaw *law, double x) {
+    if (!acts(law, x)) {
+        return 0.0;
+    }
     return law->stiffness + 3.0 * law->cubic_stiffness * (x * x);
 }
 
 PRBM double spring_energy(const SpringLaw *law, double x) {
+    if (!acts(law, x)) {
+        return 0.0;
+    }
     return (0.5 * law->stiffness + 0.25 * law->cubic_stiffness * (x * x)) * (x * x);
+}
+
+PRBM SpringLaw two_sided(const SpringLaw *law) {
+    SpringLaw result = *law;
+    result.side = 0;
+    return result;
+}
+
+PRBM double coil_elastic(const SpringLaw *law, const SpringState *now, SpringPhase phase) {
+    SpringLaw both = two_sided(law);
+    return law->side == 0          ? now->tension
+           : phase != COIL_SLACK ? spring_tension(&both, now->elongation)
+                                   : 0.0;
+}
+
+PRBM double coil_force(const SpringLaw *law, const SpringState *now, double rate, SpringPhase phase) {
+    return phase == COIL_ACTING ? coil_elastic(law, now, phase) + law->damping * rate : 0.0;
 }
 
 static const Complex *span_of_spring(const System *system, int k) {
@@ -104,16 +137,53 @@ PRBM void length_gradient(const System *system, int k, const Complex *e, double 
     span_gradient(system, k, scaled(1.0 / now.length, now.along), e, row);
 }
 
+PRBM double length_rate(const System *system, int k, const SpringState *now, const Complex *e,
+                        const double *v) {
+    const Complex *A = span_of_spring(system, k);
+    double sum = 0.0;
+    for (int j = 0; j < system->d; j++) {
+        Complex arm = product(A[arm_of(system, j)], e[j]);
+        sum -= direction_of(system, v, j) * product(conjugate(now->along), arm).im;
+    }
+    return sum / now->length;
+}
+
+PRBM double strain_of(const System *system, int k, const Complex *e) {
+    return system->laws[k].side * spring_state(system, k, e, 1.0).elongation;
+}
+
+PRBM double strain_rate_of(const System *system, int k, const Complex *e, const double *v) {
+    SpringState now = spring_state(system, k, e, 1.0);
+    return system->laws[k].side * length_rate(system, k, &now, e, v);
+}
+
+PRBM CoilPull coil_pull(const System *system, int k, const Complex *e, const double *v) {
+    const SpringLaw *law = &system->laws[k];
+    SpringState now = spring_state(system, k, e, 1.0);
+    double elastic = coil_elastic(law, &now, COIL_ACTING);
+    double damper = law->damping * length_rate(system, k, &now, e, v);
+    CoilPull result = {law->side * (elastic + damper), PHASE_RTOL * (fabs(elastic) + fabs(damper))};
+    return result;
+}
+
+PRBM SpringPhase coil_phase(const System *system, const SpringPhase *phases, int k) {
+    return system->laws[k].side != 0 ? phases[k] : COIL_ACTING;
+}
+
 /* Add the forces of springs and dampers to force (n,), and return the power that they dissipate. */
-static double add_coil_forces(const System *system, const Complex *e, const double *v, double *force,
-                              double *row) {
+static double add_coil_forces(const System *system, const SpringPhase *phases, const Complex *e,
+                            const double *v, double *force, double *row) {
     double loss = 0.0;
     for (int k = 0; k < system->coil_count; k++) {
         SpringState now = spring_state(system, k, e, 1.0);
         span_gradient(system, k, scaled(1.0 / now.length, now.along), e, row);
-        double rate = dot(system->n, row, v), damper = system->laws[k].damping * rate;
-        add_scaled(system->n, -(now.tension + damper), row, force);
-        loss += damper * rate;
+        const SpringLaw *law = &system->laws[k];
+        SpringPhase phase = coil_phase(system, phases, k);
+        double rate = dot(system->n, row, v);
+        double tension = coil_force(law, &now, rate, phase);
+        add_scaled(system->n, -tension, row, force);
+        loss += law->side == 0 ? law->damping * rate * rate
+                               : (tension - coil_elastic(law, &now, phase)) * rate;
     }
     return loss;
 }
@@ -128,9 +198,10 @@ static Stiffnesses stiffnesses(const SpringLaw *law, const SpringState *now) {
     return result;
 }
 
-/* The same without negative parts. */
+/* The same without negative parts.  Slack springs have the stiffness with which they would act. */
 static Stiffnesses positive_stiffnesses(const SpringLaw *law, const SpringState *now) {
-    Stiffnesses own = stiffnesses(law, now);
+    SpringLaw both = two_sided(law);
+    Stiffnesses own = {spring_slope(&both, now->elongation), now->tension / now->length};
     Stiffnesses result = {greater(own.along, 0.0), greater(own.across, 0.0)};
     return result;
 }
@@ -204,10 +275,11 @@ PRBM bool element_strained(const System *system) {
     return found;
 }
 
-PRBM double add_motion_forces(const System *system, double beta, const double *q, const Complex *e,
-                              const double *v, double *force, double *row) {
+PRBM double add_motion_forces(const System *system, const SpringPhase *phases, double beta,
+                              const double *q, const Complex *e, const double *v, double *force,
+                              double *row) {
     double loss = add_torsion_forces(system, beta, q, v, force);
-    return loss + add_coil_forces(system, e, v, force, row);
+    return loss + add_coil_forces(system, phases, e, v, force, row);
 }
 
 PRBM int damper_count(const System *system) {

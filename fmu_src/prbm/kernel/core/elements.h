@@ -19,11 +19,30 @@ PRBM double twist_of(const System *system, const Torsion *torsion, const double 
 /* Add a moment against its rotation to force (n,). */
 PRBM void turn_back(const Torsion *torsion, double moment, double *force);
 
+/* The force with which a spring acts on its side, and a fraction of its parts, its round-off [N]. */
+typedef struct {
+    double force, rounding;
+} CoilPull;
+
 PRBM double spring_tension(const SpringLaw *law, double x);
 PRBM double spring_slope(const SpringLaw *law, double x);
 PRBM double spring_energy(const SpringLaw *law, double x);
 /* Return a vector and the length of a spring with a share of its pretension. */
 PRBM SpringState spring_state(const System *system, int k, const Complex *e, double share);
+/* The law without its side. */
+PRBM SpringLaw two_sided(const SpringLaw *law);
+/* Return the elastic force of a spring in its phase, and its force with that of damping. */
+PRBM double coil_elastic(const SpringLaw *law, const SpringState *now, SpringPhase phase);
+PRBM double coil_force(const SpringLaw *law, const SpringState *now, double rate, SpringPhase phase);
+/* Return the rate of the length of spring k. */
+PRBM double length_rate(const System *system, int k, const SpringState *now, const Complex *e,
+                        const double *v);
+/* Return the elongation of spring k to the side on which it acts, its rate, and its force. */
+PRBM double strain_of(const System *system, int k, const Complex *e);
+PRBM double strain_rate_of(const System *system, int k, const Complex *e, const double *v);
+PRBM CoilPull coil_pull(const System *system, int k, const Complex *e, const double *v);
+/* Return the phase of spring k.  phases (coils,): of all springs, if one acts on one side. */
+PRBM SpringPhase coil_phase(const System *system, const SpringPhase *phases, int k);
 /* Set row (n,) to the derivatives of the displacement of the end of spring k relative to its start,
  * along a vector u: dz.u, with the unit vector along the spring those of its length. */
 PRBM void span_gradient(const System *system, int k, Complex u, const Complex *e, double *row);
@@ -32,8 +51,9 @@ PRBM void length_gradient(const System *system, int k, const Complex *e, double 
 
 /* Add the forces of torsion and springs with their damping to force (n,), and return the power that
  * they dissipate.  row (n,) is working memory. */
-PRBM double add_motion_forces(const System *system, double beta, const double *q, const Complex *e,
-                              const double *v, double *force, double *row);
+PRBM double add_motion_forces(const System *system, const SpringPhase *phases, double beta,
+                              const double *q, const Complex *e, const double *v, double *force,
+                              double *row);
 /* Return the number of dampers, whose damping is not in proportion to stiffness. */
 PRBM int damper_count(const System *system);
 /* Return the coefficient of damper k, and set row (n,) to the derivatives of its length or rotation. */

@@ -15,6 +15,7 @@ PRBM void equations_place(Equations *equations, const System *system, Memory *me
     q.contacts.modes = place(memory, s + f, sizeof(ContactMode));
     q.contacts.touching = place(memory, s, sizeof(ContactPhase));
     q.contacts.sides = place(memory, f, sizeof(int));
+    q.contacts.coils = place(memory, (size_t)phased_coils(system->mechanism), sizeof(SpringPhase));
     q.held = place(memory, s, sizeof(int));
     q.pressed = place(memory, s, sizeof(int));
     q.laws = place(memory, s, sizeof(ComplianceLaw));
@@ -228,6 +229,10 @@ PRBM void set_equations(Equations *equations, const Inputs *inputs,
     memmove(eq->contacts.modes, contacts->modes, count * sizeof(ContactMode));
     memmove(eq->contacts.touching, contacts->touching, (size_t)eq->system->s * sizeof(ContactPhase));
     memmove(eq->contacts.sides, contacts->sides, (size_t)eq->system->f * sizeof(int));
+    if (eq->system->mechanism->one_sided_count > 0) {
+        memmove(eq->contacts.coils, contacts->coils,
+                (size_t)eq->system->coil_count * sizeof(SpringPhase));
+    }
     set_laws(eq);
     set_rows(eq);
     set_row_parts(eq);

@@ -615,8 +615,9 @@ SHARED bool motion_of_length(int even, const Equations *eq, const Reference *nea
     add_springs(even, eq, result);
     if (damper_count(eq->system) > 0) {
         const Kinematics *at = &result->at;
-        result->spring_loss += add_motion_forces(eq->system, eq->beta, at->angle, at->e, at->speed,
-                                                 result->a, result->row);
+        result->spring_loss +=
+            add_motion_forces(eq->system, eq->contacts.coils, eq->beta, at->angle, at->e, at->speed,
+                              result->a, result->row);
     }
     if (eq->contacts_or_walls) {
         add_contacts_and_walls(eq, result);

@@ -7,7 +7,8 @@ PRBM bool has_dimension(const FlexureType *kind, int dimension) {
 
 PRBM int indicator_count(const Mechanism *mechanism) {
     int guides = mechanism->rubbing_count - mechanism->friction_count;
-    return STOP_INDICATORS * mechanism->stop_count + mechanism->rubbing_count + guides;
+    return STOP_INDICATORS * mechanism->stop_count + mechanism->rubbing_count + guides +
+           mechanism->one_sided_count;
 }
 
 PRBM bool is_hinge(const FlexureType *kind) {
@@ -34,6 +35,10 @@ PRBM int node_count(const FlexureType *kind) {
         return kind->nodes;
     }
     return kind->nodes + 2 * THICK_NODES + (is_hinge(kind) ? 0 : 2 * FILLET_NODES);
+}
+
+PRBM int phased_coils(const Mechanism *mechanism) {
+    return mechanism->one_sided_count > 0 ? mechanism->coil_count : 0;
 }
 
 PRBM double evaluate(Expression quantity, const double *values) {

@@ -73,6 +73,8 @@ typedef struct {
     const char *name;
     Connection between;
     bool pretensioned; /* Whether its free length is given. */
+    int side;          /* Sign of the forces of a spring that acts on one side; 0: both. */
+    int one_sided;     /* Number of such springs before it. */
     Expression stiffness, free_length, cubic_stiffness, damping;
 } Coil;
 
@@ -227,6 +229,7 @@ typedef struct {
     /* Sizes of the assembled system. */
     int coordinate_count, direction_count, loop_count, guided_count, given_count, link_count, strain_count, stretch_count,
         shift_count, placed_count, floating_count, step_count, mass_count, spring_count, corner_count;
+    int one_sided_count; /* Number of springs that act on one side. */
     int compliant_count; /* Number of compliant stops. */
     int first_extra;     /* 2 n + 2: position of the states of compliant stops in a state. */
     int state_count;     /* Size of a state: 2 n + 2, and 4 of each compliant stop. */
@@ -250,6 +253,8 @@ enum { PANELS_MAX = 5 };
 PRBM int panel_count(const FlexureType *kind);
 /* Return the number of nodes in all panels of a beam. */
 PRBM int node_count(const FlexureType *kind);
+/* Return the number of springs whose phases are states: none, or all if one acts on one side. */
+PRBM int phased_coils(const Mechanism *mechanism);
 PRBM double evaluate(Expression quantity, const double *values); /* Twin: Affine in mechanism/. */
 PRBM bool check_parameter(const Parameter *parameter, double x, Problem *problem);
 /* Check all values and the fields that are expressions (Mechanism.values of the twin). */

@@ -77,14 +77,16 @@ PRBM void add_contact_pulls(const Equations *eq, const Complex *e, const Evaluat
 }
 
 /* Let springs pull their bodies and the ground. */
-static void add_spring_pulls(const System *system, const Complex *e, const double *v, Complex *on,
+static void add_spring_pulls(const Equations *eq, const Complex *e, const double *v, Complex *on,
                              Scratch scratch) {
+    const System *system = eq->system;
     double *row = take(&scratch, (size_t)system->n);
     for (int k = 0; k < system->coil_count; k++) {
         const Connection *c = &system->mechanism->coils[k].between;
         SpringState now = spring_state(system, k, e, 1.0);
         length_gradient(system, k, e, row);
-        double force = now.tension + system->laws[k].damping * dot(system->n, row, v);
+        double force = coil_force(&system->laws[k], &now, dot(system->n, row, v),
+                                  coil_phase(system, eq->contacts.coils, k));
         Complex pull = scaled(force / now.length, now.along);
         pull_body(on, c->start, pull);
         pull_body(on, c->end, scaled(-1.0, pull));
@@ -177,7 +179,7 @@ PRBM SectionState section_state(const Equations *eq, const Complex *e, const dou
         pull_body(at.on, m->forces[i].body, complex_of(given[0], given[1]));
     }
     add_contact_pulls(eq, e, found, at.on);
-    add_spring_pulls(system, e, v, at.on, *scratch);
+    add_spring_pulls(eq, e, v, at.on, *scratch);
     add_guide_pulls(eq, e, found, at.on);
     transmit(system, found->lam, &at);
     return at;

@@ -428,10 +428,14 @@ static bool limp(const System *system) {
 
 static bool unreachable(const System *system, bool held, double displacement, double done,
                         Problem *problem) {
+    const char *slack = system->mechanism->one_sided_count > 0
+                            ? "; springs that act on one side carry no load while they are slack"
+                            : "";
     if (!held) {
         return fail(problem,
                     "no static equilibrium under gravity was found: the flexures are too weak for "
-                    "this load; reduce gravity or the masses, or stiffen the flexures");
+                    "this load; reduce gravity or the masses, or stiffen the flexures%s",
+                    slack);
     }
     const char *name = turns(system) ? "angle" : "displacement";
     const char *unit_name = turns(system) ? "rad" : "m";
@@ -443,11 +447,11 @@ static bool unreachable(const System *system, bool held, double displacement, do
             : "";
     return fail(problem,
                 "release.%s = %g %s cannot be reached: no equilibrium was found beyond %.4g %s%s; "
-                "release closer to the straight shape%s%s",
+                "release closer to the straight shape%s%s%s",
                 name, displacement, unit_name, done * displacement + 0.0, unit_name,
                 heavy(system) ? " (gravity raised in proportion)" : "",
                 heavy(system) ? ", or reduce gravity across the motion" : "",
-                hint);
+                hint, slack);
 }
 
 static bool unreachable_start(const Hold *hold, double done, Problem *problem) {

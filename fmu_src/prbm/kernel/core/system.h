@@ -35,9 +35,11 @@ typedef struct {
 } Torsion;
 
 /* The law of a coil spring: stiffness [N/m], coefficient of the cube of the elongation [N/m^3], damping
- * [N s/m], and its length without a force and as drawn [m]. */
+ * [N s/m], its length without a force and as drawn [m], and the sign of its forces if it acts on one side; 0:
+ * both. */
 typedef struct {
     double stiffness, cubic_stiffness, damping, free_length, drawn_length;
+    int side;
 } SpringLaw;
 
 /* The rows of a guide among those of the loops: across the line and, if the body keeps its angle, of the

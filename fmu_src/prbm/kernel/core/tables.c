@@ -203,6 +203,9 @@ static void read_coils(Reader *reader, Mechanism *m) {
         coils[i].name = read_text(reader);
         coils[i].between = read_connection(reader, m);
         coils[i].pretensioned = read_flag(reader);
+        coils[i].side = read_index(reader, 0, 3) - 1;
+        coils[i].one_sided = m->one_sided_count;
+        m->one_sided_count += coils[i].side != 0;
         coils[i].stiffness = read_expression(reader, m);
         if (coils[i].pretensioned) {
             coils[i].free_length = read_expression(reader, m);

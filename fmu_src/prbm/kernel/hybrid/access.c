@@ -22,6 +22,13 @@ PRBM int contact_count(const Simulation *sim) {
     return m->stop_count + m->rubbing_count;
 }
 
+PRBM ContactRange contacts_of(const Simulation *sim, EventKind kind) {
+    int contacts = contact_count(sim);
+    ContactRange every = {0, contacts};
+    ContactRange coils = {contacts, contacts + phased_coils(sim->configuration.mechanism)};
+    return kind == EVENT_ACTION ? coils : every;
+}
+
 PRBM ContactProblem *contact_problem_at(Simulation *sim, const double *q, Scratch scratch) {
     set_position(&sim->contact_problem, q, scratch);
     return &sim->contact_problem;
@@ -47,7 +54,8 @@ PRBM void set_inputs(Simulation *sim) {
     const double *given = sim->state.acting_given, *base = given + m->input.base;
     Inputs inputs = {sim->forces, {base[0], base[1]}, sim->state.walls,
                      given + m->input.mobilities};
-    ContactState contacts = {sim->state.modes, sim->state.touching, sim->state.sides};
+    ContactState contacts = {sim->state.modes, sim->state.touching, sim->state.sides,
+                             sim->state.coils};
     copy(LOADS * m->force_count, given, sim->forces);
     set_equations(&sim->equations, &inputs, &contacts, sim->configuration.omega);
     forget_outputs(sim);

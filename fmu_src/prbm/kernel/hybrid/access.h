@@ -9,6 +9,11 @@ PRBM int state_size(const Simulation *sim); /* ny = 2 n + 2 + 4 c */
 /* The states of compliant stops in a state y (ny,): 4 of each, see core/dynamics.c. */
 PRBM const double *extra_states(const Simulation *sim, const double *y);
 PRBM int contact_count(const Simulation *sim);
+/* What may have events of a kind: contacts or, numbered after them, springs. */
+typedef struct {
+    int first, end;
+} ContactRange;
+PRBM ContactRange contacts_of(const Simulation *sim, EventKind kind);
 /* Return the contact problem at the angles q, valid until it is set up for others. */
 PRBM ContactProblem *contact_problem_at(Simulation *sim, const double *q, Scratch scratch);
 PRBM Complex *directions_at(const Simulation *sim, const double *q, Scratch *scratch);

@@ -10,6 +10,7 @@
 #include "hybrid/contact_names.h"
 #include "hybrid/phases.h"
 #include "hybrid/rest.h"
+#include "hybrid/spring_phases.h"
 
 static const ContactFailure JAMMED = {
     "no forces satisfy the laws of contact and friction",
@@ -30,6 +31,7 @@ static void try_contacts(Simulation *sim, const ContactMode *modes) {
             (size_t)system_of(sim)->s * sizeof *sim->state.touching);
     memmove(sim->trial.contacts.sides, sim->state.sides,
             (size_t)system_of(sim)->f * sizeof *sim->state.sides);
+    sim->trial.contacts.coils = sim->state.coils;
     set_equations(&sim->trial.equations, &sim->equations.inputs, &sim->trial.contacts,
                   sim->configuration.omega);
 }
@@ -584,6 +586,7 @@ PRBM bool choose_modes(Simulation *sim, const int *touching, int touching_count,
     int candidates[2 * STOPS_MAX];
     ContactMode modes[CONTACTS_MAX];
     size_t bytes = (size_t)contact_count(sim) * sizeof *modes;
+    rephase_coils(sim);
     if (!friction_event(sim, event, &friction, problem)) {
         return false;
     }

@@ -1,10 +1,11 @@
-/* Names of contacts in messages. */
+/* Names of contacts and springs in messages. */
 #include <stdio.h>
 #include <string.h>
 
 #include "hybrid/contact_names.h"
 
 PRBM const char *contact_name(const Mechanism *m, int contact) {
+    int contacts = m->stop_count + m->rubbing_count;
     int k = contact - m->stop_count - m->friction_count;
     for (int i = 0; k >= 0 && i < m->guide_count; i++) {
         if (m->guides[i].rubs && k-- == 0) {
@@ -12,7 +13,8 @@ PRBM const char *contact_name(const Mechanism *m, int contact) {
         }
     }
     return contact < m->stop_count ? m->stops[contact].name
-                                   : m->frictions[contact - m->stop_count].name;
+           : contact < contacts    ? m->frictions[contact - m->stop_count].name
+                                   : m->coils[contact - contacts].name;
 }
 
 PRBM bool has_contact(int count, const int *contacts, int contact) {

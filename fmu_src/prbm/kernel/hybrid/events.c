@@ -8,6 +8,8 @@
 #include "hybrid/guards.h"
 #include "hybrid/impacts.h"
 #include "hybrid/phases.h"
+#include "hybrid/spring_guards.h"
+#include "hybrid/spring_phases.h"
 
 /* --- resets ----------------------------------------------------------------------------------- */
 
@@ -29,6 +31,11 @@ static bool apply_separation(Simulation *sim, const Event *event, Problem *probl
     return separate(sim, event->contact, problem);
 }
 
+static bool apply_action(Simulation *sim, const Event *event, Problem *problem) {
+    switch_coil(sim, event->contact);
+    return choose_modes(sim, NULL, 0, NULL, problem);
+}
+
 /* A slip or a reversal. */
 static bool apply_friction(Simulation *sim, const Event *event, Problem *problem) {
     return choose_modes(sim, NULL, 0, event, problem);
@@ -43,20 +50,22 @@ static bool apply_side(Simulation *sim, const Event *event, Problem *problem) {
 /* --- the table -------------------------------------------------------------------------------- */
 
 static const Transition TRANSITIONS[EVENT_KINDS] = {
-    [EVENT_RELEASE] = {{"release", release_guard, true}, held_stop, release_near, false,
+    [EVENT_RELEASE] = {{"release", release_guard, true, NULL}, held_stop, release_near, false,
                        yield_time, apply_release},
-    [EVENT_SLIP] = {{"slip", slip_guard, true}, sticking_contact, slip_near, false, yield_time,
+    [EVENT_SLIP] = {{"slip", slip_guard, true, NULL}, sticking_contact, slip_near, false, yield_time,
                     apply_friction},
-    [EVENT_REVERSAL] = {{"reversal", reversal_guard, false}, slipping_contact, reversal_near, true,
-                        reversal_time, apply_friction},
-    [EVENT_SIDE] = {{"change of side", side_guard, true}, slipping_guide, side_near, false, yield_time,
-                    apply_side},
-    [EVENT_SWITCH] = {{"switch", switching_guard, false}, pressed_stop, pressed_near, false,
+    [EVENT_REVERSAL] = {{"reversal", reversal_guard, false, NULL}, slipping_contact, reversal_near,
+                        true, reversal_time, apply_friction},
+    [EVENT_SIDE] = {{"change of side", side_guard, true, NULL}, slipping_guide, side_near, false,
+                    yield_time, apply_side},
+    [EVENT_SWITCH] = {{"switch", switching_guard, false, NULL}, pressed_stop, pressed_near, false,
                       switching_time, apply_switch},
-    [EVENT_SEPARATION] = {{"separation", indentation_guard, false}, pressed_stop,
-                          separation_near, true, closing_time, apply_separation},
-    [EVENT_IMPACT] = {{"impact", gap_guard, false}, open_stop, impact_near, true, closing_time,
-                      apply_impact},
+    [EVENT_SEPARATION] = {{"separation", indentation_guard, false, indentation_rate_guard},
+                          pressed_stop, separation_near, true, closing_time, apply_separation},
+    [EVENT_ACTION] = {{"action", action_guard, false, NULL}, one_sided_coil, action_near, true,
+                      action_time, apply_action},
+    [EVENT_IMPACT] = {{"impact", gap_guard, false, gap_rate_guard}, open_stop, impact_near, true,
+                      closing_time, apply_impact},
 };
 
 PRBM const Transition *transition(EventKind kind) {
@@ -68,7 +77,8 @@ PRBM const Transition *transition(EventKind kind) {
 /* Replace *first by the first event of a kind, if that is earlier. */
 static bool find_events(Simulation *sim, EventKind kind, Event *first, Problem *problem) {
     const Transition *row = transition(kind);
-    for (int contact = 0; contact < contact_count(sim); contact++) {
+    ContactRange range = contacts_of(sim, kind);
+    for (int contact = range.first; contact < range.end; contact++) {
         Fall fall = {false, 0.0};
         if (row->watched(&sim->equations, contact) &&
             !row->detect(sim, &row->guard, contact, &fall, problem)) {
@@ -82,10 +92,11 @@ static bool find_events(Simulation *sim, EventKind kind, Event *first, Problem *
     return true;
 }
 
-/* The first kind of events that the present contacts allow: an open stop has impacts only. */
+/* The first kind of events that the present contacts allow: an open stop has impacts only, after the
+ * events of springs. */
 static EventKind first_kind(const Equations *eq) {
     bool closed = eq->held_count > 0 || eq->sticking_count > 0 || eq->slipping_count > 0;
-    return closed ? EVENT_NONE + 1 : eq->pressed_count > 0 ? EVENT_SWITCH : EVENT_IMPACT;
+    return closed ? EVENT_NONE + 1 : eq->pressed_count > 0 ? EVENT_SWITCH : EVENT_ACTION;
 }
 
 PRBM bool first_event(Simulation *sim, Event *first, Problem *problem) {
@@ -112,12 +123,13 @@ PRBM bool first_event(Simulation *sim, Event *first, Problem *problem) {
 
 /* --- applying events -------------------------------------------------------------------------- */
 
-/* Count an event; fail if more than EVENTS_MAX occur within a short time.  A change of the phase at a
- * compliant stop does not count: force and motion are continuous there, and steps are counted. */
+/* Count an event; fail if more than EVENTS_MAX occur within a short time.  A change of the phase of a
+ * compliant stop or of a spring does not count: the motion is continuous there, and steps are
+ * counted. */
 static bool count_event(Simulation *sim, const Event *event, Problem *problem) {
     State *state = &sim->state;
     double window = EVENT_WINDOW_RTOL * sim->configuration.scales.time;
-    if (event->kind == EVENT_SWITCH) {
+    if (event->kind == EVENT_SWITCH || event->kind == EVENT_ACTION) {
         return true;
     }
     if (event->time - state->window_since > window) {

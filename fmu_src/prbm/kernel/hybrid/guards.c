@@ -16,7 +16,7 @@ PRBM double gap_guard(const Equations *equations, const Instant *at, int contact
     return gap(equations, contact, at->time, at->e, at->extra);
 }
 
-static double gap_rate_guard(const Equations *equations, const Instant *at, int contact) {
+PRBM double gap_rate_guard(const Equations *equations, const Instant *at, int contact) {
     return gap_rate(equations, contact, at->time, at->e, at->v, at->extra);
 }
 
@@ -24,9 +24,8 @@ PRBM double indentation_guard(const Equations *equations, const Instant *at, int
     return -gap_guard(equations, at, contact);
 }
 
-/* The sign of the gap in a guard that is the gap or the indentation. */
-static double sign_of_gap(const Guard *guard) {
-    return guard->value == indentation_guard ? -1.0 : 1.0;
+PRBM double indentation_rate_guard(const Equations *equations, const Instant *at, int contact) {
+    return -gap_rate_guard(equations, at, contact);
 }
 
 /* The margin of the phase of a contact.  It begins to rise when its rate exceeds the reference
@@ -363,7 +362,6 @@ static bool polish_impact(const Search *search, double apex, double *time) {
     int n = system_of(sim)->n, stop = search->contact;
     Located *located = &sim->stepping.located;
     double t = *time, *y = located->y;
-    double sign = sign_of_gap(search->guard);
     Complex *e = located->e;
     if (t <= sim->state.arc.start) {
         return true;
@@ -379,8 +377,9 @@ static bool polish_impact(const Search *search, double apex, double *time) {
             return false;
         }
         directions(system_of(sim), y, e);
-        double distance = sign * gap(&sim->equations, stop, t, e, extra_states(sim, y));
-        double speed = sign * gap_rate(&sim->equations, stop, t, e, y + n, extra_states(sim, y));
+        Instant at = {t, y, y + n, extra_states(sim, y), e, NULL};
+        double distance = search->guard->value(&sim->equations, &at, stop);
+        double speed = search->guard->rate(&sim->equations, &at, stop);
         double change = -distance / speed;
         if (speed >= 0.0 || fabs(distance) <= EVENT_TIME_RTOL * located->h * fabs(speed) ||
             fabs(change) > EVENT_CORRECTION_RTOL * located->h) {
@@ -448,8 +447,8 @@ static bool detect_closing(Search *search, const double *gaps, const double *rat
                            Closing *closing) {
     Simulation *sim = search->sim;
     double round_off = CONSTRAINT_RTOL * system_of(sim)->length;
-    double depth = closing_depth(&sim->configuration), sign = sign_of_gap(search->guard);
-    ArcGuard guard = arc_guard(search), rate = {search, gap_rate_guard, false, sign, 0.0};
+    double depth = closing_depth(&sim->configuration);
+    ArcGuard guard = arc_guard(search), rate = {search, search->guard->rate, false, 1.0, 0.0};
     bool dips = rates[0] < 0.0 && 0.0 < rates[1];
     closing->a = sample_time(sim, k);
     closing->b = sample_time(sim, k + 1);
@@ -477,7 +476,7 @@ static bool detect_closing(Search *search, const double *gaps, const double *rat
         return closing->at_a || gaps[1] < lesser(gaps[0], -depth);
     }
     if (dips) {
-        rate.sign = -sign;
+        rate.sign = -1.0;
         closing->b = locate(&rate, closing->a, closing->b);
         return guard_at(&guard, closing->b) <= 0.0;
     }
@@ -503,11 +502,11 @@ static bool locate_closing(Search *search, const Closing *closing, double *time)
 PRBM bool closing_time(Simulation *sim, const Guard *guard, int stop, Fall *fall,
                        Problem *problem) {
     Search search = {sim, guard, stop, false, problem};
-    double gaps[GUARD_INTERVALS + 1], rates[GUARD_INTERVALS + 1], sign = sign_of_gap(guard);
+    double gaps[GUARD_INTERVALS + 1], rates[GUARD_INTERVALS + 1];
     for (int k = 0; k <= GUARD_INTERVALS; k++) {
         Instant at = sample(sim, k);
-        gaps[k] = sign * gap_guard(&sim->equations, &at, stop);
-        rates[k] = sign * gap_rate_guard(&sim->equations, &at, stop);
+        gaps[k] = guard->value(&sim->equations, &at, stop);
+        rates[k] = guard->rate(&sim->equations, &at, stop);
     }
     for (int k = 0; !fall->found && k < GUARD_INTERVALS; k++) {
         Closing closing;
@@ -515,6 +514,29 @@ PRBM bool closing_time(Simulation *sim, const Guard *guard, int stop, Fall *fall
         if (fall->found && !locate_closing(&search, &closing, &fall->time)) {
             return false;
         }
+    }
+    return !search.failed;
+}
+
+PRBM bool sampled_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
+                       Problem *problem) {
+    Search search = {sim, guard, contact, false, problem};
+    ArcGuard on_arc = arc_guard(&search);
+    double z[GUARD_INTERVALS + 1];
+    for (int k = 0; k <= GUARD_INTERVALS; k++) {
+        Instant at = sample(sim, k);
+        z[k] = guard->value(&sim->equations, &at, contact);
+    }
+    bool begins = z[0] <= 0.0;
+    for (int k = begins; !fall->found && k < GUARD_INTERVALS; k++) {
+        if (z[k + 1] <= 0.0 && 0.0 < z[k]) {
+            fall->found = true;
+            fall->time = locate(&on_arc, sample_time(sim, k), sample_time(sim, k + 1));
+        }
+    }
+    if (!fall->found && begins && z[GUARD_INTERVALS] < 0.0) {
+        fall->found = true;
+        fall->time = sample_time(sim, 1);
     }
     return !search.failed;
 }
@@ -570,13 +592,13 @@ PRBM bool yield_time(Simulation *sim, const Guard *guard, int contact, Fall *fal
 /* Find the time at which the phase of a pressed contact changes. */
 PRBM bool switching_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
                          Problem *problem) {
-    const Guard rising = {guard->event, rising_guard, true};
+    const Guard rising = {guard->event, rising_guard, true, NULL};
     bool rises = sim->equations.contacts.touching[contact].phase == PHASE_RISING;
     return yield_time(sim, rises ? &rising : guard, contact, fall, problem);
 }
 
 PRBM bool balance_time(Simulation *sim, int stop, double depth, Fall *fall, Problem *problem) {
-    const Guard guard = {"balance", indentation_guard, false};
+    const Guard guard = {"balance", indentation_guard, false, NULL};
     const Arc *arc = &sim->state.arc;
     Search search = {sim, &guard, stop, false, problem};
     ArcGuard on_arc = arc_guard(&search);

@@ -21,6 +21,7 @@ typedef struct {
     const char *event;
     GuardValue *value;
     bool forces; /* whether the value needs multipliers */
+    GuardValue *rate; /* its rate, for closing_time; else NULL */
 } Guard;
 
 /* Whether and when a guard falls in the latest step. */
@@ -34,6 +35,8 @@ PRBM double side_guard(const Equations *equations, const Instant *at, int contac
 PRBM double slip_guard(const Equations *equations, const Instant *at, int contact);
 PRBM double reversal_guard(const Equations *equations, const Instant *at, int contact);
 PRBM double gap_guard(const Equations *equations, const Instant *at, int contact);
+PRBM double gap_rate_guard(const Equations *equations, const Instant *at, int contact);
+PRBM double indentation_rate_guard(const Equations *equations, const Instant *at, int contact);
 PRBM double indentation_guard(const Equations *equations, const Instant *at, int contact);
 PRBM double switching_guard(const Equations *equations, const Instant *at, int contact);
 PRBM double rising_guard(const Equations *equations, const Instant *at, int contact);
@@ -59,6 +62,10 @@ PRBM bool switching_time(Simulation *sim, const Guard *guard, int contact, Fall 
 PRBM bool reversal_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
                         Problem *problem);
 PRBM bool closing_time(Simulation *sim, const Guard *guard, int stop, Fall *fall,
+                       Problem *problem);
+/* The same from the samples of the step.  At its start a guard may be round-off of either sign, which
+ * counts only if it persists. */
+PRBM bool sampled_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
                        Problem *problem);
 /* Find the first time in the latest step at which an indentation passes a depth [m]. */
 PRBM bool balance_time(Simulation *sim, int stop, double depth, Fall *fall, Problem *problem);

@@ -123,7 +123,8 @@ static void output_springs(Simulation *sim, double *out) {
         SpringState now = spring_state(system, k, sim->present.e, 1.0);
         length_gradient(system, k, sim->present.e, row);
         double rate = dot(system->n, row, sim->present.y + system->n);
-        values[SPRING_FORCE] = now.tension + system->laws[k].damping * rate;
+        values[SPRING_FORCE] = coil_force(&system->laws[k], &now, rate,
+                                          coil_phase(system, sim->equations.contacts.coils, k));
         values[SPRING_LENGTH] = now.length;
         values[SPRING_LENGTH_RATE] = rate;
     }

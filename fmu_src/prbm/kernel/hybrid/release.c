@@ -12,6 +12,7 @@
 #include "hybrid/peaks.h"
 #include "hybrid/phases.h"
 #include "hybrid/release.h"
+#include "hybrid/spring_phases.h"
 #include "hybrid/stability.h"
 #include "hybrid/walls.h"
 
@@ -31,6 +32,9 @@ PRBM void clear_stops(Simulation *sim) {
     size_t s = (size_t)sim->configuration.mechanism->stop_count;
     memset(state->latched, 0, s * sizeof *state->latched);
     memset(state->touching, 0, s * sizeof *state->touching);
+    for (int k = 0; k < phased_coils(sim->configuration.mechanism); k++) {
+        state->coils[k] = COIL_ACTING;
+    }
     memset(state->touches, 0, s * sizeof *state->touches);
     memset(state->walls, 0, s * sizeof *state->walls);
     memset(state->driven, 0, s * sizeof *state->driven);
@@ -121,7 +125,7 @@ static bool release_mechanism(Simulation *sim, Problem *problem) {
     set_inputs(sim);
     return start_state(sim, problem) &&
            project(&sim->equations, state->time, state->front, sim->scratch, problem) &&
-           check_walls(sim, problem) &&
+           begin_coils(sim) && check_walls(sim, problem) &&
            rephase(sim, problem) && choose_modes(sim, rigid, count, NULL, problem) &&
            find_fastest(sim, problem);
 }

@@ -50,6 +50,7 @@ static void place_state(State *state, const Mechanism *m, Memory *memory) {
     state->sides = place(memory, (size_t)m->rubbing_count, sizeof *state->sides);
     state->driven = place(memory, s, sizeof(bool));
     state->touching = place(memory, s, sizeof(ContactPhase));
+    state->coils = place(memory, (size_t)phased_coils(m), sizeof(SpringPhase));
     state->touches = place(memory, s, sizeof(ContactStart));
     state->latched = place(memory, s, sizeof(Latched));
     state->walls = place(memory, s, sizeof(Wall));

@@ -13,7 +13,8 @@ enum { SCALARS = 26, PER_STOP_STATE = 16, PER_CONTACT_STATE = 13 };
 PRBM size_t simulation_state_count(const Simulation *simulation) {
     const Mechanism *m = simulation->configuration.mechanism;
     return SCALARS + PER_STOP_STATE * (size_t)m->stop_count + 2 * (size_t)m->rubbing_count +
-           PER_CONTACT_STATE * (size_t)m->compliant_count + simulation->state.number_count;
+           PER_CONTACT_STATE * (size_t)m->compliant_count + (size_t)phased_coils(m) +
+           simulation->state.number_count;
 }
 
 /* --- to numbers ------------------------------------------------------------------------------- */
@@ -70,6 +71,9 @@ PRBM void simulation_save(const Simulation *simulation, double *to) {
         *to++ = state->modes[m->stop_count + i];
         *to++ = state->sides[i];
     }
+    for (int k = 0; k < phased_coils(m); k++) {
+        *to++ = state->coils[k];
+    }
     memcpy(to, state->numbers, state->number_count * sizeof *to);
 }
 
@@ -105,7 +109,7 @@ static void get_scalars(State *state, StateReader *reader) {
     state->arc.valid = get_flag(reader);
     state->interrupted = get_flag(reader);
     state->pending.kind = (EventKind)get_integer(reader, EVENT_NONE, EVENT_KINDS - 1);
-    state->pending.contact = get_integer(reader, 0, 2 * STOPS_MAX);
+    state->pending.contact = get_integer(reader, 0, 2 * STOPS_MAX + PLACES_MAX);
     state->window_count = get_integer(reader, 0, EVENTS_MAX);
     state->pending.time = get_number(reader);
     state->time = get_number(reader);
@@ -185,6 +189,11 @@ static bool read_state(Simulation *sim, const double *from) {
         state->sides[i] = get_integer(&reader, i < m->friction_count ? 1 : -1, 1);
         reader.sound = reader.sound && state->sides[i] != 0;
     }
+    for (int k = 0; k < phased_coils(m); k++) {
+        bool one_sided = m->coils[k].side != 0;
+        state->coils[k] = (SpringPhase)get_integer(&reader, one_sided ? COIL_SLACK : COIL_ACTING,
+                                                   one_sided ? COIL_LAGGING : COIL_ACTING);
+    }
     for (size_t i = 0; i < state->number_count; i++) {
         state->numbers[i] = get_number(&reader);
     }
@@ -197,8 +206,10 @@ static bool consistent(const Simulation *sim) {
     const Mechanism *m = sim->configuration.mechanism;
     EventKind kind = state->pending.kind;
     bool friction = kind == EVENT_SLIP || kind == EVENT_REVERSAL || kind == EVENT_SIDE;
-    int first = kind == EVENT_SIDE ? m->stop_count + m->friction_count : 0;
-    int end = friction ? contact_count(sim) : m->stop_count, contact = state->pending.contact;
+    ContactRange range = contacts_of(sim, kind);
+    int first = kind == EVENT_SIDE ? m->stop_count + m->friction_count : range.first;
+    int end = friction || kind == EVENT_ACTION ? range.end : m->stop_count;
+    int contact = state->pending.contact;
     if (state->step_size < 0.0 || (kind != EVENT_NONE && (contact < first || contact >= end))) {
         return false;
     }

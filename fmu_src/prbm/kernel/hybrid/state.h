@@ -110,6 +110,7 @@ typedef struct {
     int *sides;           /* (f,) to which slipping guides push, see ContactState */
     bool *driven;         /* (s,): whether stop.velocity has ever been non-zero */
     ContactPhase *touching;   /* (s,) contacts at compliant stops */
+    SpringPhase *coils;       /* (coils,) phases of the springs, if one acts on one side */
     ContactStart *touches;       /* (s,) */
     Latched *latched;     /* (s,) */
     Wall *walls;          /* (s,) */

@@ -188,7 +188,8 @@ static bool cut_step(Simulation *sim, const Event *event, Problem *problem) {
     state->step_size = state->arc.h; /* The event does not shorten the next step. */
     state->pending = *event;
     state->has_k1 = false;
-    bool closing = event->kind == EVENT_IMPACT || event->kind == EVENT_SEPARATION;
+    bool closing = event->kind == EVENT_IMPACT || event->kind == EVENT_SEPARATION ||
+                   event->kind == EVENT_ACTION;
     if (closing && event->time > state->arc.start) {
         Located *located = &sim->stepping.located;
         if (located->stop != event->contact) {
