@@ -213,10 +213,8 @@ class Joint:
 
     Parameters
     ----------
-    name : str
-        Prefix of its parameters, for instance ``joint``.
-    start, end : str
-        The two points.
+    name, start, end : str
+        Prefix of its parameters, for instance ``joint``, and the two points.
     stiffness : Quantity or None
         Torsional stiffness k [N m/rad]; None: no spring.
     free_angle : Quantity or None
@@ -300,7 +298,7 @@ class Guide:
     Parameters
     ----------
     name, point : str
-        Prefix of its outputs, for instance ``guide``, and the guided point, ``body.point``.
+        Prefix of its outputs and the guided point, ``body.point``.
     start, end : str
         Two points of the line, both on the ground or on one other body, which carries the line.
         The line is unlimited, and passes through the guided point as drawn.
@@ -663,13 +661,13 @@ def fields_of(part: Part) -> dict[str, Meta]:
 
 def _compliant_fields(stop: Stop) -> dict[str, Meta]:
     """Return the fields of a compliant stop that differ from those of a rigid stop."""
+    restitution, stiffness = FIELDS[Stop]["restitution"], FIELDS[Stop]["stiffness"]
     about = "Coefficient of restitution of a point mass"
-    restitution = Meta("", about, RESTITUTION_MIN, 1.0, tunable=True)
-    if stop.exponent == 1.0:
-        return {"restitution": restitution}
-    rigid = FIELDS[Stop]["stiffness"]
-    about = f"{rigid.description} [N/m^exponent]"
-    return {"restitution": restitution, "stiffness": rigid._replace(unit="", description=about)}
+    found = {"restitution": restitution._replace(minimum=RESTITUTION_MIN, description=about)}
+    if stop.exponent != 1.0:
+        about = f"{stiffness.description} [N/m^exponent]"
+        found["stiffness"] = stiffness._replace(unit="", description=about)
+    return found
 
 
 def field_of(part: Part, name: str) -> Quantity | None:
