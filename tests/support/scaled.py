@@ -32,7 +32,7 @@ def unbounded(monkeypatch):
         patch.setattr(Parameter, "__post_init__", freed)
         patch.setattr(parts, "LENGTH_MIN", 0.0)
         for kind, metas in parts.FIELDS.items():
-            free = {n: (*m[:2], -math.inf, math.inf, *m[4:]) for n, m in metas.items()}
+            free = {n: m._replace(minimum=-math.inf, maximum=math.inf) for n, m in metas.items()}
             patch.setitem(parts.FIELDS, kind, free)
         yield
 
