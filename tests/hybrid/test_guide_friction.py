@@ -9,13 +9,13 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from exchange import assert_directional, integrate
-from guides import CRANK, ROD, cart, incline, rough, slider_crank, slotted_arm, trammel
+from guides import CRANK, ROD, cart, incline, mechanism, rough, slider_crank, slotted_arm, trammel
 from kernel_simulation import KernelSimulation
 from prbm.analysis.linear_model import linearize
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.contact_state import ContactMode
 from prbm.mechanics.inputs import input_names
-from prbm.mechanism.parts import Spring
+from prbm.mechanism.parts import Body, Force, Guide, Release, Spring
 from prbm.runs.engine import simulation as started
 
 G = 9.81
@@ -86,6 +86,34 @@ def test_a_load_across_a_line_holds_a_block_on_either_side(engine):
         sim.advance(0.1)
         assert (abs(sim.outputs()["block.vx"]) > 1e-3) == slides, k
         assert sim.outputs()["way.force"] == pytest.approx(2.0 * G - across)
+
+
+@engines
+@pytest.mark.parametrize("angle", [10.0, 50.0, 170.0, -130.0])
+def test_a_coefficient_above_one_holds_a_block_on_either_side(engine, angle):
+    sim = start(rough(incline(angle), 1.2), engine)
+    sim.advance(0.1)
+    out, across = sim.outputs(), 2.0 * G * math.cos(math.radians(angle))
+    assert math.hypot(out["block.x"], out["block.y"]) < 1e-12
+    assert out["way.force"] == pytest.approx(across, abs=1e-9)
+
+
+@engines
+@pytest.mark.parametrize("mu", [0.4, 0.9, 1.1, 3.0])
+def test_a_drawer_jams_if_it_is_pushed_too_far_beside_its_guides(engine, mu):
+    """The guides, 0.2 m apart, balance a push 0.1 m beside them: N = F/2 each, friction mu F."""
+    ends = {"front": (-0.1, 0.0), "rear": (0.1, 0.0)}
+    model = mechanism(
+        "Drawer", (Body("drawer", 1.0, 1e-3, (0.0, 0.0), ends),),
+        tuple(Guide(end, f"drawer.{end}", "ground.o", "ground.a", friction=mu) for end in ends),
+        Release("drawer"), ground={"o": (-1.0, 0.0), "a": (1.0, 0.0)},
+        forces=(Force("push", "drawer", (0.0, 0.1)),),
+    )  # fmt: skip
+    sim = start(model, engine, changes={"push.x": 2.0})
+    sim.advance(0.5)
+    out = sim.outputs()
+    assert out["drawer.x"] == pytest.approx(max(0.0, 2.0 - 2.0 * mu) * 0.5**2 / 2, abs=1e-10)
+    assert (out["front.force"], out["rear.force"]) == pytest.approx((-1.0, 1.0), abs=1e-9)
 
 
 @engines

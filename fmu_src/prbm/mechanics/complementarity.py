@@ -163,7 +163,8 @@ def coulomb(
     tangential forces abs(P) <= limit, and P = -limit sign(rate) where the rate is not zero.  The
     limit is fixed + friction P_n, with the normal force P_n of the contact.  P_n may be the
     magnitude of a force of constraints that act in both directions, abs(b + L P): a further unknown
-    z is its negative part, z >= 0, b + L P + z >= 0, and one of both is zero.
+    z is its negative part, z >= 0, b + L P + z >= 0, and one of both is zero.  The force counts as
+    positive to the side of b: with z = 0 at first, the path also finds contacts that stick there.
 
     The solution need not be unique: friction can jam contacts that would also slide or separate.
     Contacts that do not close without forces are therefore left out at first.  They take part only
@@ -266,9 +267,9 @@ def _coulomb_problem(
         if 0 <= normal[j] < k:
             M[row, normal[j]] = friction[j] * scale[normal[j]] / scale[k + j]
         elif carried is not None and g >= 0:
-            side = size + m + g
-            M[side, :size] = (carried.L[g] * scale / scale[k + j]) @ spread
-            M[side, side], constants[m + g] = 1.0, carried.b[g] / scale[k + j]
+            side, unit = size + m + g, math.copysign(1.0 / scale[k + j], carried.b[g])
+            M[side, :size] = (carried.L[g] * scale * unit) @ spread
+            M[side, side], constants[m + g] = 1.0, carried.b[g] * unit
             M[row] += friction[j] * M[side]
             M[row, side] += friction[j]
             constants[j] += friction[j] * constants[m + g]

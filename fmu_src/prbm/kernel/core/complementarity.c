@@ -168,11 +168,12 @@ static int force_at(int k, int m, int a, double *sign) {
 }
 
 /* Set the row and the column of the negative part of a normal force that acts in both directions, on
- * which the limit of tangent j depends. */
+ * which the limit of tangent j depends.  The force counts as positive to the side of its constant
+ * part. */
 static void set_side(int k, int m, const CoulombLaws *laws, int j, const double *scale, int size,
                      double *M, double *q) {
     int forces = k + 2 * m, g = laws->normal[j] - k, row = forces + j, side = forces + m + g;
-    double sign, mu = laws->friction[j], unit = 1.0 / scale[k + j];
+    double sign, mu = laws->friction[j], unit = copysign(1.0 / scale[k + j], laws->b[g]);
     for (int a = 0; a < forces; a++) {
         int i = force_at(k, m, a, &sign);
         M[side * size + a] = sign * (laws->L[g * (k + m) + i] * scale[i] * unit);
