@@ -1,9 +1,12 @@
 """Random mechanisms with loops, joints and walls on bodies: the C kernel equals the engine."""
 
+import re
+
 import numpy as np
 import pytest
 
-from kernel_simulation import KernelSimulation
+from kernel_simulation import KernelMistake, KernelSimulation
+from prbm.base.errors import SimulationError
 from prbm.fmu.start import interface
 from prbm.hybrid.simulation import Simulation
 from random_mechanisms import inputs, seeded
@@ -25,7 +28,12 @@ def deviations(seed, **parts):
     nominal = {v.name: v.nominal or 1.0 for v in interface(mechanism, {})}
     result = {}
     for t in np.linspace(0.0, SPAN, COMPARISONS + 1):
-        engine.advance(t)
+        try:
+            engine.advance(t)
+        except SimulationError as error:  # Friction along guides may jam.
+            with pytest.raises(KernelMistake, match=re.escape(str(error).partition(" at t")[0])):
+                kernel.advance(t)
+            return {"time": 0.0}
         kernel.advance(t)
         expected, found = engine.outputs(), kernel.outputs()
         assert expected.keys() <= found.keys()

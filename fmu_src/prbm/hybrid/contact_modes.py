@@ -14,6 +14,7 @@ from ..base.tolerances import (
     FRICTION_EXCESS_RTOL,
     MODE_ITERATIONS_MAX,
 )
+from ..mechanics.constraints import solve_saddle
 from ..mechanics.contact_state import ContactMode, ContactState
 from ..mechanics.dynamics import Equations
 from . import spring_phases
@@ -44,9 +45,28 @@ def release(configuration: Configuration, front: Front, stop: int) -> Front:
 
 
 def change_side(configuration: Configuration, front: Front, contact: int) -> Front:
-    """Return the front after the force of a guide that slips has changed its side."""
-    contacts = front.contacts.with_side(contact, -front.contacts.side(contact))
-    return choose_modes(configuration, front.with_contacts(contacts))
+    """Return the front after the force of a guide that slips has changed its side.
+
+    Raises
+    ------
+    SimulationError
+        If friction reverses the effect of the force on the motion across the line, on either side
+        (Painleve's paradox): no force satisfies the laws after the change.
+    """
+    changed = front.contacts.with_side(contact, -front.contacts.side(contact))
+    other = front.with_contacts(changed)
+    if not all(_resists(one, contact) for one in (front, other)):
+        raise SimulationError(_failure(configuration, front, [contact], JAMMED))
+    return choose_modes(configuration, other, turned=contact)
+
+
+def _resists(front: Front, guide: int) -> bool:
+    """Return whether the force of a slipping guide, with its friction, resists to its side."""
+    equations = front.equations
+    right = np.zeros(equations.n + len(equations.rows))
+    row = equations.n + equations.normal_row(guide)
+    right[row] = 1.0  # An acceleration of the point to the left of its line.
+    return bool(solve_saddle(front.evaluate().factors, right)[row] < 0.0)
 
 
 def slip(configuration: Configuration, front: Front, contact: int) -> Front:
@@ -71,6 +91,7 @@ def choose_modes(
     resting: Sequence[int] = (),
     slipped: int | None = None,
     reversing: int | None = None,
+    turned: int | None = None,
 ) -> Front:
     """Return the front with the modes of all contacts chosen anew.
 
@@ -86,6 +107,8 @@ def choose_modes(
         A contact that has reached the limit of friction: it cannot stick.
     reversing : int or None
         A contact whose sliding velocity has fallen to zero.
+    turned : int or None
+        A guide that has changed its side: its force is round-off, and does not change it back.
 
     The phases of springs follow the rates, which an impact changes.
 
@@ -100,7 +123,7 @@ def choose_modes(
     for _ in range(MODE_ITERATIONS_MAX):
         # A compliant stop is a candidate only while it is a constraint.
         candidates = [i for i in candidates if i not in front.contacts.pressed]
-        front = _chosen(configuration, front, candidates, slipped, turning)
+        front = _chosen(configuration, front, candidates, slipped, turning, turned)
         if front.contacts == before or not front.contacts.held:
             return front
         # The projection closes gaps of round-off, which changes the forces of stiff flexures.
@@ -123,6 +146,7 @@ def _chosen(
     candidates: Sequence[int],
     slipped: int | None,
     turning: Mapping[int, float],
+    turned: int | None,
 ) -> Front:
     """Return the front with the modes that its forces choose; not projected.
 
@@ -135,7 +159,7 @@ def _chosen(
         holding = holding_stops(configuration, front, candidates)
         front = front.with_contacts(front.contacts.holding(holding))
         front = _with_friction(configuration, front, candidates, slipped, turning)
-        wrong = _guide_on_wrong_side(configuration, front)
+        wrong = _guide_on_wrong_side(configuration, front, turned)
         if wrong is None:
             return front
         contacts = front.contacts.with_side(wrong, -front.contacts.side(wrong))
@@ -144,9 +168,12 @@ def _chosen(
     raise SimulationError(_failure(configuration, front, failed, JAMMED))
 
 
-def _guide_on_wrong_side(configuration: Configuration, front: Front) -> int | None:
-    """Return the first slipping guide that does not push to the side of its friction."""
-    slipping, least = front.equations.slipping_guides, -configuration.scales.zero_force
+def _guide_on_wrong_side(
+    configuration: Configuration, front: Front, turned: int | None
+) -> int | None:
+    """Return the first slipping guide but ``turned`` that pushes to the wrong side of its line."""
+    slipping = [c for c in front.equations.slipping_guides if c != turned]
+    least = -configuration.scales.zero_force
     lam = front.evaluate().lam if slipping else np.zeros(0)
     return next((c for c in slipping if front.equations.side_force(c, lam) < least), None)
 

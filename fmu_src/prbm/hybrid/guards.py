@@ -395,9 +395,16 @@ def release_time(view: StepView, guard: Guard, stop: int) -> float | None:
 
 
 def side_time(view: StepView, guard: Guard, contact: int) -> float | None:
-    """Return when the force of a slipping guide changes its side by more than round-off."""
+    """Return when the force of a slipping guide changes its side by more than round-off.
+
+    Directly after a change it may be round-off of either sign, which counts only if it persists.
+    """
     equations, slack = view.equations, view.scales.zero_force
     seen = [(t, equations.side_force(contact, at.lam) + slack) for t, _, at in view.evaluations]
+    if seen[0][1] <= 0.0:
+        seen = seen[1:]
+        if seen[0][1] <= 0.0:
+            return seen[0][0]
     z = view.along(guard, contact)
     return _first_fall(view, lambda t: z(t) + slack, seen)
 

@@ -193,11 +193,13 @@ static bool holding_stops(Simulation *sim, int count, const int *candidates, con
 
 /* A slip (slips is true) or reversal at a contact; contact is -1 without such an event.  After a
  * reversal, sliding speeds of the contact up to slow [m/s] count as zero; rate is its sliding
- * acceleration. */
+ * acceleration.  turned: a guide that has changed its side, whose force is round-off and does not change
+ * it back; -1: none. */
 typedef struct {
     int contact;
     bool slips;
     double slow, rate;
+    int turned;
 } FrictionEvent;
 
 /* Whether a contact can slide while all other held and sticking contacts rest. */
@@ -436,6 +438,34 @@ static bool choose_slips(Simulation *sim, const HoldingSet *holding, const Holdi
     return agree || friction_jams(sim, touching, problem);
 }
 
+/* Whether the force of a slipping guide, with its friction, resists an acceleration of its point to the
+ * left of its line. */
+static bool resists(Simulation *sim, int contact, bool *result, Problem *problem) {
+    const Equations *eq = &sim->equations;
+    const double *q = sim->state.front, *v = q + eq->system->n;
+    Scratch scratch = sim->scratch;
+    double *x = take(&scratch, (size_t)eq->system->even), *lam = take(&scratch, (size_t)eq->r);
+    if (!evaluate_equations(eq, sim->state.front_time, q, v, extra_states(sim, q), NULL,
+                            &sim->at_front, problem)) {
+        return false;
+    }
+    zeros(eq->system->even, x);
+    zeros(eq->r, lam);
+    lam[normal_row(eq, contact)] = 1.0;
+    solve_again(&sim->at_front.factors, x, lam);
+    *result = lam[normal_row(eq, contact)] > 0.0;
+    return true;
+}
+
+PRBM bool change_side(Simulation *sim, int contact, Problem *problem) {
+    bool before = false, after = false;
+    bool ok = resists(sim, contact, &before, problem);
+    sim->state.sides[contact - system_of(sim)->s] *= -1;
+    set_contacts(sim, sim->state.modes);
+    ok = ok && resists(sim, contact, &after, problem);
+    return ok && ((before && after) || contacts_fail(sim, &JAMMED, 1, &contact, problem));
+}
+
 /* --- all contacts ----------------------------------------------------------------------------- */
 
 /* The error of the time of an event [s]. */
@@ -463,9 +493,13 @@ static bool slide_acceleration(Simulation *sim, int contact, double *result, Pro
 
 static bool friction_event(Simulation *sim, const Event *event, FrictionEvent *result,
                            Problem *problem) {
-    FrictionEvent none = {-1, false, 0.0, 0.0};
+    FrictionEvent none = {-1, false, 0.0, 0.0, -1};
     *result = none;
     if (!event) {
+        return true;
+    }
+    if (event->kind == EVENT_SIDE) {
+        result->turned = event->contact;
         return true;
     }
     result->contact = event->contact;
@@ -502,8 +536,8 @@ static int resting_candidates(Simulation *sim, const int *touching, int touching
 }
 
 /* Find the first slipping guide that does not push to the side of its friction in the trial
- * equations; -1: none. */
-static bool find_wrong_side(Simulation *sim, const ContactMode *modes, int *wrong,
+ * equations, except for the guide that has just turned; -1: none. */
+static bool find_wrong_side(Simulation *sim, const ContactMode *modes, int turned, int *wrong,
                             Problem *problem) {
     const Equations *eq = &sim->trial.equations;
     const double *q = sim->state.front, *v = q + system_of(sim)->n;
@@ -519,7 +553,7 @@ static bool find_wrong_side(Simulation *sim, const ContactMode *modes, int *wron
                                  &sim->trial.evaluation, problem);
     for (int k = 0; ok && *wrong < 0 && k < eq->slipping_rows; k++) {
         int c = eq->slipping[k];
-        bool changed = is_guide(eq->system, c) && side_force(eq, sim->trial.evaluation.lam, c) <
+        bool changed = is_guide(eq->system, c) && c != turned && side_force(eq, sim->trial.evaluation.lam, c) <
                                                       -zero_force(&sim->configuration);
         *wrong = changed ? c : -1;
     }
@@ -551,7 +585,7 @@ static bool choose_all_modes(Simulation *sim, const HoldingSet *touching, const 
     for (int k = 0; k < MODE_ITERATIONS_MAX; k++) {
         int wrong;
         if (!choose_by_forces(sim, touching, event, modes, problem) ||
-            !find_wrong_side(sim, modes, &wrong, problem)) {
+            !find_wrong_side(sim, modes, event->turned, &wrong, problem)) {
             return false;
         }
         if (wrong < 0) {
@@ -579,7 +613,7 @@ static void remove_pressed(const Simulation *sim, HoldingSet *stops) {
  * they stay the same.
  *
  * touching: open stops that touch and neither close nor open
- * event: a slip or reversal that has just occurred, or NULL */
+ * event: a slip, a reversal or a change of side that has just occurred, or NULL */
 PRBM bool choose_modes(Simulation *sim, const int *touching, int touching_count, const Event *event,
                  Problem *problem) {
     FrictionEvent friction;

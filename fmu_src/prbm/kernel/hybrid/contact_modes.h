@@ -12,6 +12,9 @@ typedef struct {
 
 PRBM bool find_holding_stops(Simulation *sim, int count, const int *candidates, const double *q,
                              const double *v, HoldingSet *holding, Problem *problem);
+/* Change the side to which a slipping guide pushes.  Fail if friction reverses the effect of its force on
+ * the motion across its line, on either side (Painleve's paradox): it jams. */
+PRBM bool change_side(Simulation *sim, int contact, Problem *problem);
 /* The trial equations in which a set of stops is closed and all contacts with a velocity slip. */
 PRBM const Equations *equations_holding(Simulation *sim, const HoldingSet *holding,
                                         const double *q, const double *v);

@@ -42,9 +42,7 @@ static bool apply_friction(Simulation *sim, const Event *event, Problem *problem
 }
 
 static bool apply_side(Simulation *sim, const Event *event, Problem *problem) {
-    sim->state.sides[event->contact - system_of(sim)->s] *= -1;
-    set_contacts(sim, sim->state.modes);
-    return choose_modes(sim, NULL, 0, NULL, problem);
+    return change_side(sim, event->contact, problem) && choose_modes(sim, NULL, 0, event, problem);
 }
 
 /* --- the table -------------------------------------------------------------------------------- */
@@ -57,7 +55,7 @@ static const Transition TRANSITIONS[EVENT_KINDS] = {
     [EVENT_REVERSAL] = {{"reversal", reversal_guard, false, NULL}, slipping_contact, reversal_near,
                         true, reversal_time, apply_friction},
     [EVENT_SIDE] = {{"change of side", side_guard, true, NULL}, slipping_guide, side_near, false,
-                    yield_time, apply_side},
+                    side_time, apply_side},
     [EVENT_SWITCH] = {{"switch", switching_guard, false, NULL}, pressed_stop, pressed_near, false,
                       switching_time, apply_switch},
     [EVENT_SEPARATION] = {{"separation", indentation_guard, false, indentation_rate_guard},

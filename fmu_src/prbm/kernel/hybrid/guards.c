@@ -577,13 +577,31 @@ PRBM bool yield_time(Simulation *sim, const Guard *guard, int contact, Fall *fal
     Search search = {sim, guard, contact, false, problem};
     ArcGuard on_arc = arc_guard(&search);
     const Arc *arc = &sim->state.arc;
-    on_arc.offset = guard->value == side_guard ? zero_force(&sim->configuration) : 0.0;
     double times[3] = {arc->start, arc->start + arc->h / 2, arc->start + arc->h};
     for (int part = 0; !fall->found && part < 2; part++) {
         double a = times[part], b = times[part + 1];
         if (guard_at(&on_arc, b) <= 0.0) {
             fall->found = true;
             fall->time = locate(&on_arc, a, b); /* At a if the guard has fallen there. */
+        }
+    }
+    return !search.failed;
+}
+
+/* Find the time at which the force of a slipping guide changes its side by more than round-off.  Directly
+ * after a change it may be round-off of either sign, which counts only if it persists. */
+PRBM bool side_time(Simulation *sim, const Guard *guard, int contact, Fall *fall, Problem *problem) {
+    Search search = {sim, guard, contact, false, problem};
+    ArcGuard on_arc = arc_guard(&search);
+    const Arc *arc = &sim->state.arc;
+    double times[3] = {arc->start, arc->start + arc->h / 2, arc->start + arc->h};
+    on_arc.offset = zero_force(&sim->configuration);
+    bool begins = guard_at(&on_arc, times[0]) <= 0.0;
+    for (int part = 0; !fall->found && part < 2; part++) {
+        double a = times[part], b = times[part + 1];
+        if (guard_at(&on_arc, b) <= 0.0) {
+            fall->found = true;
+            fall->time = begins && part == 0 ? b : locate(&on_arc, a, b);
         }
     }
     return !search.failed;

@@ -55,6 +55,7 @@ PRBM bool separation_near(Simulation *sim);
 PRBM bool impact_near(Simulation *sim);
 /* Find the first time in the latest step at which the guard of a contact falls to zero.  The caller
  * sets fall->found to false.  Return false on failure. */
+PRBM bool side_time(Simulation *sim, const Guard *guard, int contact, Fall *fall, Problem *problem);
 PRBM bool yield_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
                      Problem *problem);
 PRBM bool switching_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
