@@ -14,7 +14,7 @@ from random_mechanisms import inputs, seeded
 SPAN, COMPARISONS = 4e-3, 4  # Duration [s] and number of comparisons.
 SLOW_SEEDS = (4, 5, *range(12, 120))
 SEEDS = [seed for seed in range(12) if seed not in SLOW_SEEDS]
-DEVIATION_MAX = 1e-5  # Relative to the nominal value; impacts amplify rounding errors.
+DEVIATION_MAX = 1e-4  # Relative to the nominal value; impacts amplify rounding errors.
 COUNTED = ("impact_count", "contact")
 PEAKS = ("peak_stress", "peak_stress_time", "peak_stress_position")
 PEAK_RTOL = 1e-2  # Largest of the samples at the ends of steps, whose lengths vary by round-off.
