@@ -117,6 +117,35 @@ def test_a_drawer_jams_if_it_is_pushed_too_far_beside_its_guides(engine, mu):
 
 
 @engines
+@pytest.mark.parametrize(
+    ("angle", "mu", "push"),
+    [(37.66, 2.5, (-3.936, 2.901)), (39.58, 2.54, (5.332, -4.608)), (67.66, 2.72, (-1.458, 1.506))],
+)
+def test_a_rod_on_two_lines_locks_itself(engine, angle, mu, push):
+    """It stays where two forces within the cones of friction meet on the line of the push."""
+    sim = start(
+        rough(trammel(angle=angle), mu), engine, changes={"push.x": push[0], "push.y": push[1]}
+    )
+    a = cmath.rect(1.0, math.radians(angle))
+    first, second = 0.5 * a.real, 0.5j * a.imag  # Ends, and the directions in their cones.
+    at, pushed = complex(0.3 * a.real, 0.2 * a.imag), complex(*push)
+    slopes = np.linspace(-mu, mu, 2001)
+    assert any(_meet(at, pushed, (first, complex(s, 1.0)), second, mu) for s in slopes)
+    sim.advance(0.1)
+    assert math.hypot(sim.outputs()["pen.x"], sim.outputs()["pen.y"]) < 1e-9
+
+
+def _meet(at, pushed, one, other, mu):
+    """Return whether a force at the second end within its cone completes one at the first end."""
+    end, direction = one
+    # Moments about the second end give the force at the first end.
+    turning = ((end - other).conjugate() * direction).imag
+    size = -((at - other).conjugate() * pushed).imag / turning
+    rest = -pushed - size * direction
+    return abs(rest.imag) <= mu * abs(rest.real)
+
+
+@engines
 def test_a_block_without_a_load_across_its_line_slides_freely(engine):
     """The force of the guide is round-off of either sign: it causes no events."""
     model = replace(rough(incline(30.0, velocity=0.5), 0.4), gravity=(0.0, 0.0))

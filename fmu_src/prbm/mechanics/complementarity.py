@@ -219,6 +219,8 @@ def coulomb(
     M, spread, constants = _coulomb_problem(scale, W, friction, fixed, normal, carried)
     size = k + 2 * m
     given, u = u, np.where(np.abs(u) <= tolerance / 2, 0.0, u)
+    # Guides that lock each other may need a path from another unknown than a normal force.
+    heaviest = k if carried is None or not len(carried.b) else len(M)
     attempts = [(M, u), (M, u + tolerance / 2 * (np.arange(k + m) < k))]
     unloaded = np.flatnonzero(u[:k] >= -tolerance)
     if len(unloaded):
@@ -229,9 +231,9 @@ def coulomb(
         attempts.insert(0, (reduced, rates))
     for matrix, rates in attempts:
         q = np.concatenate([spread.T @ (scale * rates), constants])
-        for heavy in range(-1, k):
+        for heavy in range(-1, heaviest):
             cover = np.ones(len(q))
-            cover[:k][np.arange(k) == heavy] = COVER_FACTOR
+            cover[np.arange(len(q)) == heavy] = COVER_FACTOR
             z = lemke(matrix, q, cover)
             if z is None:
                 continue

@@ -272,6 +272,9 @@ PRBM bool coulomb(int k, int m, const double *W, const double *u, const CoulombL
     double *q = take(&scratch, (size_t)size), *limit = take(&scratch, (size_t)m);
     double *rates = take(&scratch, (size_t)(k + m)); /* without round-off */
     bool solved = false;
+    /* Guides that lock each other may need a path that begins at another unknown than a normal
+     * force. */
+    int heaviest = laws->sides > 0 ? size : k;
     int first = 1; /* The first attempt leaves contacts out, if there are any. */
     for (int i = 0; i < k; i++) {
         first = closes(u[i], tolerance) ? first : 0;
@@ -290,7 +293,7 @@ PRBM bool coulomb(int k, int m, const double *W, const double *u, const CoulombL
         for (int i = 0; attempt == 2 && i < k; i++) {
             q[i] += scale[i] * (tolerance / 2);
         }
-        for (int heavy = -1; !solved && heavy < k; heavy++) {
+        for (int heavy = -1; !solved && heavy < heaviest; heavy++) {
             solved = follow_path(k, m, size, M, q, heavy, scale, P, scratch);
             for (int j = 0; solved && j < m; j++) {
                 limit[j] = limit_of(k, k + m, laws, j, P);
