@@ -250,6 +250,11 @@ CHANGES = {
         "gravity = 9.81",
         "gravity = 9.81: write a pair, gravity = [0, -9.81]",
     ),
+    "states without a list": (
+        'gravity = ["0 m/s2", "-981 cm/s2"]',
+        'states = "arm.angle"',
+        "states = 'arm.angle': write a list of coordinates, states = [\"crank.angle\"]",
+    ),
     "value instead of a table of points": (
         '[bodies.points]\nroot = ["20 mm", 0.0]\ntip = ["arm.length", "0 m"]\n',
         "points = 3\n",

@@ -48,6 +48,7 @@ FORMS = {  # Remedy for a value of another form than those that these keys have.
     "gravity": "write a pair, gravity = [0, -9.81]",
     "outline": _CORNERS,
     "holes": _CORNERS + ", for each hole",
+    "states": 'write a list of coordinates, states = ["crank.angle"]',
     "mirror": 'write the line of symmetry, "x = 0" or "y = 40 mm", or a list of both',
     "ends": "write clamp, pin or free in quotes, or a pair of them",
 }
