@@ -8,6 +8,7 @@ import pytest
 from PIL import Image
 
 from prbm.commands.command_line import main
+from prbm.hybrid.events import EventKind
 from support import ROOT
 
 DOCS = ROOT / "docs"
@@ -76,6 +77,13 @@ LINKING = [path for path in PAGES if path.parent == DOCS and path.stem != "index
 def test_pages_link_the_index_and_the_glossary(page):
     linked = {target.resolve() for target, _ in links(page)}
     assert {DOCS / "index.md", DOCS / "glossary.md"} <= linked | {page}
+
+
+def test_the_page_of_conventions_lists_every_kind_of_event():
+    page = (ROOT / "docs" / "conventions.md").read_text("utf-8")
+    section = page.partition("\n## Events\n")[2]
+    items = re.findall(r"(?m)^- .*$", section.partition("\n\nRest is")[0])
+    assert len(items) == len(EventKind)
 
 
 def test_the_glossary_is_in_alphabetical_order_and_has_the_terms():
