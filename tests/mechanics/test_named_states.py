@@ -29,13 +29,19 @@ def test_named_coordinates_are_chosen_and_the_others_completed():
     [
         (("crank.omega",), "states: 'crank.omega' is unknown|states: .*crank.omega"),
         (("crank.angle", "crank.angle"), "crank.angle is named twice"),
-        (("crank.angle", "rod.angle"), "determine these coordinates from each other"),
-        (("slider.angle",), "determine these coordinates from each other"),
+        (("crank.angle", "rod.angle"), "do not determine the others"),
+        (("slider.angle",), "do not determine the others"),
     ],
 )
 def test_names_that_are_no_independent_coordinates_are_rejected(states, message):
     with pytest.raises(MechanismError, match=message):
         independent(replace(slider_crank(), states=states))
+
+
+@pytest.mark.parametrize("states", ["crank.angle", (3,), None])
+def test_states_are_texts(states):
+    with pytest.raises(MechanismError, match=r"states = .* must be coordinates as texts"):
+        replace(slider_crank(), states=states)
 
 
 @pytest.mark.native

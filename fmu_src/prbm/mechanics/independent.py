@@ -45,7 +45,7 @@ def independent(mechanism: Mechanism) -> tuple[int, ...]:
     EquilibriumError
         If the shape of the release cannot be reached.
     MechanismError
-        If a state is no coordinate, or the loops determine the states from each other.
+        If a state is no coordinate, or the states do not determine the other coordinates.
     """
     values = mechanism.values()
     system = assemble(mechanism, values)
@@ -58,9 +58,9 @@ def independent(mechanism: Mechanism) -> tuple[int, ...]:
     best = max(choices, key=lambda dependent: min(conditioning(J, dependent) for J in rows))
     if states and not min(conditioning(J, best) for J in rows) > DEPENDENT_PIVOT_RTOL:
         raise MechanismError(
-            f"states = {list(mechanism.states)}: the loops determine these coordinates from each "
-            f"other, at least in the drawn or the released shape; name fewer of the "
-            f"{system.n - len(system.loops)} independent coordinates, or others"
+            f"states = {list(mechanism.states)}: these coordinates do not determine the others in "
+            "the drawn or the released shape; name coordinates that can be chosen freely there, at "
+            f"most {system.n - len(system.loops)}"
         )
     return tuple(j for j in range(system.n) if j not in best)
 

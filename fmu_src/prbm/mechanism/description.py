@@ -157,6 +157,10 @@ class Mechanism:
             )
         if len(self.gravity) != 2:
             raise MechanismError(f"gravity = {self.gravity!r} must have an x and a y component")
+        if not isinstance(self.states, tuple) or not all(isinstance(x, str) for x in self.states):
+            raise MechanismError(
+                f'states = {self.states!r} must be coordinates as texts, such as ("crank.angle",)'
+            )
         self._check_references()
         if self.damping_zeta and self.free_bodies:
             raise MechanismError(
@@ -222,7 +226,7 @@ class Mechanism:
         )  # fmt: skip
         yield Parameter(
             "damping.beta", self.damping_beta, "s",
-            "Time constant of damping in proportion to the rate of every spring", 0.0, 1e-2,
+            "Time constant of damping in proportion to the stiffness of flexures and torsion", 0.0, 1e-2,
             1e-5, tunable=True,
         )  # fmt: skip
         tuned: tuple[Part, ...] = (*self.frictions, *self.guides, *self.stops)

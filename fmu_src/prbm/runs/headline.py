@@ -126,7 +126,7 @@ def headline(
     if not moving:
         lines.append(
             "motion               nothing moves: release the mechanism away from its equilibrium, "
-            "or apply an input"
+            "or apply an input, a larger one if friction holds the mechanism"
         )
     impacts = marks(result, mechanism)
     for i, (stop, compliant) in enumerate((s.name, s.compliant) for s in mechanism.stops):
