@@ -226,8 +226,8 @@ class Mechanism:
         )  # fmt: skip
         yield Parameter(
             "damping.beta", self.damping_beta, "s",
-            "Time constant of damping in proportion to the stiffness of flexures and torsion", 0.0, 1e-2,
-            1e-5, tunable=True,
+            "Time constant of damping in proportion to the stiffness of flexures and torsion",
+            0.0, 1e-2, 1e-5, tunable=True,
         )  # fmt: skip
         tuned: tuple[Part, ...] = (*self.frictions, *self.guides, *self.stops)
         for part in tuned:
