@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import pytest
 
 from free_bodies import ball, with_start
+from guides import rough
 from kernel_library import KernelError, kernel
 from many_parts import anvil, elastic, profiles
 from prbm.base.errors import MechanismError
@@ -130,6 +131,7 @@ class Reader:
 
 OWN = {
     "Elastic": elastic, "Profiles": profiles,
+    "Guides": lambda: rough(read_mechanism(shipped()["SliderCrank"]), 0.2),
     "Starts": lambda: with_start(ball(), "ball", start_angle=0.2, start_y=0.1, start_vx=0.3),
 }  # fmt: skip
 
@@ -290,7 +292,8 @@ class Comparison:
                 assert self.body() == body_of(point)
                 self.point(m.point(point, guide.name))
             self.point(m.point(guide.end, guide.name))
-            assert r.take("I") == (not guide.turning)
+            assert r.take("II") == (not guide.turning, guide.friction is not None)
+            self.fields(guide)
 
     def contacts_and_forces(self) -> None:
         m, r = self.mechanism, self.reader
