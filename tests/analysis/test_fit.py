@@ -114,6 +114,7 @@ def test_k_theta_of_the_steel_guide_fits_to_2_586():
     assert found[K].value == pytest.approx(2.586, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_fits_to_frequencies_of_held_shapes_and_higher_modes_recover_the_parameters():
     """The data are the engine's frequencies for known parameters."""
     m, truth = mechanism("PRBDM2R"), {"flexure.K_theta1": 3.9, "flexure.K_theta2": 1.9}
@@ -166,6 +167,7 @@ def test_one_frequency_cannot_separate_two_coefficients(ambiguous):
     assert "not determined" in str(ambiguous)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("given", [None, (2e-5, 2e-3)])
 def test_a_force_cannot_separate_thickness_and_modulus_with_any_bounds(given):
     """The force over the deflection of leaves depends on E h^3 alone; a length is no ratio."""
@@ -220,6 +222,7 @@ def test_the_header_of_a_valley_is_aligned_with_its_columns():
     assert ends[0] == ends[1]
 
 
+@pytest.mark.slow
 def test_three_coefficients_and_one_frequency_have_two_undetermined_directions():
     """The third direction is determined as accurately as the frequency."""
     m = mechanism("PRBDM2R")
@@ -307,6 +310,7 @@ def test_a_parameter_at_its_bound_is_reported():
     assert (wide.lower[1], wide.upper[1]) == (0.0, 1.0), "bounds of the mechanism are kept"
 
 
+@pytest.mark.slow
 def test_the_title_of_a_fit_is_not_wider_than_its_figure():
     """Parameters with twelve digits take one line each; short ones share a line."""
     m = mechanism("PRBDM")

@@ -207,6 +207,7 @@ def test_a_nearly_symmetric_double_beam_snaps_to_a_second_stable_position():
     assert rests == [1, 0]
 
 
+@pytest.mark.slow
 def test_a_held_path_ends_at_the_reach_of_rigid_links() -> None:
     """The links of PRBDM are straight at a displacement of gamma times the length."""
     guide = mechanism("PRBDM")

@@ -95,6 +95,7 @@ def test_a_clock_pendulum_on_a_light_spring_has_the_frequency_of_its_boundary_va
     assert sum(out[name] for name in names) == pytest.approx(first, abs=1e-9 * abs(first))
 
 
+@pytest.mark.slow
 def test_a_ball_falls_and_bounces_by_its_closed_form():
     """After sqrt(2 h/g) = 0.45152 s with sqrt(2 g h) = 4.4294 m/s, and back with 0.7 of it.
 

@@ -79,6 +79,7 @@ def test_the_mechanism_starts_at_rest_in_its_equilibrium():
     assert out["shuttle.x"] == pytest.approx(system.amount(equilibrium(system).q), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_bump_stops_limit_the_displacement_and_are_hit():
     pulse = Pulse("half-sine", 500 * 9.80665, 0.5e-3)
     found = shock(accelerometer(), {pulse.input: pulse.signal}, duration=pulse.duration)

@@ -19,6 +19,7 @@ def bistable():
     return assemble(guide, guide.values())
 
 
+@pytest.mark.slow
 def test_a_valley_whose_fits_do_not_converge_is_rejected(monkeypatch):
     free = [Free("K_theta1", 1.0, 9.0), Free("K_theta2", 1.0, 9.0)]
     free = [Free(f"flexure.{one.name}", one.lower, one.upper) for one in free]

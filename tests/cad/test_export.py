@@ -71,6 +71,7 @@ def test_a_mechanism_that_cannot_be_cut_from_a_plate_is_rejected(name, reason):
         outline(load(name))
 
 
+@pytest.mark.slow
 def test_a_drawing_that_is_imported_and_exported_keeps_its_material(tmp_path):
     """The frame too, with its holes; a wall keeps its place in front of the stage."""
     plate = framed_stage().difference(disc(-5 + 20j, 2)).difference(disc(105 + 60j, 2))

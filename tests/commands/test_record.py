@@ -80,6 +80,7 @@ def test_the_arguments_of_a_record_repeat_the_study():
     assert again.optimum is not None
 
 
+@pytest.mark.slow
 def test_results_of_another_file_with_the_same_name_are_replaced_with_a_note(capsys):
     """An edited file replaces its own results without a note."""
     own_file("one.toml")

@@ -158,6 +158,7 @@ def test_a_safety_factor_after_a_rigid_impact_has_a_caveat_and_the_one_before(
     assert "stress" in free
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", ["--peak", "--peaks"])
 def test_a_shock_with_rigid_impacts_has_the_caveat(guide, options, capsys):
     """The free guide moves by less than 10 mm."""

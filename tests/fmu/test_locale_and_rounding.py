@@ -52,6 +52,7 @@ def motion_and_message(fmu):
         return moved.bytes(), next(m for m in wrong.messages if "flexure.length" in m)
 
 
+@pytest.mark.slow
 @versions
 def test_the_locale_changes_the_separator_of_messages_only(native, german, fmi):
     motion, message = motion_and_message(native["PRBDM", fmi])

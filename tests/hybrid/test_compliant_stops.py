@@ -335,6 +335,7 @@ def test_equal_masses_exchange_their_velocities(step):
     assert out["energy.work"] == pytest.approx(-start, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_a_settled_stop_costs_no_more_than_a_rigid_one():
     steps = {}
     for own in (mechanism("PRBDM"), compliant("PRBDM", 6e7)):

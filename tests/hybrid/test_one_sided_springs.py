@@ -290,6 +290,7 @@ def test_a_saved_state_continues_in_its_phase_bit_for_bit(engine, c):
         sim.restore(saved)
 
 
+@pytest.mark.slow
 def test_a_saved_state_with_a_wrong_phase_is_rejected():
     sim = Simulation(one_sided(SIDES["mixed"]))
     for wrong in ([1] * 4, [3, 1, 1, 1, 1], [1, 1, 1, 0, 1]):

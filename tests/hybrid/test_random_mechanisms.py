@@ -366,7 +366,7 @@ FEATURE_SEEDS = range(10)  # Seeds whose mechanisms together have all features.
     mechanisms(starting=True, damping=False) | mechanisms(starting=True, damping=False, guides=2),
     SEEDS,
 )
-@laws(15, shrink=False)
+@laws(4, shrink=False)
 def test_energy_is_balanced_and_loops_remain_closed(mechanism, seed):
     check_energy(mechanism, seed)
 
@@ -444,7 +444,7 @@ def check_momentum(mechanism, seed):
 
 
 @given(mechanisms(starting=True) | mechanisms(starting=True, guides=2), SEEDS)
-@laws(15, shrink=False)
+@laws(4, shrink=False)
 def test_impacts_satisfy_the_balance_of_momentum_and_do_not_gain_energy(mechanism, seed):
     check_impacts(mechanism, seed)
 

@@ -54,6 +54,7 @@ def hard_angles(rng):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_directions_are_within_one_unit_in_the_last_place(rng):
     q = hard_angles(rng)
     for x, z in zip(q, directions(q), strict=True):

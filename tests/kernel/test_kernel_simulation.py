@@ -247,6 +247,7 @@ def test_both_engines_reject_a_taper_with_an_end_as_thick_as_long(name):
         engine(taper, {f"flexure.{name}": 0.039, "release.displacement": 0.0})
 
 
+@pytest.mark.slow
 def test_the_blocks_beside_a_notch_may_be_thicker_than_its_flexure_is_long():
     guide, ends = mechanism("NotchGuide"), []
     kind = replace(guide.flexure_types[0], end_thickness=0.011, notch_depth=5e-3)

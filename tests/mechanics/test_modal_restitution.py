@@ -79,6 +79,7 @@ def test_restitution_is_bounded_by_the_share_of_the_fundamental_mode():
     assert max(hit.restitution for hit in hits if hit.before[0] < 0.01) > 1.0
 
 
+@pytest.mark.slow
 def test_restitution_is_that_of_an_unstable_mode_if_the_impact_shape_has_one():
     """The guide passes a shape that would be unstable at rest."""
     sim = Simulation(mechanism("PRBDM3R"))

@@ -44,6 +44,7 @@ def test_states_are_texts(states):
         replace(slider_crank(), states=states)
 
 
+@pytest.mark.slow
 @pytest.mark.native
 def test_a_pin_in_a_turning_slot_makes_full_turns_with_its_place_as_states():
     """Without the names, the angle of the arm determines the pin, which fails at a right angle."""

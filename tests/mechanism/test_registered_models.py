@@ -35,6 +35,7 @@ def test_a_registered_model_moves_like_the_shipped_one_with_its_coefficients(eng
     np.testing.assert_allclose(columns[0], columns[1], rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.native
 def test_a_python_fmu_is_refused_and_a_native_one_has_the_model(tmp_path):
     prbm.register_model("Own", (0.44, 0.46), (3.471, 2.0682))
@@ -50,6 +51,7 @@ def test_a_python_fmu_is_refused_and_a_native_one_has_the_model(tmp_path):
     assert found["shuttle.x"][-1] == pytest.approx(column[-1], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_another_process_names_a_model_that_it_does_not_know(tmp_path):
     """With a timeout, the simulations of a study run in other processes."""
     prbm.register_model("Own", (0.44, 0.46), (3.471, 2.0682))

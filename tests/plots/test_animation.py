@@ -159,6 +159,7 @@ def test_loops_are_closed_between_two_rows(result: Result) -> None:
         assert np.abs(opened).max() < POSITION_ATOL
 
 
+@pytest.mark.slow
 @pytest.mark.fmu
 def test_results_of_fmpy_and_of_the_engine_give_equal_films(
     mechanisms: dict[str, Mechanism], fmus: dict[str, Path]

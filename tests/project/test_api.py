@@ -58,6 +58,7 @@ def test_simulation_from_python_imports_no_matplotlib_and_mechanisms_need_no_pyd
     assert in_new_process(script).split() == []
 
 
+@pytest.mark.slow
 def test_a_star_import_imports_the_public_names():
     script = "from prbm import *; print(*sorted({*dir()} & {*" + repr(PUBLIC) + "}))"
     assert in_new_process(script).split() == sorted(PUBLIC)

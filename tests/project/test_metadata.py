@@ -117,6 +117,7 @@ def packages(extra: str) -> set[str]:
     return found
 
 
+@pytest.mark.slow
 def test_the_documented_modules_need_no_package_of_another_extra():
     """``pip install ".[docs]" && python docs/build_site.py`` imports them."""
     pages = (ROOT / "docs" / "website" / "api").glob("*.rst")

@@ -11,6 +11,7 @@ from support import ScalarGuide, mechanism
 FREE = {"stop.position": 0.05, "damping.beta": 0.0}
 
 
+@pytest.mark.slow
 def test_rk4_with_projection_is_of_fourth_order():
     """The slope of the error over five halvings; the reference is the engine at 1e-13."""
     exact = Simulation(mechanism("PRBDM"), FREE, tolerance=1e-13)

@@ -223,6 +223,7 @@ def test_the_guide_of_the_engine_has_the_stiffness_of_two_beams():
     assert slope == pytest.approx(24 * EI / LENGTH**3, rel=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wall", [0.0, 0.05])
 def test_the_energy_of_the_engine_does_not_grow(wall):
     """In this undamped run the printed equations gain energy."""

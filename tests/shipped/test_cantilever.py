@@ -107,6 +107,7 @@ def test_force_at_rest_on_the_stop_is_weight_less_bending_force() -> None:
     assert result.imbalance < 2e-8 * result.outputs[0]["energy.elastic"]
 
 
+@pytest.mark.slow
 def test_impacts_at_the_foot_obey_newtons_law_and_turn_the_tip() -> None:
     """The foot is below the centre of mass."""
     result = run(LEAF, stop_time=0.2)

@@ -61,6 +61,7 @@ def test_the_first_impact_has_the_energy_of_the_released_shape() -> None:
     assert impact.latched.impulse == pytest.approx(1.5 * inertia(stop) * speed, rel=1e-7)
 
 
+@pytest.mark.slow
 def test_the_slider_rests_on_its_stop_with_the_force_of_virtual_work() -> None:
     last = run(GUIDE).outputs[-1]
     assert last["stop.contact"]

@@ -133,6 +133,7 @@ def test_tolerances_are_three_standard_deviations(mechanisms, text, mean, spread
     assert found.points.std() == pytest.approx(spread, rel=0.02)
 
 
+@pytest.mark.slow
 def test_yield_with_the_tolerances_of_a_file_is_that_of_the_normal_distribution(
     mechanisms, tmp_path
 ):
@@ -336,6 +337,7 @@ def test_a_tolerance_of_an_unknown_parameter_is_rejected_before_the_simulations(
         )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_an_output_without_indices_is_named_with_its_missing_values(tmp_path, capsys):
     """Not every simulation settles; the number of impacts has indices, which are written."""
     words = ["study", "PRBDM2R", "--vary", "stop.restitution=0.3:0.8", "--runs", "8"]

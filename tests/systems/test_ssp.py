@@ -221,6 +221,7 @@ def slow(*values):
     return pytest.param(*values, marks=pytest.mark.slow)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("outer", "inner"), [(2, 2), (3, 3), slow(3, 2), slow(2, 3)])
 def test_container_moves_as_in_our_master(outer, inner, ours, tmp_path):
     """The container is a valid FMU of either version, with FMUs of either version inside."""
