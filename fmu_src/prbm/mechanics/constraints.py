@@ -142,17 +142,33 @@ def factor_saddle(kkt: Real, n: int, length: float, scale: Real) -> Factors:
     return factors
 
 
+def factor_and_solve(
+    kkt: Real, right: Real, n: int, length: float, scale: Real
+) -> tuple[Real, Factors]:
+    """Solve as :func:`factor_saddle` and :func:`solve_saddle`, in one call of LAPACK."""
+    lu, pivots, x, _ = _lapack().dgesv(_scaled(kkt, scale), scale * right, overwrite_a=True)
+    if _regular(lu.diagonal()):
+        return scale * x, Factors(lu, pivots, scale)
+    factors = factor_saddle(kkt, n, length, scale)
+    return solve_saddle(factors, right), factors
+
+
+def _scaled(kkt: Real, scale: Real) -> Real:
+    """Return D A D for the diagonal of D."""
+    scaled: Real = kkt * scale
+    scaled *= scale[:, None]
+    return scaled
+
+
 def _factored(kkt: Real, scale: Real) -> Factors:
     """Return the factors of a matrix with scales, regular or not."""
-    scaled = kkt * scale
-    scaled *= scale[:, None]
-    lu, pivots, _ = _lapack().dgetrf(scaled, overwrite_a=True)
+    lu, pivots, _ = _lapack().dgetrf(_scaled(kkt, scale), overwrite_a=True)
     return Factors(lu, pivots, scale)
 
 
 def _regular(diagonal: Real) -> bool:
     """Return whether no pivot of a scaled matrix is round-off."""
-    pivots = np.abs(diagonal).tolist()
+    pivots = [*map(abs, diagonal.tolist())]
     return bool(min(pivots) > SINGULAR_RTOL * max(pivots))
 
 

@@ -87,6 +87,7 @@ class Equations:
         values, mechanism = system.values, system.mechanism
         self.n = system.n
         self.elements = Elements(system, contacts.springs)
+        self.element = self.elements.sole
         self.beta = values["damping.beta"]
         self.mass_damping = 2.0 * values["damping.zeta"] * omega
         self.stop_friction = [value(s, "friction", values) for s in mechanism.stops]
@@ -145,7 +146,8 @@ class Equations:
             self.rows.c[self.first_hold + k] += self.inputs.walls[i].position
             self.rows.c[self.first_hold + k] += self.contacts.depth(i)
         self.positions = self.rows.first(self.first_stick)
-        self.terms = np.vstack([system.H, self.rows.repeated, self.w])
+        self.terms = np.vstack([system.H, 1j * self.rows.repeated, 1j * self.w])
+        self.moves = np.hstack([system.Phi.Phi, np.zeros((len(self.w), 1))]).astype(complex)
 
     def _scale(self) -> Real:
         """Return scales with which the elements of the equations are at most near one, (n + r,)."""
@@ -173,9 +175,9 @@ class Equations:
     def evaluate(self, t: float, q: Real, v: Real, extras: Real | None = None) -> Evaluation:
         """Return accelerations, multipliers, mass matrix and factors.
 
-        With F = diag(e) Phi, the products of H, of the rows B and of the loads w with [F, e w^2]
-        contain all terms: M and the quadratic velocity terms are the real and imaginary part of
-        F^H H [F, e w^2] (:func:`prbm.mechanics.kinetics.inertia`).
+        With F = diag(e) Phi, the products of H, of i B for the rows B and of i w for the loads w
+        with [F, e w^2] contain all terms: M and the quadratic velocity terms are the real and
+        imaginary part of F^H H [F, e w^2] (:func:`prbm.mechanics.kinetics.inertia`).
 
         Parameters
         ----------
@@ -193,17 +195,18 @@ class Equations:
         """
         system, n, d = self.system, self.n, len(self.w)
         e, w = system.directions(q), system.turning(v)
-        moved = np.empty((d, n + 1), complex)
-        moved[:, :n], moved[:, n] = system.Phi.Phi, w * w
-        moved *= e[:, None]
+        moved = self.moves * e[:, None]
+        moved[:, n] = e * (w * w)
         terms = self.terms.dot(moved)
-        moments = moved[:, :n].conj().T.dot(terms[:d])
-        M = moments.real[:, :n] + system.inertia
-        Q = moments.imag[:, n] + terms.real[-1, :n]
-        Q += self.elements.motion_force(q, e, v, self.beta)
-        R, bent = -terms.imag[d:-1, :n], terms.real[d:-1, n]
+        moments = moved.conj().T.dot(terms[:d])
+        kkt, right = np.zeros((len(self.scale),) * 2, order="F"), np.empty(len(self.scale))
+        M, R, Q, bent = kkt[:n, :n], kkt[n:, :n], right[:n], right[n:]
+        np.add(moments.real[:n, :n], system.inertia, out=M)
+        np.add(moments.imag[:n, n], terms.imag[-1, :n], out=Q)
+        Q += self.element.motion_force(q, e, v, self.beta)
+        R[:], bent[:] = terms.real[d:-1, :n], terms.imag[d:-1, n]
         self.rows.carry(R, bent, e, v)
-        kkt = constraints.saddle(M, R, R)
+        kkt[:n, n:] = R.T
         if self.moving_walls:
             bent[self.first_hold : self.first_stick] -= self.held_motions(t)[2]
         if self.driven:
@@ -222,8 +225,7 @@ class Equations:
             share = self.friction_coefficient(c) * self.contacts.modes[c].slip
             share *= self.contacts.side(c)
             kkt[: self.n, self.n + self.normal_row(c)] -= share * self.slip_row(c, e)
-        factors = constraints.factor_saddle(kkt, self.n, system.length, self.scale)
-        x = constraints.solve_saddle(factors, np.concatenate([Q, bent]))
+        x, factors = constraints.factor_and_solve(kkt, right, self.n, system.length, self.scale)
         return Evaluation(x[: self.n], -x[self.n :], M, factors, e, pressure)
 
     # -- rates of the state --
@@ -237,7 +239,7 @@ class Equations:
         n = self.n
         q, v, extras = y[:n], y[n : 2 * n], y[2 * n + 2 :]
         evaluation = self.evaluate(t, q, v, extras)
-        loss, power = self.elements.loss(evaluation.e, v, self.beta), 0.0
+        loss, power = self.element.loss(evaluation.e, v, self.beta), 0.0
         if self.mass_damping:
             loss += 2.0 * self.mass_damping * kinetic_energy(evaluation.M, v)
         if self.slipping_points or self.slipping_rows:

@@ -447,6 +447,12 @@ class Elements:
         torsion = Torsion(system) if len(system.turns) else None
         self.parts: list[Element] = [Bending(system)]
         self.parts += [part for part in (torsion, self.springs) if part is not None]
+        self.damped = any(part.damped for part in self.parts)
+
+    @property
+    def sole(self) -> "Element | Elements":
+        """The only element, whose calls cost less than those of a sum, or else the sum."""
+        return self.parts[0] if len(self.parts) == 1 else self
 
     @cached_property
     def drawn(self) -> Real:

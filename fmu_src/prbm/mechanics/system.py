@@ -510,9 +510,7 @@ class System:
             if len(self.floats):
                 e[..., self.floats] = self._floating(q)
             return e
-        theta = self.Phi.of(q)
-        turned = np.empty(theta.shape, complex)
-        turned.real, turned.imag = np.cos(theta), np.sin(theta)
+        turned: Complex = np.exp(1j * self.Phi.of(q))
         return turned
 
     def turning(self, v: Real) -> Real | Complex:
