@@ -493,8 +493,8 @@ def check_impacts(mechanism, seed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("free", [False, True])
-@pytest.mark.parametrize("seed", range(150))
-def test_the_laws_hold_for_300_random_mechanisms(seed, free):
+@pytest.mark.parametrize("seed", range(50))
+def test_the_laws_hold_for_random_mechanisms(seed, free):
     quiet = seeded(seed, damping=False, free=free)
     check_energy(quiet, seed)
     check_momentum(seeded(seed, free=free), seed)
