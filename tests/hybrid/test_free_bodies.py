@@ -281,9 +281,9 @@ def test_a_released_free_body_is_displaced_or_turned():
     assert (moved["ball.x"], moved["ball.y"]) == pytest.approx((0.0, 0.5))
 
 
-def test_the_scale_of_lengths_comes_from_the_drawing_or_is_one_metre():
-    system = assemble(ball(), ball().values())
-    assert system.length == 1.0  # All points coincide.
+def test_the_scale_of_lengths_comes_from_the_drawing_or_is_the_radius_of_gyration():
+    lone = ball(bodies=(Body("ball", 2.0, 0.5, (0.0, 1.0)),))
+    assert assemble(lone, lone.values()).length == 0.5  # All points coincide.
     near = ball(ground={"floor": (0.0, 0.75)})
     assert assemble(near, near.values()).length == 0.25
     far = ball(stops=(Stop("floor", "ball", (0.0, 0.7), -90.0, 0.7),))

@@ -11,7 +11,7 @@ from ..base.errors import MechanismError, ParameterError
 from ..base.tolerances import JOINT_DISTANCE_RTOL, SPRING_APART_RTOL
 from ..mechanism.description import Mechanism
 from ..mechanism.expressions import affine
-from ..mechanism.parts import GROUND, Flexure, Guide, Joint, Point, Spring, body_of
+from ..mechanism.parts import GROUND, Body, Flexure, Guide, Joint, Point, Spring, body_of, value
 from .arrays import Real
 from .direction_map import DirectionMap
 from .free_body import Connection, FreeBody
@@ -147,7 +147,7 @@ class Collection:
 
         It is the largest distance between any two ground points or centres of mass, or the length
         of the longest flexure if that is larger.  Without flexures, hit points count, too; if all
-        points coincide, the size is 1 m.
+        points coincide, the size is the largest radius of gyration.
         """
         drawn = [self.at(p) for p in self.mechanism.ground.values()]
         drawn += [self.at(body.centre) for body in self.mechanism.bodies]
@@ -155,7 +155,13 @@ class Collection:
         if not lengths:
             drawn += [self.at(stop.point) for stop in self.mechanism.stops]
         points = np.array(drawn)
-        return max(*lengths, *(float(np.abs(points - p).max()) for p in points), 0.0) or 1.0
+        size = max(*lengths, *(float(np.abs(points - p).max()) for p in points), 0.0)
+        return size or max(self.gyration(body) for body in self.mechanism.bodies)
+
+    def gyration(self, body: Body) -> float:
+        """Return the radius of gyration of a body about its centre of mass [m]."""
+        mass, inertia = (value(body, name, self.values) for name in ("mass", "inertia"))
+        return math.sqrt(inertia / mass)
 
     def on(self, body: str, drawn: complex) -> Place:
         """Return the place of a drawn point of a body."""

@@ -298,9 +298,20 @@ static void add_moments(System *system, Scratch scratch) {
     set_branches(system, scratch);
 }
 
+/* Return the largest radius of gyration of a body about its centre of mass [m]. */
+static double largest_gyration(const System *system) {
+    const Mechanism *m = system->mechanism;
+    double largest = 0.0;
+    for (int i = 0; i < m->body_count; i++) {
+        double mass = evaluate(m->bodies[i].mass, system->values);
+        largest = greater(square_root(evaluate(m->bodies[i].inertia, system->values) / mass), largest);
+    }
+    return largest;
+}
+
 /* Return the size of the drawn mechanism [m]: the largest distance between points of the ground and
  * centres of mass, but at least the length of the longest flexure.  Without flexures, hit points
- * count, too; if all points coincide, the size is 1 m. */
+ * count, too; if all points coincide, the size is the largest radius of gyration. */
 static double size_of(const System *system, Scratch scratch) {
     const Mechanism *m = system->mechanism;
     int others = m->ground_count + m->body_count;
@@ -320,7 +331,7 @@ static double size_of(const System *system, Scratch scratch) {
             longest = greater(modulus(minus(points[i], points[k])), longest);
         }
     }
-    return longest > 0.0 ? longest : 1.0;
+    return longest > 0.0 ? longest : largest_gyration(system);
 }
 
 static Complex first_ground_end(const System *system) {
