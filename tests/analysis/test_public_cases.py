@@ -111,6 +111,96 @@ def test_a_ball_falls_and_bounces_by_its_closed_form():
     assert out["floor.rebound_speed"] == pytest.approx(0.7 * speed, rel=1e-9)
 
 
+@pytest.mark.parametrize("engine", [Simulation, KernelSimulation])
+def test_a_ball_without_flexures_falls_and_bounces_by_its_closed_form(engine):
+    """After sqrt(2 h/g) = 0.45152 s with sqrt(2 g h) = 4.4294 m/s, and back with 0.7 of it."""
+    sim = engine(case("ball"))
+    sim.advance(0.5)
+    out = sim.outputs()
+    assert out["floor.impact_time"] == pytest.approx(math.sqrt(2 / 9.81), rel=1e-9)
+    assert out["floor.approach_speed"] == pytest.approx(math.sqrt(2 * 9.81), rel=1e-9)
+    assert out["floor.rebound_speed"] == pytest.approx(0.7 * math.sqrt(2 * 9.81), rel=1e-9)
+
+
+def rods(angles):
+    """Return mass matrix (2, 2) and Jacobian of the tip (x and y; 2, 2) of rods of 1 m and 1 kg.
+
+    The angles are measured from the vertical [rad].
+    """
+    couple = 0.5 * math.cos(angles[0] - angles[1])
+    M = np.array([[4 / 3, couple], [couple, 1 / 3]])
+    return M, np.array([np.cos(angles), np.sin(angles)])
+
+
+def rubbed(M, J, rates, mu, eps, *, newton=False):
+    """Return rates after an impact with a floor, by Routh's impulses and Stronge's restitution.
+
+    The tip has velocities (t, n) = J rates.  While the normal impulse grows by dp, it slips, with
+    the tangential impulse -mu sign(t) dp, or sticks.  The impact ends when the normal force has
+    given back eps^2 of the work of the compression; by Newton's law, when n is -eps n at the start.
+    """
+    W = J @ np.linalg.solve(M, J.T)
+    u, impulse, work, goal = J @ rates, np.zeros(2), 0.0, None
+    rebound = -eps * u[1]
+    hold = -W[0, 1] / W[0, 0]  # Ratio of the impulses that keeps the tip from slipping.
+    while True:
+        if u[0] != 0.0:
+            f = -mu * math.copysign(1.0, u[0])
+        else:
+            f = hold if abs(hold) <= mu else math.copysign(mu, hold)
+        slope = W @ [f, 1.0]
+        ends = [-u[0] / slope[0]] if u[0] * slope[0] < 0.0 else []
+        if goal is None:
+            ends += [-u[1] / slope[1]] if slope[1] > 0.0 else []
+        elif newton:
+            ends.append((rebound - u[1]) / slope[1])
+        else:
+            ends.append((math.sqrt(u[1] ** 2 + 2 * slope[1] * (goal - work)) - u[1]) / slope[1])
+        step = min(ends)
+        stops = bool(u[0] * slope[0] < 0.0 and step == -u[0] / slope[0])
+        last = goal is not None and step == ends[-1]
+        work += u[1] * step + 0.5 * slope[1] * step**2
+        u, impulse = u + slope * step, impulse + step * np.array([f, 1.0])
+        if stops:
+            u[0] = 0.0
+        elif last:
+            return rates + np.linalg.solve(M, J.T @ impulse)
+        else:
+            u[1], goal = 0.0, work - eps**2 * work
+
+
+@pytest.mark.parametrize("engine", [Simulation, KernelSimulation])
+@pytest.mark.parametrize("mu", [0.0, 0.2, 0.5, 1.0])
+@pytest.mark.parametrize("eps", [0.0, 0.5, 1.0])
+def test_a_rough_double_pendulum_does_not_gain_energy(engine, mu, eps):
+    """Its rates after the impact are those of Routh's method (Stronge, 1990)."""
+    model = case("kane")
+    changes = {"floor.restitution": eps, "floor.friction": mu}
+
+    def at(t):
+        sim = engine(model, changes)
+        sim.advance(t)
+        out = sim.outputs()
+        return out, np.array([out[f"{name}.omega"] for name in ("upper", "lower")])
+
+    out, _ = at(0.02)
+    assert out["floor.impact_count"] == 1
+    t = out["floor.impact_time"]
+    (out, before), (_, after) = at(t - 1e-10), at(t + 1e-10)
+    turned = np.array([out["upper.angle"], out["lower.angle"]])
+    M, J = rods(np.radians([20.0, 30.0]) + turned)
+    np.testing.assert_allclose(after, rubbed(M, J, before, mu, eps), atol=1e-9)
+    assert after @ M @ after <= (1 + 1e-12) * (before @ M @ before)
+
+
+def test_newtons_law_of_restitution_gains_energy_at_a_rough_double_pendulum():
+    M, J = rods(np.radians([20.0, 30.0]))
+    before = np.array([-0.1, -0.2])
+    after = rubbed(M, J, before, 0.7, 0.5, newton=True)
+    assert (J @ after)[1] == pytest.approx(-0.5 * (J @ before)[1])
+    assert after @ M @ after > 1.5 * (before @ M @ before)
+
+
 def test_a_resonator_on_straight_beams_has_its_closed_form():
     """The stiffness is 4 12 EI/L^3; the beams add 4 (13/35) of their mass: 14842.9 Hz.
 
