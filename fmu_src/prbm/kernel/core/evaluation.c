@@ -277,20 +277,6 @@ SHARED void rows_dispatch(int even, const Equations *eq, const Kinematics *at, d
 
 /* --- inertia ---------------------------------------------------------------------------------- */
 
-/* Subtract the damping c M v of the block M that begins at start from the loads. */
-NOINLINE void damp_block(const Equations *eq, int size, int start, const double *RESTRICT M,
-                         Evaluation *result) {
-    const double c = eq->mass_damping, *v = result->at.speed + start;
-    double *x = result->a + start;
-    for (int i = 0; i < size; i++) {
-        x[i] -= c * M[i * size + i] * v[i];
-        for (int j = i + 1; j < size && j <= eq->system->last[start + i]; j++) {
-            x[i] -= c * M[i * size + j] * v[j];
-            x[j] -= c * M[i * size + j] * v[i];
-        }
-    }
-}
-
 /* Compute the upper triangle of a block of M, of a size up to SMALL, and add its quadratic velocity
  * terms Im(diag(e)^H H diag(e)) v^2 to the loads x.  M is symmetric, the matrix of these terms
  * antisymmetric. */
@@ -357,9 +343,6 @@ static bool block_motion(const Equations *eq, Evaluation *result, const Block *b
     double *M = result->block;
     block_inertia(size, eq->system->last + start, H, own_inertia(eq->system, at) + start,
                   parts_from(at->e_parts, start), at->squares + start, M, result->a + start);
-    if (eq->mass_damping != 0.0) {
-        damp_block(eq, size, start, M, result);
-    }
     return factor_block(eq, result, block, M, U);
 }
 
@@ -371,9 +354,6 @@ SIZED bool small_block_motion(const Equations *eq, Evaluation *result, int size,
     double M[SMALL * SMALL], D[SMALL];
     small_inertia(size, H, own_inertia(eq->system, at) + start, parts_from(at->e_parts, start),
                   at->squares + start, M, result->a + start);
-    if (eq->mass_damping != 0.0) {
-        damp_block(eq, size, start, M, result);
-    }
     if (!small_factor(size, M, U, D)) {
         UNROLLED
         for (int i = 0; i < size * size; i++) {
@@ -410,9 +390,6 @@ NOINLINE bool mapped_blocks_motion(const Equations *eq, Evaluation *result) {
     for (int k = 0; k < result->factors.block_count; k++) {
         const Block *block = &result->factors.blocks[k];
         int start = block->start, size = block->size;
-        if (eq->mass_damping != 0.0) {
-            damp_block(eq, size, start, M, result);
-        }
         regular = (block->split > 0 ? factor_guide_block(eq, result, start, M, U)
                                     : factor_block(eq, result, block, M, U)) &&
                   regular;
@@ -602,6 +579,16 @@ NOINLINE void add_coriolis(const System *system, Evaluation *result) {
     }
 }
 
+/* Damping c M v, proportional to mass, changes the accelerations by -c v.  The other part of them
+ * therefore has the right side of the rows plus c rows v. */
+NOINLINE void damp_rows(const Equations *eq, Evaluation *result) {
+    for (int k = 0; k < eq->r; k++) {
+        result->lam[k] += eq->mass_damping * even_dot(eq->system->even,
+                                                     result->factors.Z + k * eq->system->even,
+                                                     result->at.speed);
+    }
+}
+
 /* Solve for a and lam at the time, angles and rates of the evaluation. */
 SHARED bool motion_of_length(int even, const Equations *eq, const Reference *near,
                             Evaluation *result) {
@@ -622,10 +609,16 @@ SHARED bool motion_of_length(int even, const Equations *eq, const Reference *nea
     if (eq->contacts_or_walls) {
         add_contacts_and_walls(eq, result);
     }
+    if (eq->mass_damping != 0.0) {
+        damp_rows(eq, result);
+    }
     if (!factor_motion(even, eq, result)) {
         return false;
     }
     finish_dispatch(even, &result->factors, result->a, result->lam);
+    if (eq->mass_damping != 0.0) {
+        add_scaled(eq->system->n, -eq->mass_damping, result->at.speed, result->a);
+    }
     if (eq->system->stretch_count > 0 && !eq->system->mapped) {
         add_coriolis(eq->system, result);
     }
