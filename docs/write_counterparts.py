@@ -57,6 +57,7 @@ C_ONLY = {
     "core/factors": "replaces LAPACK",
     "core/flexure": "`mechanism/flexure.py`",
     "core/guides": "in Python, part of `mechanics/collection.py` and `mechanics/assembly.py`",
+    "core/intervals": "columns of rows that are not zero; Python multiplies dense matrices",
     "core/layout": "`mechanism/description.py` and `interface/variables.py`",
     "core/matrix": "replaces NumPy and LAPACK",
     "core/mechanism": "`mechanism/parameters.py` and `mechanism/expressions.py`",

@@ -733,10 +733,30 @@ def even(x):
     return np.ascontiguousarray(padded)
 
 
-def factors_of(M, rows, columns, sizes, split=0):
+def intervals_of(Z, *, whole):
+    """Return the kernel's Intervals of rows with an even length, and their arrays.
+
+    They have the pairs of columns in which a row is not zero, or all columns.
+    """
+    used = np.any(Z.reshape(len(Z), Z.shape[1] // 2, 2) != 0.0, axis=2) | whole
+    lists = [
+        (2 * np.flatnonzero(np.diff(row, prepend=False, append=False))).reshape(-1, 2)
+        for row in used
+    ]
+    first = np.cumsum([0, *map(len, lists)], dtype=np.int32)
+    repeats = np.array([k > 0 and np.array_equal(used[k], used[k - 1]) for k in range(len(Z))])
+    bounds = np.concatenate([np.zeros((0, 2), int), *lists])
+    each = np.column_stack([bounds, np.full(len(bounds), system_arrays.FIXED)]).astype(np.int32)
+    arrays = [first, each, repeats]
+    made = structures()["Intervals"](*(part.ctypes.data for part in arrays))
+    return made, [made, *arrays]
+
+
+def factors_of(M, rows, columns, sizes, split=0, last=None):
     """Return the kernel's Factors of a matrix with blocks of some sizes, and their arrays.
 
-    The rows of a block before the row ``split`` are zero in the columns behind it.
+    The rows of a block before the row ``split`` are zero in the columns behind it.  ``last``, for
+    another pattern, has the last columns that are not zero, counted in the blocks.
     """
     r, n = rows.shape
     U = np.linalg.cholesky(M[::-1, ::-1])[::-1, ::-1]  # M = U U^T
@@ -751,11 +771,25 @@ def factors_of(M, rows, columns, sizes, split=0):
         [starts[:-1], sizes, [split if sizes == (7,) else 0] * len(sizes)], np.int32
     ).T.copy()
     S, pivots = np.full(r * (2 * r + 1), np.nan), np.zeros(r, np.int32)
-    last = np.repeat(np.array(sizes, np.int32) - 1, sizes)
-    last[:split] = split
-    arrays = [blocks, last, parts, even(1.0 / root**2), Z, Z_columns, S, pivots]
-    addresses = (part.ctypes.data for part in arrays)
-    return structures()["Factors"](n + n % 2, r, len(sizes), *addresses, 0.0), arrays
+    if last is None:
+        last = np.repeat(np.array(sizes) - 1, sizes)
+        last[:split] = split
+    start = np.repeat(starts[:-1], sizes)
+    area = np.repeat(np.cumsum([0, *np.square(sizes)])[:-1], sizes)
+    begin = area + (np.arange(n) - start) * np.repeat(sizes, sizes) - start
+    factor_rows = np.column_stack([begin, start + last]).astype(np.int32)
+    intervals, kept = intervals_of(Z, whole=r <= constants()["SMALL"] or Z_columns is not Z)
+    fields = {
+        "blocks": blocks, "last": last.astype(np.int32), "factor_rows": factor_rows,
+        "scaled": np.zeros(n + n % 2), "U": parts, "inverse": even(1.0 / root**2), "Z": Z,
+        "Z_columns": Z_columns, "S": S, "pivots": pivots,
+    }  # fmt: skip
+    addresses = {name: part.ctypes.data for name, part in fields.items()}
+    made = structures()["Factors"](
+        n=n, even=n + n % 2, r=r, block_count=len(sizes), intervals=ctypes.addressof(intervals),
+        **addresses,
+    )  # fmt: skip
+    return made, [fields, *kept]
 
 
 def solved_again(factors, right, n):
@@ -792,6 +826,33 @@ def test_repeated_solutions_with_one_factorization_are_the_same(sizes, split):
             for one in right:
                 expected = constraints.solve_saddle(known, one)
                 assert_same(solved_again(factors, one, n), expected, rel)
+
+
+@pytest.mark.parametrize("sizes", [(9,), (2,) * 5, (3, 1, 9, 2), (9, 9)])
+def test_rows_with_structural_zeros_are_solved_as_dense_ones(sizes):
+    """Blocks of 9 coordinates are a trunk of one and two branches of four, which share no mass."""
+    rng, n = np.random.default_rng(0), sum(sizes)
+    branches = {9: [8, *[4] * 4, *[8] * 4]}
+    last = np.concatenate([branches.get(size, [size - 1] * size) for size in sizes])
+    end = np.repeat(np.cumsum([0, *sizes])[:-1], sizes) + last
+    columns = np.arange(n)
+    for _ in range(20):
+        U = np.triu(rng.normal(size=(n, n)), 1) * (columns <= end[:, None]) + np.eye(n)
+        M = (U * rng.uniform(0.5, 2.0, n)) @ U.T
+        pairs = rng.permutation(n // 2)[
+            :2
+        ]  # Two pairs of rows, as those of loops, and one of a stop.
+        rows = rng.normal(size=(5, n))
+        rows[:4] *= np.repeat(columns // 2 == pairs[:, None], 2, axis=0)
+        factors, (fields, *_) = factors_of(M, rows, rows, sizes, last=last)
+        Z, rel = fields["Z"].copy(), spread(np.linalg.cond(U))
+        fields["Z"][:] = even(rows)
+        kernel().forward_rows(factors)
+        assert_same(fields["Z"], Z, rel)
+        assert kernel().factor_schur(factors)
+        kkt, right = constraints.saddle(M, rows, rows), rng.normal(size=n + len(rows))
+        rel = spread(np.linalg.cond(kkt) * np.linalg.cond(M))
+        assert_same(solved_again(factors, right, n), np.linalg.solve(kkt, right), rel)
 
 
 @pytest.mark.parametrize("scales", [(1e30, 1e30, 1e30, 1e-75), (3e-23, 3e-23, 3e-23, 1e20)])

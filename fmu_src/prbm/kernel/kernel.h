@@ -30,6 +30,7 @@
 #include "core/free_body.h"
 #include "core/kinetics.h"
 #include "core/constraints.h"
+#include "core/intervals.h"
 #include "core/factors.h"
 #include "core/forces.h"
 #include "core/elements.h"

@@ -27,6 +27,7 @@
 #include "core/kinetics.c"
 #include "core/system.c"
 #include "core/constraints.c"
+#include "core/intervals.c"
 #include "core/forces.c"
 #include "core/elements.c"
 #include "core/collection.c"

@@ -205,18 +205,23 @@ static int guide_split(int size, const int *last) {
     return split;
 }
 
-/* Find the last column that is linked with each row, counted in the block of the row. */
+/* Find the last column that is linked with each row, counted in the block of the row, and the rows of
+ * the factor. */
 static void find_last(const System *system, const bool *linked, int *last) {
-    int n = system->n;
+    int n = system->n, first = 0;
     for (int k = 0; k < system->mass_block_count; k++) {
-        int start = system->mass_blocks[k].start, end = start + system->mass_blocks[k].size;
+        int start = system->mass_blocks[k].start, size = system->mass_blocks[k].size;
+        int end = start + size;
         for (int i = start; i < end; i++) {
             last[i] = i - start;
             for (int j = i; j < end; j++) {
                 last[i] = linked[i * n + j] || linked[j * n + i] ? j - start : last[i];
             }
+            system->factor_rows[i].begin = first + (i - start) * size - start;
+            system->factor_rows[i].last = start + last[i];
         }
-        system->mass_blocks[k].split = guide_split(end - start, last + start);
+        first += size * size;
+        system->mass_blocks[k].split = guide_split(size, last + start);
     }
 }
 

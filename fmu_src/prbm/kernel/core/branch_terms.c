@@ -71,10 +71,10 @@ PRBM void map_directions(const System *system, const double *x, double *theta) {
     }
 }
 
-/* Add r rows x of derivatives by the directions, wide apart, pulled back to the coordinates, to out,
- * even apart. */
-SIZED void branch_to_coordinates(int size, int count, const System *system, const Branch *branch,
-                                 int r, const double *RESTRICT x, double *RESTRICT out) {
+/* Add r rows x of derivatives by the directions, wide apart, pulled back to the coordinates, to
+ * out, even apart. */
+SIZED void pull_back(int size, int count, const System *system, const Branch *branch, int r,
+                     const double *RESTRICT x, double *RESTRICT out) {
     const int even = even_length(size), paired = size - size % PAIR;
     x += branch->start;
     for (int row = 0; row < r; row++) {
@@ -94,20 +94,14 @@ SIZED void branch_to_coordinates(int size, int count, const System *system, cons
     }
 }
 
-static void rows_to_coordinates(const System *system, const Branch *branch, int r, const double *x,
+PRBM void branch_to_coordinates(const System *system, const Branch *branch, int r, const double *x,
                                 double *out) {
     switch (branch->code) {
-    case LEAF_5: branch_to_coordinates(5, LEAF_COORDINATES, system, branch, r, x, out); break;
+    case LEAF_5: pull_back(5, LEAF_COORDINATES, system, branch, r, x, out); break;
     case LEAF_5_BODY:
-    case LEAF_6: branch_to_coordinates(6, LEAF_COORDINATES, system, branch, r, x, out); break;
-    case LEAF_6_BODY: branch_to_coordinates(7, LEAF_COORDINATES, system, branch, r, x, out); break;
-    case ANY_BRANCH: branch_to_coordinates(branch->size, branch->count, system, branch, r, x, out);
-    }
-}
-
-PRBM void directions_to_coordinates(const System *system, int r, const double *x, double *out) {
-    for (int k = 0; k < system->branch_count; k++) {
-        rows_to_coordinates(system, &system->branches[k], r, x, out);
+    case LEAF_6: pull_back(6, LEAF_COORDINATES, system, branch, r, x, out); break;
+    case LEAF_6_BODY: pull_back(7, LEAF_COORDINATES, system, branch, r, x, out); break;
+    case ANY_BRANCH: pull_back(branch->size, branch->count, system, branch, r, x, out);
     }
 }
 
@@ -283,7 +277,7 @@ static void add_own_terms(const System *system, const Branch *branch, const doub
     }
 }
 
-PRBM void branch_terms(const System *system, const double *own, int r, Evaluation *result) {
+PRBM void branch_terms(const System *system, const double *own, Evaluation *result) {
     memcpy(result->mass, system->constant_mass, system->mass_size * sizeof *result->mass);
     for (int k = 0; k < system->branch_count; k++) {
         const Branch *branch = &system->branches[k];
@@ -292,7 +286,6 @@ PRBM void branch_terms(const System *system, const double *own, int r, Evaluatio
             root_terms(system, branch, result);
         }
         add_own_terms(system, branch, own, result);
-        rows_to_coordinates(system, branch, 1, result->load, result->a);
-        rows_to_coordinates(system, branch, r, result->rows, result->factors.Z);
+        branch_to_coordinates(system, branch, 1, result->load, result->a);
     }
 }

@@ -8,12 +8,13 @@
 PRBM void map_directions(const System *system, const double *x, double *theta);
 /* Compute the directions and their rates from the coordinates and their rates. */
 PRBM void map_motion(const System *system, Kinematics *at);
-/* Add the derivatives by directions x (r, wide), pulled back to the coordinates, to out
- * (r, even). */
-PRBM void directions_to_coordinates(const System *system, int r, const double *x, double *out);
+/* Add the derivatives x (r, wide) by the directions of a branch, pulled back to the coordinates, to
+ * out (r, even). */
+PRBM void branch_to_coordinates(const System *system, const Branch *branch, int r, const double *x,
+                                double *out);
 /* Compute the mass matrix of the coordinates.  Add the quadratic velocity terms to the loads, and
- * pull loads and r rows back to the coordinates.  own (d,) is the diagonal of the mass matrix of
- * the directions. */
-PRBM void branch_terms(const System *system, const double *own, int r, Evaluation *result);
+ * pull the loads back to the coordinates.  own (d,) is the diagonal of the mass matrix of the
+ * directions. */
+PRBM void branch_terms(const System *system, const double *own, Evaluation *result);
 
 #endif

@@ -28,6 +28,7 @@ PRBM void equations_place(Equations *equations, const System *system, Memory *me
     q.z = place(memory, r, sizeof(Complex));
     q.c = place(memory, r, sizeof(double));
     q.on = place(memory, r, sizeof(int));
+    q.intervals = place_intervals(system, r, memory);
     q.carried = place(memory, r, sizeof(int));
     q.w = place(memory, d, sizeof(Complex));
     q.w_input = place(memory, d, sizeof(Complex));
@@ -115,6 +116,8 @@ static void set_rows(Equations *eq) {
     list_slipping(eq);
     Rows active = {system, eq->r, eq->B, eq->c, eq->z, eq->on};
     eq->active = active;
+    eq->dense = eq->r <= SMALL || eq->slipping_rows > 0;
+    set_intervals(&active, eq->dense, &eq->intervals);
 }
 
 /* Set the real and imaginary parts of the rows, with columns for stretches, padded. */

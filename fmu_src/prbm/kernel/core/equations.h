@@ -2,7 +2,7 @@
 #ifndef PRBM_EQUATIONS_H
 #define PRBM_EQUATIONS_H
 
-#include "core/constraints.h"
+#include "core/intervals.h"
 #include "core/compliance.h"
 
 /* A wall that joins its reference, a uniform motion, along a cubic.  At the time since, the wall is
@@ -48,6 +48,8 @@ typedef struct {
     int *on, *carried;      /* (r,), (carried_count,) rows relative to a moving body */
     int carried_count;
     Rows active;
+    bool dense;             /* whether the rows are few, or contacts slip: their intervals are whole */
+    RowIntervals intervals;
     Complex *w, *w_input;   /* (d,) */
     double *moment;         /* (wide,) */
     bool walls_move;

@@ -59,9 +59,12 @@ PRBM void evaluation_place(Evaluation *evaluation, const System *system, Memory 
     result.block = system->block;
     result.pressure = place(memory, (size_t)system->s, sizeof(double));
     result.contact_loss = place(memory, (size_t)system->s, sizeof(double));
+    result.factors.n = (int)n;
     result.factors.even = (int)even;
     result.factors.blocks = system->mass_blocks;
     result.factors.last = system->last;
+    result.factors.factor_rows = system->factor_rows;
+    result.factors.scaled = result.row;
     result.factors.U = place(memory, n * n, sizeof(double));
     result.factors.inverse = place(memory, even, sizeof(double));
     result.factors.Z = place(memory, r * even, sizeof(double));
@@ -252,8 +255,8 @@ SIZED void rows_padded(int even, const Equations *eq, const Kinematics *at, doub
     case 3: convect(3, even, B, e, at->squares, rows, convective); break;
     default:
         for (int k = 0; k < eq->r; k++) {
-            convect(1, even, parts_from(B, k * even), e, at->squares, rows + k * even,
-                    convective + k);
+            convect_intervals(&eq->intervals.directions, k, parts_from(B, k * even), e, at->squares,
+                          rows + k * even, convective + k);
         }
     }
     if (eq->carried_count > 0) {
@@ -323,6 +326,11 @@ static void block_inertia(int size, const int *last, Parts H, const double *own,
     }
 }
 
+/* Return the number of rows to which U^-1 is applied block by block, if they are few. */
+static int rows_with_blocks(const Equations *eq) {
+    return eq->r <= SMALL ? eq->r : 0;
+}
+
 /* Factor a block of M into U, and apply U^-1 to loads and rows. */
 NOINLINE bool factor_block(const Equations *eq, Evaluation *result, const Block *block,
                            const double *M, double *U) {
@@ -331,7 +339,7 @@ NOINLINE bool factor_block(const Equations *eq, Evaluation *result, const Block 
         return false;
     }
     forward_block(size, last, U, 1, 0, result->a + start);
-    forward_block(size, last, U, eq->r, eq->system->even, result->factors.Z + start);
+    forward_block(size, last, U, rows_with_blocks(eq), eq->system->even, result->factors.Z + start);
     return true;
 }
 
@@ -349,7 +357,7 @@ static bool block_motion(const Equations *eq, Evaluation *result, const Block *b
 /* Compute and factor a small block of M.  Blocks of tiny or huge numbers take the general path. */
 SIZED bool small_block_motion(const Equations *eq, Evaluation *result, int size,
                               const Block *block, const Complex *H, double *U) {
-    const int even = eq->system->even, r = eq->r, start = block->start;
+    const int even = eq->system->even, r = rows_with_blocks(eq), start = block->start;
     const Kinematics *at = &result->at;
     double M[SMALL * SMALL], D[SMALL];
     small_inertia(size, H, own_inertia(eq->system, at) + start, parts_from(at->e_parts, start),
@@ -376,7 +384,7 @@ NOINLINE bool factor_guide_block(const Equations *eq, Evaluation *result, int st
         return false;
     }
     solve_guide(U, result->a + start, FORWARD);
-    for (int k = 0; k < eq->r; k++) {
+    for (int k = 0; k < rows_with_blocks(eq); k++) {
         solve_guide(U, result->factors.Z + k * eq->system->even + start, FORWARD);
     }
     return true;
@@ -445,7 +453,7 @@ static void blocks_to_coordinates(const Equations *eq, Evaluation *result) {
     if (system->stretch_count > 0) {
         find_shift(system, &result->at, result->shift);
     }
-    branch_terms(system, own, eq->r, result);
+    branch_terms(system, own, result);
 }
 
 /* Compute directions, loads and rows. */
@@ -454,6 +462,28 @@ SIZED void direction_terms(int wide, const Equations *eq, const Reference *near,
     directions_of(wide, eq->system, near, &result->at);
     find_loads(wide, eq, result);
     rows_padded(wide, eq, &result->at, result->rows, result->lam);
+}
+
+PRBM void rows_to_coordinates(const Equations *eq, const double *rows, double *out) {
+    const System *system = eq->system;
+    const Intervals *to = &eq->intervals.coordinates, *from = &eq->intervals.directions;
+    if (eq->dense) {
+        zeros(eq->r * system->even, out);
+        for (int b = 0; b < system->branch_count; b++) {
+            branch_to_coordinates(system, &system->branches[b], eq->r, rows, out);
+        }
+        return;
+    }
+    for (int k = 0; k < eq->r; k++) {
+        for (int s = to->first[k]; s < to->first[k + 1]; s++) {
+            zeros(to->list[s].end - to->list[s].start, out + to->list[s].start);
+        }
+        for (int s = from->first[k]; s < from->first[k + 1]; s++) {
+            branch_to_coordinates(system, &system->branches[from->list[s].branch], 1, rows, out);
+        }
+        rows += system->wide;
+        out += system->even;
+    }
 }
 
 /* Compute loads, rows and mass matrix of the directions, and pull them back to the coordinates.
@@ -471,10 +501,11 @@ NOINLINE void mapped_terms(const Equations *eq, const Reference *near, Evaluatio
     for (int j = 0; j < even; j += LANES) {
         set_lanes(result->a + j, all_lanes(0.0));
     }
-    memset(Z, 0, (size_t)(eq->r * even) * sizeof *Z);
     blocks_to_coordinates(eq, result);
+    rows_to_coordinates(eq, result->rows, Z);
     for (int k = 0; system->stretch_count > 0 && k < eq->r; k++) {
-        result->lam[k] += even_dot(wide, result->rows + k * wide, result->shift);
+        result->lam[k] +=
+            interval_product(&eq->intervals.directions, k, result->rows + k * wide, result->shift);
     }
 }
 
@@ -561,8 +592,12 @@ NOINLINE void set_columns(const Equations *eq, Evaluation *result) {
 SIZED bool factor_motion(int even, const Equations *eq, Evaluation *result) {
     result->factors.r = eq->r;
     result->factors.block_count = eq->system->mass_block_count;
+    result->factors.intervals = &eq->intervals.coordinates;
     if (!blocks_motion(eq, result)) {
         return false;
+    }
+    if (eq->r > SMALL) {
+        forward_rows(&result->factors);
     }
     result->factors.Z_columns = result->factors.Z;
     result->factors.least = eq->system->least_mobility;
@@ -583,9 +618,9 @@ NOINLINE void add_coriolis(const System *system, Evaluation *result) {
  * therefore has the right side of the rows plus c rows v. */
 NOINLINE void damp_rows(const Equations *eq, Evaluation *result) {
     for (int k = 0; k < eq->r; k++) {
-        result->lam[k] += eq->mass_damping * even_dot(eq->system->even,
-                                                     result->factors.Z + k * eq->system->even,
-                                                     result->at.speed);
+        const double *row = result->factors.Z + k * eq->system->even;
+        result->lam[k] += eq->mass_damping * interval_product(&eq->intervals.coordinates, k, row,
+                                                              result->at.speed);
     }
 }
 

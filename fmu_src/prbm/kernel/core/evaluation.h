@@ -23,6 +23,8 @@ SHARED void arms_at(int even, const System *system, const Reference *near, Kinem
 /* Compute the derivatives of the active rows by the directions, and their convective terms. */
 PRBM void rows_and_convection(const Equations *eq, const Kinematics *at, double *rows,
                               double *convective);
+/* Pull rows (r, wide) back to the coordinates, out (r, even). */
+PRBM void rows_to_coordinates(const Equations *eq, const double *rows, double *out);
 SHARED void rows_dispatch(int even, const Equations *eq, const Kinematics *at, double *rows,
                            double *convective);
 SHARED bool motion_of_length(int even, const Equations *eq, const Reference *near,

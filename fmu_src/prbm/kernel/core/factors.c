@@ -315,6 +315,57 @@ SIZED void solve_blocks(const Factors *factors, double *x, Substitution way) {
     }
 }
 
+/* Replace count rows Z with the intervals of the row k, the first one, by U^-1 Z. */
+SIZED void forward_in_intervals(int count, const Factors *factors, int k) {
+    const int even = factors->even;
+    const Interval *first = factors->intervals->list + factors->intervals->first[k];
+    const Interval *end = factors->intervals->list + factors->intervals->first[k + 1];
+    double *x = factors->Z + k * even;
+    for (const Interval *interval = end - 1; interval >= first; interval--) {
+        const int padded = interval->end > factors->n;
+        for (int i = interval->end - padded - 1; i >= interval->start; i--) {
+            const FactorRow own = factors->factor_rows[i];
+            Lanes sum[SMALL][SUMS] = {{NO_LANES}};
+            double rest[SMALL] = {0.0};
+            for (const Interval *next = interval; next < end && next->start <= own.last; next++) {
+                const int stop = own.last + 1 < next->end ? own.last + 1 : next->end;
+                const double *row = factors->U + own.begin;
+                int j = next == interval ? i + 1 : next->start;
+                for (; j + 1 < stop; j += PAIR) {
+                    UNROLLED
+                    for (int l = 0; l < PAIR; l += LANES) {
+                        UNROLLED
+                        for (int c = 0; c < count; c++) {
+                            Lanes each = lanes_at(x + c * even + j + l);
+                            sum[c][SUM_OF(l)] += lanes_at(row + j + l) * each;
+                        }
+                    }
+                }
+                UNROLLED
+                for (int c = 0; c < count && j < stop; c++) {
+                    rest[c] += row[j] * x[c * even + j];
+                }
+            }
+            UNROLLED
+            for (int c = 0; c < count; c++) {
+                x[c * even + i] -= total(sum[c]) + rest[c];
+            }
+        }
+    }
+}
+
+PRBM void forward_rows(const Factors *factors) {
+    for (int k = 0, next; k < factors->r; k = next) {
+        const bool pair = k + 1 < factors->r && factors->intervals->repeats[k + 1];
+        next = k + 1 + pair;
+        if (pair) {
+            forward_in_intervals(PAIR, factors, k);
+        } else {
+            forward_in_intervals(1, factors, k);
+        }
+    }
+}
+
 PRBM void forward_all(const Factors *factors, double *x) {
     solve_blocks(factors, x, FORWARD);
 }
@@ -386,19 +437,60 @@ SIZED void metric_products(int count, int even, const double *RESTRICT x,
     }
 }
 
+/* Compute the products of x, in the intervals of row i, with count consecutive rows Z, in those of
+ * row k, the first of them. */
+SIZED void common_products(int count, const Factors *factors, int i, int k,
+                           const double *RESTRICT x, double *RESTRICT products) {
+    const Intervals *intervals = factors->intervals;
+    const Interval *one = intervals->list + intervals->first[i];
+    const Interval *other = intervals->list + intervals->first[k];
+    const Interval *end = intervals->list + intervals->first[i + 1];
+    const Interval *last = intervals->list + intervals->first[k + 1];
+    const int even = factors->even;
+    const double *Z = factors->Z + k * even;
+    Lanes sum[PAIR][SUMS] = {{NO_LANES}};
+    while (one < end && other < last) {
+        const int start = one->start > other->start ? one->start : other->start;
+        const int stop = one->end < other->end ? one->end : other->end;
+        for (int j = start; j < stop; j += PAIR) {
+            UNROLLED
+            for (int l = j; l < j + PAIR; l += LANES) {
+                UNROLLED
+                for (int c = 0; c < count; c++) {
+                    sum[c][SUM_OF(l)] += lanes_at(x + l) * lanes_at(Z + c * even + l);
+                }
+            }
+        }
+        one += one->end == stop;
+        other += other->end == stop;
+    }
+    UNROLLED
+    for (int c = 0; c < count; c++) {
+        products[c] = total(sum[c]);
+    }
+}
+
 /* As schur_of_size, for any number of rows. */
 NOINLINE bool schur_of_many(Factors *factors) {
     const int r = factors->r, even = factors->even;
+    const Intervals *intervals = factors->intervals;
     const double *Z = factors->Z, *inverse = factors->inverse;
-    double *S = factors->S, *U = S + r * r;
+    double *S = factors->S, *U = S + r * r, *scaled = factors->scaled;
     for (int i = 0; i < r; i++) {
         const double *row = Z + i * even;
-        int k = i;
-        for (; k + SMALL <= r; k += SMALL) {
-            metric_products(SMALL, even, row, inverse, Z + k * even, S + i * r + k);
+        for (int s = intervals->first[i]; s < intervals->first[i + 1]; s++) {
+            for (int j = intervals->list[s].start; j < intervals->list[s].end; j += LANES) {
+                set_lanes(scaled + j, lanes_at(inverse + j) * lanes_at(row + j));
+            }
         }
-        for (; k < r; k++) {
-            metric_products(1, even, row, inverse, Z + k * even, S + i * r + k);
+        for (int k = i, next; k < r; k = next) {
+            const bool pair = k + 1 < r && intervals->repeats[k + 1];
+            next = k + 1 + pair;
+            if (pair) {
+                common_products(PAIR, factors, i, k, scaled, S + i * r + k);
+            } else {
+                common_products(1, factors, i, k, scaled, S + i * r + k);
+            }
         }
         if (!(S[i * r + i] > factors->least)) {
             return false;
@@ -478,43 +570,34 @@ SHARED bool schur_dispatch(int even, Factors *factors) {
 /* Solve S lam = b with the factors of a symmetric S.  On entry lam contains b. */
 SIZED void multipliers_of_size(int r, const double *S, double *lam) {
     const double *U = S + r * r, *inverse = U + r * r;
-    if (r <= SMALL) {
-        block_forward(r, U, lam);
-    } else {
-        forward_block(r, NULL, U, 1, 0, lam);
-    }
+    block_forward(r, U, lam);
     UNROLLED
     for (int k = 0; k < r; k++) {
         lam[k] *= inverse[k];
     }
-    if (r <= SMALL) {
-        block_backward(r, U, lam);
-    } else {
-        backward_block(r, NULL, U, lam);
-    }
+    block_backward(r, U, lam);
 }
 
-/* Subtract Z D^-1 x from lam, the right side of the constraint rows. */
-SIZED void reduce_right_side(int count, int even, const double *RESTRICT Z,
-                             const double *RESTRICT x, const double *RESTRICT inverse,
-                             double *RESTRICT lam) {
-    double products[SMALL];
-    metric_products(count, even, x, inverse, Z, products);
-    UNROLLED
-    for (int k = 0; k < count; k++) {
-        lam[k] -= products[k];
+/* The same for any number of rows. */
+NOINLINE void multipliers_of_many(int r, const double *S, double *lam) {
+    const double *U = S + r * r, *inverse = U + r * r;
+    forward_block(r, NULL, U, 1, 0, lam);
+    for (int k = 0; k < r; k++) {
+        lam[k] *= inverse[k];
     }
+    backward_block(r, NULL, U, lam);
 }
 
 /* Solve for the multipliers lam, and set x := D^-1 (x + Z_columns^T lam).  On entry x contains
  * U^-1 f, and lam the right side of the constraint rows. */
 SIZED void constrain_of_size(int r, int even, const Factors *factors, double *RESTRICT x,
                              double *RESTRICT lam) {
-    const double *RESTRICT Z = factors->Z, *RESTRICT columns = factors->Z_columns;
-    const double *RESTRICT inverse = factors->inverse;
-    const int together = r <= SMALL ? r : 1;
-    for (int k = 0; k < r; k += together) {
-        reduce_right_side(together, even, Z + k * even, x, inverse, lam + k);
+    const double *RESTRICT columns = factors->Z_columns, *RESTRICT inverse = factors->inverse;
+    double products[SMALL];
+    metric_products(r, even, x, inverse, factors->Z, products);
+    UNROLLED
+    for (int k = 0; k < r; k++) {
+        lam[k] -= products[k];
     }
     if (factors->symmetric) {
         multipliers_of_size(r, factors->S, lam);
@@ -532,6 +615,32 @@ SIZED void constrain_of_size(int r, int even, const Factors *factors, double *RE
     }
 }
 
+/* The same for any number of rows. */
+NOINLINE void constrain_many(const Factors *factors, double *RESTRICT x, double *RESTRICT lam) {
+    const int r = factors->r, even = factors->even;
+    const Intervals *intervals = factors->intervals;
+    const double *inverse = factors->inverse;
+    for (int k = 0; k < r; k++) {
+        lam[k] -= scaled_interval_product(intervals, k, inverse, x, factors->Z + k * even);
+    }
+    if (factors->symmetric) {
+        multipliers_of_many(r, factors->S, lam);
+    } else {
+        unsymmetric_multipliers(factors, lam);
+    }
+    for (int k = 0; k < r; k++) {
+        const double *column = factors->Z_columns + k * even;
+        for (int s = intervals->first[k]; s < intervals->first[k + 1]; s++) {
+            for (int j = intervals->list[s].start; j < intervals->list[s].end; j += LANES) {
+                set_lanes(x + j, lanes_at(x + j) + lam[k] * lanes_at(column + j));
+            }
+        }
+    }
+    for (int j = 0; j < even; j += LANES) {
+        set_lanes(x + j, lanes_at(x + j) * lanes_at(inverse + j));
+    }
+}
+
 /* Compute the solution x and the multipliers lam.  On entry x contains U^-1 f, and lam the right
  * side of the constraint rows. */
 SIZED void finish_padded(int even, const Factors *factors, double *x, double *lam) {
@@ -541,7 +650,7 @@ SIZED void finish_padded(int even, const Factors *factors, double *x, double *la
     case 2: constrain_of_size(2, even, factors, x, lam); break;
     case 3: constrain_of_size(3, even, factors, x, lam); break;
     case 4: constrain_of_size(4, even, factors, x, lam); break;
-    default: constrain_of_size(factors->r, even, factors, x, lam);
+    default: constrain_many(factors, x, lam);
     }
     backward_all(factors, x);
 }

@@ -2,14 +2,17 @@
 #ifndef PRBM_FACTORS_H
 #define PRBM_FACTORS_H
 
-#include "core/system.h"
+#include "core/intervals.h"
 
 /* M = U D U^T block by block, Z = U^-1 rows^T and the Schur complement S of a saddle-point matrix
  * [[M, columns^T], [rows, 0]], for repeated solution.  Vectors are padded to an even length. */
 typedef struct {
-    int even, r, block_count;
+    int n, even, r, block_count;
     const Block *blocks;
     const int *last;            /* (n,) last elements of the rows of U, counted in their blocks */
+    const FactorRow *factor_rows; /* (n,) */
+    const Intervals *intervals; /* of the rows Z */
+    double *scaled;             /* (even,) working memory */
     double *U;                  /* upper triangles of the blocks, consecutive */
     double *inverse;            /* (even,) 1/D */
     double *Z, *Z_columns;      /* (r, even); Z_columns = U^-1 columns^T, Z itself if symmetric */
@@ -42,6 +45,8 @@ PRBM void forward_block(int size, const int *last, const double *U, int count, i
                         double *b);
 SHARED bool schur_dispatch(int even, Factors *factors);
 SHARED void finish_dispatch(int even, const Factors *factors, double *x, double *lam);
+/* Replace the rows Z by U^-1 Z. */
+PRBM void forward_rows(const Factors *factors);
 PRBM void forward_all(const Factors *factors, double *x);
 
 #endif

@@ -109,6 +109,7 @@ PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memor
     place_branches(&result, memory);
     result.mass_blocks = place(memory, n, sizeof(Block));
     result.last = place(memory, n, sizeof(int));
+    result.factor_rows = place(memory, n, sizeof(FactorRow));
     result.coupling = place(memory, d * d, sizeof(Complex));
     result.block = place(memory, (size_t)result.wide * (size_t)result.wide, sizeof(double));
     result.coupling_parts = place_parts(memory, result.mapped ? 0 : d * d);

@@ -69,35 +69,23 @@ PRBM void correction_place(Correction *correction, const System *system, Memory 
     zero_placed(memory, begin);
 }
 
-/* The value of an active row on the ground without its constant, if no arm stretches. */
-SIZED double active_sum(int even, const Equations *eq, const Kinematics *at, int k) {
-    Parts B = parts_from(eq->B_conjugate, k * even), e = at->e_parts;
-    Lanes sum[SUMS] = {NO_LANES};
-    UNROLLED_BY_LANES
-    for (int j = 0; j < even; j += LANES) {
-        Lanes re = lanes_at(B.re + j) * lanes_at(e.re + j);
-        Lanes im = lanes_at(B.im + j) * lanes_at(e.im + j);
-        sum[SUM_OF(j)] += re + im;
-    }
-    return total(sum);
-}
-
 /* The value of an active row without its constant. */
-SIZED double active_value(int even, const Equations *eq, const Kinematics *at, int k) {
+static double active_value(const Equations *eq, const Kinematics *at, int k) {
     if (has_shared_arms(eq->system) || eq->on[k] != FIXED) {
         return row_value(&eq->active, k, at->e);
     }
-    return eq->system->mapped ? active_sum(eq->system->wide, eq, at, k)
-                              : active_sum(even, eq, at, k);
+    Parts B = parts_from(eq->B_conjugate, k * eq->system->wide);
+    return interval_product(&eq->intervals.directions, k, B.re, at->e_parts.re) +
+           interval_product(&eq->intervals.directions, k, B.im, at->e_parts.im);
 }
 
 /* Compute the residuals of the positions, and return the largest magnitude. */
-SIZED double position_residuals(int even, const Equations *eq, const Kinematics *at, double t,
-                                double *residual) {
+static double position_residuals(const Equations *eq, const Kinematics *at, double t,
+                                 double *residual) {
     double worst = 0.0;
     for (int k = 0; k < eq->r; k++) {
         bool placed = k < eq->first_stick;
-        residual[k] = placed ? -(active_value(even, eq, at, k) + offset(eq, k, t)) : 0.0;
+        residual[k] = placed ? -(active_value(eq, at, k) + offset(eq, k, t)) : 0.0;
         worst = fabs(residual[k]) <= worst ? worst : fabs(residual[k]); /* a NaN stays */
     }
     return worst;
@@ -105,10 +93,8 @@ SIZED double position_residuals(int even, const Equations *eq, const Kinematics 
 
 /* Compute the rows by the coordinates, if they are not the directions. */
 NOINLINE void mapped_rows(const Equations *eq, Correction *c) {
-    const System *system = eq->system;
     rows_and_convection(eq, &c->at, c->by_direction, c->convective);
-    zeros(eq->r * system->even, c->rows);
-    directions_to_coordinates(system, eq->r, c->by_direction, c->rows);
+    rows_to_coordinates(eq, c->by_direction, c->rows);
 }
 
 SIZED void velocity_residuals(int even, const Equations *eq, double t, Correction *c) {
@@ -118,7 +104,8 @@ SIZED void velocity_residuals(int even, const Equations *eq, double t, Correctio
         rows_dispatch(even, eq, &c->at, c->rows, c->convective);
     }
     for (int k = 0; k < eq->r; k++) {
-        double rate = even_dot(even, c->rows + k * even, c->at.speed);
+        double rate =
+            interval_product(&eq->intervals.coordinates, k, c->rows + k * even, c->at.speed);
         c->residual[k] = -(rate + prescribed(eq, k, t));
     }
 }
@@ -140,11 +127,11 @@ SIZED void correct(int even, const Equations *eq, const Factors *factors, Correc
 SIZED bool corrected_of_length(int even, const Equations *eq, const Evaluation *evaluation,
                                const Reference *near, double t, double *y, Correction *c) {
     int n = eq->system->n;
-    position_residuals(even, eq, &evaluation->at, t, c->residual);
+    position_residuals(eq, &evaluation->at, t, c->residual);
     correct(even, eq, &evaluation->factors, c, y);
     pad_of(even, n, y, c->at.angle);
     arms_at(even, eq->system, near, &c->at);
-    double worst = position_residuals(even, eq, &c->at, t, c->residual);
+    double worst = position_residuals(eq, &c->at, t, c->residual);
     if (!(worst <= CONSTRAINT_RTOL * eq->system->length)) {
         return false;
     }

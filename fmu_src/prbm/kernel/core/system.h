@@ -110,6 +110,12 @@ typedef struct {
     int root;              /* Index of the motion of the root among those of all branches. */
 } Branch;
 
+/* A row of the factor U of the mass matrix: its element in column j is U[begin + j], and it has none
+ * behind the column last. */
+typedef struct {
+    int begin, last;
+} FactorRow;
+
 /* The constant arrays of a mechanism, as in the twin.  There are n coordinates, d directions, r
  * loop rows, p mass points, s stops, f friction points and guides with friction, and b bodies.
  * Columns of A and of the rows are zero at stretches, see repeat_columns.  Vectors with the shape
@@ -181,6 +187,7 @@ typedef struct {
     Block *mass_blocks;       /* of M: the same, unless mapped */
     int *last;                /* (n,) the last columns of the rows of M that may not be zero, counted
                                * in their blocks */
+    FactorRow *factor_rows;   /* (n,) */
     Complex *coupling;        /* the blocks of H, one after the other */
     double *block;            /* (wide, wide) working memory of all evaluations, one at a time */
     Parts coupling_parts;     /* their upper triangles, and zero elsewhere */
