@@ -12,6 +12,7 @@ import pytest
 from support import ROOT
 
 COMMANDS = {
+    "accelerations": f"{ROOT} {ROOT} --states 1 --random 1 --model PRBDM",
     "desk": "--short",
     "flexure_cost": "--short --runs 1",
     "native": "--only overhead profile --runs 1",
