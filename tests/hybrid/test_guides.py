@@ -15,7 +15,7 @@ from moved_drawings import moved
 from prbm.base.errors import PrbmError
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.inputs import input_names
-from prbm.mechanism.parts import Guide, Spring, Stop
+from prbm.mechanism.parts import Body, Guide, Joint, Spring, Stop
 from prbm.runs.engine import simulation as started
 
 G = 9.81
@@ -371,6 +371,17 @@ def test_dependent_guides_are_named(engine):
 def test_a_guide_between_bodies_that_fly_freely_is_rejected():
     with pytest.raises(PrbmError, match="slot guides pin along arm, and both fly freely"):
         Simulation(replace(slotted_arm(), joints=()))
+
+
+@engines
+def test_a_guide_to_a_body_on_a_body_that_flies_freely_is_rejected(engine):
+    """The arm is joined to a block, and nothing joins arm, block and pin to the ground."""
+    model, block = slotted_arm(), Body("block", 1.0, 0.01, (0.0, 0.0), {"o": (0.0, 0.0)})
+    model = replace(
+        model, bodies=(block, *model.bodies), joints=(Joint("pivot", "block.o", "arm.o"),)
+    )
+    with pytest.raises(PrbmError, match=r"slot.*fly freely"):
+        start(model, engine)
 
 
 @pytest.mark.parametrize(

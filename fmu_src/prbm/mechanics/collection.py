@@ -72,6 +72,7 @@ class Collection:
         self.origin: dict[str, Place] = {GROUND: Place()}
         self.drawn: dict[str, complex] = {GROUND: 0j}
         self.depth = {GROUND: 0}  # Flexures and joints between each body and the ground.
+        self.root = {GROUND: GROUND}  # What floats, or the ground, at the begin of these parts.
         self.index: dict[str, int | None] = {GROUND: None}  # Directions of the bodies.
         self.links: list[int] = []
         self.floats: list[int] = []  # Arms that float.
@@ -222,7 +223,7 @@ class Collection:
             self.direction({j: size}, arm=arm)
         turn = self.turn(body)
         self.reach(body, Place(drawn, {arm: 1.0 + 0.0j}), drawn, turn)
-        self.depth[body] = 0
+        self.depth[body], self.root[body] = 0, body
         self.floats.append(arm)
         place = [*shifts, *self.changes[turn]]
         self.floating += place
@@ -241,6 +242,7 @@ class Collection:
         """Register a flexure or a joint; known: it has just closed a loop."""
         loop = len(self.loops) - 1 if known else None
         self.depth.setdefault(far, self.depth[near] + 1)
+        self.root.setdefault(far, self.root[near])
         self.connections.append(Connection(near, far, loop, flexure))
 
     def span(self, spring: Spring) -> Place:
@@ -261,11 +263,13 @@ class Collection:
         Raises
         ------
         MechanismError
-            If both bodies fly freely: where they are placed would have to satisfy the guide.
+            If both bodies fly freely and no flexures and joints connect them: where they are placed
+            would have to satisfy the guide.
         ParameterError
             As :meth:`line`.
         """
-        if self._floats(guide) and guide.body in self.mechanism.free_bodies:
+        separate = self.root[guide.body] != self.root[guide.on]
+        if separate and guide.body in self.mechanism.free_bodies:
             raise MechanismError(
                 f"guide {guide.name} guides {guide.body} along {guide.on}, and both fly freely: "
                 "connect one of them to the ground by a flexure, joint, spring or guide"

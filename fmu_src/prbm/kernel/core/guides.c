@@ -90,10 +90,30 @@ static bool check_guide(const System *system, const Guide *guide, Problem *probl
                 guide->name, fabs(apart), apart > 0.0 ? "left" : "right");
 }
 
-/* Reject a guide between bodies that fly freely. */
+/* Return the body that floats, or the ground, to which flexures and joints connect a body. */
+static int root_of(const Mechanism *m, int body) {
+    for (int i = m->step_count - 1; i >= 0 && body != GROUND; i--) {
+        const Step *step = &m->steps[i];
+        if (step->body == body) {
+            return body;
+        }
+        if (step->body == GROUND && !step->closes) {
+            int start = step->between->start, end = step->between->end;
+            int far = step->backwards ? start : end;
+            body = far == body ? start + end - far : body;
+        }
+    }
+    return body;
+}
+
+/* Reject a guide between bodies that fly freely, unless flexures and joints connect them. */
 static bool check_held(const System *system, const Guide *guide, Problem *problem) {
     const Mechanism *m = system->mechanism;
-    int turn = angle_of(system, system->origins[guide->between.start].j);
+    int root = root_of(m, guide->between.start);
+    if (root == GROUND || root == root_of(m, guide->between.end)) {
+        return true;
+    }
+    int turn = angle_of(system, system->origins[root].j);
     for (int k = 0; k < m->placed_count; k++) {
         if (m->placed[k] == turn) {
             return fail(problem,
@@ -120,8 +140,7 @@ PRBM bool add_guides(System *system, Scratch scratch, Problem *problem) {
         for (int i = 0; i < m->guide_count; i++) {
             const Guide *guide = &m->guides[i];
             bool alone = floats_alone(m, guide->between.start) && floats_alone(m, guide->between.end);
-            if (!check_guide(system, guide, problem) ||
-                (alone && !check_held(system, guide, problem))) {
+            if (!check_guide(system, guide, problem) || !check_held(system, guide, problem)) {
                 return false;
             }
             if (alone == (floating == 1)) {
