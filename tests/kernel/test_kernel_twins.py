@@ -1071,7 +1071,7 @@ def test_impulses_of_many_stops_satisfy_the_law_of_impact():
 
 @twin(
     lemke=complementarity.lemke, coulomb=complementarity.coulomb,
-    violation=complementarity.violation,
+    violation=complementarity.violation, in_any_modes=complementarity.in_any_modes,
 )  # fmt: skip
 @pytest.mark.parametrize(("k", "m"), [(0, 2), (3, 0), (2, 3), (8, 8)])
 def test_forces_that_satisfy_the_laws_of_contact_are_the_same(k, m):
@@ -1089,6 +1089,7 @@ def test_forces_that_satisfy_the_laws_of_contact_are_the_same(k, m):
         )
         for g in range(m // 2):  # Some limits depend on forces that act in both directions.
             normal[-1 - g] = k + g
+            fixed[-1 - g] = 0.0
         laws = coulomb_laws(mu, fixed, normal, *carried)
         assert kernel().coulomb(k, m, W, u, laws, tolerance, P)
         expected = complementarity.coulomb(W, u, mu, fixed, normal, tolerance, carried)
@@ -1096,6 +1097,12 @@ def test_forces_that_satisfy_the_laws_of_contact_are_the_same(k, m):
         limit = complementarity.limits(P, mu, fixed, normal, carried)
         wrong = complementarity.violation(W, u, P, limit)
         assert wrong <= tolerance
+        few = 2**k * 3**m <= tolerances.MODES_TRIED_MAX
+        assert kernel().in_any_modes(k, m, W, u, laws, tolerance, P) == few
+        found = complementarity.in_any_modes(W, u, mu, fixed, normal, tolerance, carried)
+        assert (found is not None) == few
+        if few:
+            assert_same(P, found, 1e-10)
         Q = rng.normal(size=k + m)
         wrong = kernel().violation(k, m, W, u, Q, limit)
         assert wrong == pytest.approx(complementarity.violation(W, u, Q, limit), rel=1e-12)

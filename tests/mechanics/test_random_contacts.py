@@ -8,10 +8,11 @@ from scipy.optimize import linprog
 
 import random_contacts
 from kernel_library import coulomb_laws, kernel
+from prbm.base.errors import SimulationError
 from prbm.base.tolerances import COMPLEMENTARITY_RTOL
 from prbm.mechanics import complementarity
 
-ERRORS = {"newton": 0.0, "stronge": 0.02, "several": 0.02, "rest": 0.02}
+ERRORS = {"newton": 0.0, "stronge": 0.02, "several": 0.02, "rest": 0.02, "guides": 0.01}
 """Largest allowed fractions of rejected problems."""
 
 
@@ -49,6 +50,34 @@ def test_rejected_problems_have_no_solution_in_any_combination_of_modes():
     assert second_paths > 0
 
 
+@pytest.mark.slow
+def test_rejected_problems_of_guides_have_no_solution_in_any_combination_of_modes():
+    """The force of each guide has either side; each combination is a linear program."""
+    rng, rejected, further = np.random.default_rng(3), 0, 0
+    for _ in range(1500):
+        problem = W, u, mu, normal, carried = random_contacts.drawn_guides(rng)
+        try:
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setattr(complementarity, "MODES_TRIED_MAX", 0)
+                random_contacts.forces_of_guides("package", *problem)
+            continue
+        except SimulationError:
+            pass
+        try:
+            random_contacts.forces_of_guides("package", *problem)
+            further += 1
+        except SimulationError:
+            rejected += 1
+            k, g = len(u) - len(mu), len(mu)
+            assert not any(
+                fits(W, u, mu, normal, *modes, carried, sides)
+                for sides in product((1, -1), repeat=g)
+                for modes in combinations(k, g)
+            )
+    assert rejected > 1
+    assert further > 20
+
+
 @pytest.mark.parametrize("engine", ["package", "kernel"])
 def test_contacts_that_separate_without_forces_receive_none(engine):
     """Friction could jam a part of them: these problems have a second solution."""
@@ -80,24 +109,35 @@ def combinations(k, m):
     return product(product((0, 1), repeat=k), product((0, 1, -1), repeat=m))
 
 
-def fits(W, u, mu, normal, closed, slips):
-    """Return whether forces satisfy the laws in given modes, to 1e-9 of the largest rate."""
-    scale = 1 / np.sqrt(np.diag(W))
+def fits(W, u, mu, normal, closed, slips, carried=None, sides=()):
+    """Return whether forces satisfy the laws in given modes, to 1e-9 of the largest rate.
+
+    ``sides`` are the signs of the normal forces of ``carried``.
+    """
+    scale = 1 / np.sqrt(np.abs(np.diag(W)))
     S, b = scale[:, None] * W * scale, scale * u / np.abs(scale * u).max()
     n, k, unit = len(u), len(closed), np.eye(len(u))
+    top = np.abs(scale * u).max()
     bounds, equal = [], []
     for i in range(k):
         zero, positive = ((S[i], b[i]), (unit[i], 0.0))[:: 1 if closed[i] else -1]
         equal.append(zero)
         bounds.append(positive)
     for j, slip in enumerate(slips):
-        limit = mu[j] * scale[normal[j]] / scale[k + j] * unit[normal[j]]
+        share, least = mu[j] / scale[k + j], 0.0
+        if carried is None:
+            limit = share * scale[normal[j]] * unit[normal[j]]
+        else:
+            g = normal[j] - k
+            limit, least = sides[g] * scale * carried.L[g], sides[g] * carried.b[g] / top
+            bounds.append((limit, least))
+            limit, least = share * limit, share * least
         if slip:
-            equal.append((unit[k + j] + slip * limit, 0.0))
+            equal.append((unit[k + j] + slip * limit, slip * least))
             bounds.append((slip * S[k + j], slip * b[k + j]))
         else:
             equal.append((S[k + j], b[k + j]))
-            bounds += [(limit - unit[k + j], 0.0), (limit + unit[k + j], 0.0)]
+            bounds += [(limit - unit[k + j], least), (limit + unit[k + j], least)]
     # Minimise the violation t of all laws a.P + c >= 0 and a.P + c = 0.
     rows = [*bounds, *equal, *((-a, -c) for a, c in equal)]
     A = np.array([[*-a, -1.0] for a, _ in rows])

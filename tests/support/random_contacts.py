@@ -110,6 +110,59 @@ def rest(engine, rng):
     return complementarity.violation(W, u, P, limit) / np.abs(u).max()
 
 
+def drawn_guides(rng):
+    """Return a mechanism at rest on guides with friction: W, u, mu, normal, and the guide forces.
+
+    They follow from M a = f + N^T P_n + T^T P_t + G^T lam and G a = 0.  The rows are G of the
+    guides, T along them and N of up to two closed stops, in one to three degrees of freedom.  Some
+    guides slide, and push along T in proportion to lam.  Each force moves its contact forwards.
+    """
+    while True:
+        problem = _drawn_guides(rng)
+        if np.diag(problem[0]).min() > 0.0:
+            return problem
+
+
+def _drawn_guides(rng):
+    g, k = int(rng.integers(1, 4)), int(rng.integers(0, 3))
+    n = g + int(rng.integers(1, 4))
+    inverse = np.diag(10 ** rng.uniform(-1, 1, n))
+    G, rows = rng.normal(size=(g, n)), rng.normal(size=(k + g, n))
+    f, mu = rng.normal(size=n), rng.uniform(0, 3, g)
+    slides = rng.choice([0.0, 0.0, 1.0, -1.0], g)
+    slides[0] = 0.0
+    acting = G + (slides * mu)[:, None] * rows[k:]
+    carry = np.linalg.solve(G @ inverse @ acting.T, G @ inverse)  # -lam by unit loads.
+    moved, rest = inverse @ (np.eye(n) - acting.T @ carry), slides == 0.0
+    rows = np.vstack([rows[:k], rows[k:][rest]])
+    W, u = rows @ moved @ rows.T, rows @ moved @ f
+    carried = complementarity.TwoSided(-carry[rest] @ rows.T, -carry[rest] @ f)
+    return W, u, mu[rest], k + np.arange(rest.sum()), carried
+
+
+def guides(engine, rng):
+    """Return the violation of the laws of guides with friction at rest, beside closed stops."""
+    W, u, mu, normal, carried = drawn_guides(rng)
+    none = np.zeros(len(mu))
+    P = forces_of_guides(engine, W, u, mu, normal, carried)
+    limit = complementarity.limits(P, mu, none, normal, carried)
+    return complementarity.violation(W, u, P, limit) / np.abs(u).max()
+
+
+def forces_of_guides(engine, W, u, mu, normal, carried):
+    """Return the forces of stops and of friction along guides; raise an error if there are none."""
+    P, tolerance, none = np.zeros(len(u)), COMPLEMENTARITY_RTOL * np.abs(u).max(), np.zeros(len(mu))
+    if engine == "kernel":
+        laws, k = coulomb_laws(mu, none, normal, *carried), len(u) - len(mu)
+        if not kernel().coulomb(k, len(mu), W, u, laws, tolerance, P):
+            raise KernelError("no forces")
+        return P
+    found = complementarity.coulomb(W, u, mu, none, normal, tolerance, carried)
+    if found is None:
+        raise SimulationError("no forces")
+    return found
+
+
 def gain(W, u, P):
     """Return the energy that impulses add, divided by the sum of the impulses [m/s]."""
     return max(float(P @ u + P @ W @ P / 2), 0.0) / max(float(np.abs(P).sum()), 1e-300)
@@ -125,7 +178,7 @@ def friction_violation(W, u, mu, P):
 
 
 SEARCHES: dict[str, Callable[..., float]] = {
-    "newton": newton, "stronge": stronge, "several": several, "rest": rest,
+    "newton": newton, "stronge": stronge, "several": several, "rest": rest, "guides": guides,
 }  # fmt: skip
 
 

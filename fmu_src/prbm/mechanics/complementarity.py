@@ -9,7 +9,8 @@ The path ends in a solution or in another ray.  It ends in a solution if the rat
 are those of a possible motion [2].  There may be no solution if walls close in on the mechanism or,
 for accelerations, if contacts slide (Painleve's paradox).  In these cases a path may also end in a
 ray although a solution exists.  Therefore the problem is rejected as unsolvable only after the
-paths of other covering vectors have failed, too.
+paths of other covering vectors have failed, too.  With constraints that act in both directions, all
+combinations of modes are then tried, unless there are too many of them.
 
 Sources
 -------
@@ -19,12 +20,19 @@ Sources
 """
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.tolerances import COVER_FACTOR, PIVOT_RTOL, PIVOTS_FACTOR, RATIO_RTOL
+from ..base.tolerances import (
+    COVER_FACTOR,
+    MODES_TRIED_MAX,
+    PIVOT_RTOL,
+    PIVOTS_FACTOR,
+    RATIO_RTOL,
+)
 from .arrays import Real
 
 Integers = NDArray[np.int_]
@@ -241,7 +249,85 @@ def coulomb(
             limit = limits(P, friction, fixed, normal, carried)
             if violation(W, given, P, limit) <= tolerance:
                 return P
+    if carried is None or not len(carried.b):
+        return None
+    return in_any_modes(W, given, friction, fixed, normal, tolerance, carried)
+
+
+def in_any_modes(
+    W: Real,
+    u: Real,
+    friction: Real,
+    fixed: Real,
+    normal: Integers,
+    tolerance: float,
+    carried: TwoSided,
+) -> Real | None:
+    """Return forces as :func:`coulomb`, from all combinations of modes; None without a solution.
+
+    A normal is open or closed, a tangent sticks or has a friction force of either sign.  Forces
+    that act in both directions need no further modes: their side times the direction of sliding is
+    the sign of the friction force.  The limits by these forces have no constant parts.  Modes with
+    dependent equations are left out, and nothing is tried if there are more than
+    ``MODES_TRIED_MAX`` combinations.
+    """
+    m = len(fixed)
+    k = len(u) - m
+    if 2.0**k * 3.0**m > MODES_TRIED_MAX:
+        return None
+    diagonal = np.abs(np.diag(W))
+    scale = np.where(diagonal > 0.0, 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0)), 1.0)
+    rates, still = scale[:, None] * W * scale, -scale * u
+    loads, constants = _normal_forces(scale, friction, fixed, normal, carried)
+    for modes in _all_modes(k, m):
+        A, right = np.eye(k + m), np.zeros(k + m)
+        for i, mode in enumerate(modes):
+            if mode == (1 if i < k else 0):
+                A[i], right[i] = rates[i], still[i]
+            elif i >= k:
+                sign = 3 - 2 * mode  # 1 or -1.
+                A[i] += sign * loads[i - k]
+                right[i] = -sign * constants[i - k]
+        try:
+            P: Real = scale * np.linalg.solve(A, right)
+        except np.linalg.LinAlgError:
+            continue
+        if not np.isfinite(P).all():
+            continue
+        if violation(W, u, P, limits(P, friction, fixed, normal, carried)) <= tolerance:
+            return P
     return None
+
+
+def _all_modes(k: int, m: int) -> Iterator[list[int]]:
+    """Yield all modes of k normals (0: open, 1: closed) and m tangents (0: stick, 1, 2: slip).
+
+    The first one changes fastest.
+    """
+    sizes = [2] * k + [3] * m
+    for number in range(2**k * 3**m):
+        modes, rest = [], number
+        for size in sizes:
+            rest, mode = divmod(rest, size)
+            modes.append(mode)
+        yield modes
+
+
+def _normal_forces(
+    scale: Real, friction: Real, fixed: Real, normal: Integers, carried: TwoSided
+) -> tuple[Real, Real]:
+    """Return the limits of scaled tangents as A p + c of scaled forces p, with signs of normals."""
+    m = len(fixed)
+    k = len(scale) - m
+    A, constants = np.zeros((m, k + m)), fixed / scale[k:]
+    for j in range(m):
+        share = friction[j] / scale[k + j]
+        if 0 <= normal[j] < k:
+            A[j, normal[j]] = share * scale[normal[j]]
+        elif normal[j] >= k:
+            A[j] = share * carried.L[normal[j] - k] * scale
+            constants[j] += share * carried.b[normal[j] - k]
+    return A, constants
 
 
 def _coulomb_problem(

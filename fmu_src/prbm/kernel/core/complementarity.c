@@ -265,6 +265,72 @@ static bool follow_path(int k, int m, int size, const double *M, const double *q
     return solved;
 }
 
+/* Set the equations of a combination of modes, scaled: a normal is open (0) or closed (1), a tangent
+ * sticks (0) or has a friction force of either sign (1, 2). */
+static void set_modes(int k, int m, const double *W, const double *u, const CoulombLaws *laws,
+                      const double *scale, int modes, double *A, double *right) {
+    int size = k + m;
+    zeros(size * size, A);
+    zeros(size, right);
+    for (int i = 0; i < size; i++) {
+        int choices = i < k ? 2 : 3, mode = modes % choices;
+        double *row = A + i * size;
+        modes /= choices;
+        if (mode == (i < k ? 1 : 0)) {
+            for (int j = 0; j < size; j++) {
+                row[j] = scale[i] * W[i * size + j] * scale[j];
+            }
+            right[i] = -scale[i] * u[i];
+            continue;
+        }
+        row[i] = 1.0;
+        if (i >= k) {
+            int normal = laws->normal[i - k], g = normal - k;
+            double sign = 3 - 2 * mode, share = sign * (laws->friction[i - k] / scale[i]);
+            right[i] = -sign * (laws->fixed[i - k] / scale[i]);
+            if (normal >= 0 && normal < k) {
+                row[normal] += share * scale[normal];
+            }
+            for (int j = 0; g >= 0 && j < size; j++) {
+                row[j] += share * laws->L[g * size + j] * scale[j];
+            }
+            right[i] -= g >= 0 ? share * laws->b[g] : 0.0;
+        }
+    }
+}
+
+PRBM bool in_any_modes(int k, int m, const double *W, const double *u, const CoulombLaws *laws,
+                       double tolerance, double *P, Scratch scratch) {
+    int size = k + m, *pivot = take_integers(&scratch, size);
+    double *A = take_matrix(&scratch, size, size), *limit = take(&scratch, (size_t)m);
+    double *scale = take(&scratch, (size_t)size), count = ldexp(1.0, k);
+    bool solved = false;
+    for (int j = 0; j < m; j++) {
+        count *= 3.0;
+    }
+    for (int i = 0; i < size; i++) {
+        double mobility = fabs(W[i * size + i]);
+        scale[i] = mobility > 0.0 ? 1.0 / square_root(mobility) : 1.0;
+    }
+    for (int modes = 0; !solved && count <= MODES_TRIED_MAX && modes < (int)count; modes++) {
+        set_modes(k, m, W, u, laws, scale, modes, A, P);
+        if (!lu_factor(size, A, pivot)) {
+            continue;
+        }
+        lu_solve(size, A, pivot, P);
+        bool finite = true;
+        for (int i = 0; i < size; i++) {
+            P[i] *= scale[i];
+            finite = finite && finite_number(P[i]);
+        }
+        for (int j = 0; finite && j < m; j++) {
+            limit[j] = limit_of(k, size, laws, j, P);
+        }
+        solved = finite && violation(k, m, W, u, P, limit) <= tolerance;
+    }
+    return solved;
+}
+
 PRBM bool coulomb(int k, int m, const double *W, const double *u, const CoulombLaws *laws,
                   double tolerance, double *P, Scratch scratch) {
     int size = k + 3 * m + laws->sides;
@@ -301,7 +367,7 @@ PRBM bool coulomb(int k, int m, const double *W, const double *u, const CoulombL
             solved = solved && violation(k, m, W, u, P, limit) <= tolerance;
         }
     }
-    return solved;
+    return solved || (laws->sides > 0 && in_any_modes(k, m, W, u, laws, tolerance, P, scratch));
 }
 
 /* --- impacts ---------------------------------------------------------------------------------- */

@@ -26,6 +26,10 @@ PRBM double limit_of(int k, int size, const CoulombLaws *laws, int j, const doub
  * to the tolerance, a rate, are accepted as round-off. */
 PRBM bool coulomb(int k, int m, const double *W, const double *u, const CoulombLaws *laws,
                   double tolerance, double *P, Scratch scratch);
+/* Compute forces as coulomb, from all combinations of modes, up to MODES_TRIED_MAX: a normal is open
+ * or closed, a tangent sticks or has a friction force of either sign. */
+PRBM bool in_any_modes(int k, int m, const double *W, const double *u, const CoulombLaws *laws,
+                       double tolerance, double *P, Scratch scratch);
 /* Compute impulses P (k + m,) of an impact by the laws of coulomb.  Tangent j belongs to normal j;
  * m is k, or 0 without friction.  The normal impulses have the lower bounds least (k,). */
 PRBM bool impulses(int k, int m, const double *W, const double *u, const double *friction,
