@@ -4,7 +4,7 @@ The choice depends only on the state at the front: on the forces and acceleratio
 in the modes that are tried.
 """
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import product
 
 import numpy as np
@@ -13,6 +13,7 @@ from ..base.errors import SimulationError
 from ..base.tolerances import (
     FRICTION_EXCESS_RTOL,
     MODE_ITERATIONS_MAX,
+    SIDES_TRIED_MAX,
 )
 from ..mechanics.constraints import solve_saddle
 from ..mechanics.contact_state import ContactMode, ContactState
@@ -152,20 +153,52 @@ def _chosen(
 
     The friction of a guide that slips depends on the side to which the guide pushes.  Changing the
     side of the first wrong one at a time ends, however many guides there are, if forces and sides
-    determine each other uniquely (Murty's method for linear complementarity problems).
+    determine each other uniquely (Murty's method for linear complementarity problems).  If it
+    fails, all combinations of sides are tried.
     """
-    wrong: int | None = None
-    for _ in range(MODE_ITERATIONS_MAX):
-        holding = holding_stops(configuration, front, candidates)
-        front = front.with_contacts(front.contacts.holding(holding))
-        front = _with_friction(configuration, front, candidates, slipped, turning)
-        wrong = _guide_on_wrong_side(configuration, front, turned)
-        if wrong is None:
-            return front
-        contacts = front.contacts.with_side(wrong, -front.contacts.side(wrong))
-        front = front.with_contacts(contacts)
-    failed = list(candidates) if wrong is None else [*candidates, wrong]
-    raise SimulationError(_failure(configuration, front, failed, JAMMED))
+
+    def on_sides(one: Front) -> tuple[Front, int | None]:
+        """Return the front with the modes for the sides of its guides, and a guide on the wrong."""
+        holding = holding_stops(configuration, one, candidates)
+        one = one.with_contacts(one.contacts.holding(holding))
+        one = _with_friction(configuration, one, candidates, slipped, turning)
+        return one, _guide_on_wrong_side(configuration, one, turned)
+
+    chosen, wrong = front, None
+    try:
+        for _ in range(MODE_ITERATIONS_MAX):
+            chosen, wrong = on_sides(chosen)
+            if wrong is None:
+                return chosen
+            contacts = chosen.contacts.with_side(wrong, -chosen.contacts.side(wrong))
+            chosen = chosen.with_contacts(contacts)
+        failed = list(candidates) if wrong is None else [*candidates, wrong]
+        raise SimulationError(_failure(configuration, front, failed, JAMMED))
+    except SimulationError:
+        for contacts in _all_sides(front, turned):
+            try:
+                chosen, wrong = on_sides(front.with_contacts(contacts))
+            except SimulationError:
+                continue
+            if wrong is None:
+                return chosen
+        raise
+
+
+def _all_sides(front: Front, turned: int | None) -> Iterator[ContactState]:
+    """Yield the contacts with all sides of the guides but ``turned``; none if there are too many.
+
+    The side of the first guide changes fastest.
+    """
+    contacts, stops = front.contacts, front.contacts.stops
+    every = range(stops, stops + len(contacts.sides))
+    guides = [c for c in every if front.equations.is_guide(c) and c != turned]
+    if not guides or 2 ** len(guides) > SIDES_TRIED_MAX:
+        return
+    for number in range(2 ** len(guides)):
+        for k, c in enumerate(guides):
+            contacts = contacts.with_side(c, -1 if number >> k & 1 else 1)
+        yield contacts
 
 
 def _guide_on_wrong_side(

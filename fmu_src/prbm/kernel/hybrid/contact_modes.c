@@ -579,8 +579,8 @@ static bool choose_by_forces(Simulation *sim, const HoldingSet *touching, const 
 
 /* Choose the modes of all contacts by their forces at the front.  The friction of a guide that slips
  * depends on the side to which it pushes: the side of the first wrong one at a time is changed. */
-static bool choose_all_modes(Simulation *sim, const HoldingSet *touching, const FrictionEvent *event,
-                             ContactMode *modes, Problem *problem) {
+static bool change_sides(Simulation *sim, const HoldingSet *touching, const FrictionEvent *event,
+                         ContactMode *modes, Problem *problem) {
     HoldingSet failed = *touching;
     for (int k = 0; k < MODE_ITERATIONS_MAX; k++) {
         int wrong;
@@ -595,6 +595,39 @@ static bool choose_all_modes(Simulation *sim, const HoldingSet *touching, const 
         failed.stops[touching->count] = wrong;
     }
     return contacts_fail(sim, &JAMMED, touching->count + 1, failed.stops, problem);
+}
+
+/* Choose the modes for any combination of the sides of the guides, except for the guide that has just
+ * turned; false if there are too many. */
+static bool choose_on_any_sides(Simulation *sim, const HoldingSet *touching,
+                                const FrictionEvent *event, ContactMode *modes) {
+    const System *system = system_of(sim);
+    int count = 0, guides[PLACES_MAX];
+    for (int i = 0; i < system->f; i++) {
+        if (is_guide(system, system->s + i) && system->s + i != event->turned) {
+            guides[count++] = i;
+        }
+    }
+    bool found = false;
+    for (int sides = 0; !found && count > 0 && count < (int)(8 * sizeof(int)) - 1 &&
+                        1 << count <= SIDES_TRIED_MAX && sides < 1 << count; sides++) {
+        Problem ignored;
+        int wrong = -1;
+        for (int k = 0; k < count; k++) {
+            sim->state.sides[guides[k]] = sides >> k & 1 ? -1 : 1;
+        }
+        found = choose_by_forces(sim, touching, event, modes, &ignored) &&
+                find_wrong_side(sim, modes, event->turned, &wrong, &ignored) && wrong < 0;
+    }
+    return found;
+}
+
+/* Choose the modes of all contacts by their forces at the front: by changes of one side at a time or,
+ * if they fail, for any combination of sides. */
+static bool choose_all_modes(Simulation *sim, const HoldingSet *touching, const FrictionEvent *event,
+                             ContactMode *modes, Problem *problem) {
+    return change_sides(sim, touching, event, modes, problem) ||
+           choose_on_any_sides(sim, touching, event, modes);
 }
 
 /* Remove the compliant stops that are pressed: they are no constraints. */
