@@ -421,9 +421,10 @@ class Equations:
     ) -> tuple[float, float]:
         """Return the friction force of a sticking contact, and its limit mu N [N]."""
         force = float(lam[self.first_stick + self.sticking.index(contact)])
-        if contact in self.held or self.is_guide(contact):
-            normal = float(lam[self.normal_row(contact)])
-            normal = normal if self.contacts.is_stop(contact) else abs(normal)
+        if contact in self.held:
+            return force, self.stop_friction[contact] * float(lam[self.normal_row(contact)])
+        if self.is_guide(contact):
+            normal = abs(float(lam[self.normal_row(contact)]))
             return force, self.friction_coefficient(contact) * normal
         return force, self.friction_limit(contact, e, pressure)
 
