@@ -196,10 +196,6 @@ def contact_forces(equations: Equations, e: Complex, found: Evaluation) -> Pulls
         pull = u * complex(-force, along)
         yield stop.body, pull
         yield stop.on, -pull
-    lines = {
-        guide.name: -1j * rows.normal
-        for guide, rows in zip(system.mechanism.guides, system.guided, strict=True)
-    }
     for k, part in enumerate(system.mechanism.rubbing):
         contact, carrier = equations.contacts.stops + k, int(system.rubs_on[k])
         if modes[contact] is ContactMode.STICK:
@@ -208,7 +204,10 @@ def contact_forces(equations: Equations, e: Complex, found: Evaluation) -> Pulls
             size = -modes[contact].slip * sliding_friction(equations, contact, e, found)
         else:
             continue
-        direction = lines[part.name] if isinstance(part, Guide) else unit(part.direction)
+        if isinstance(part, Guide):
+            direction = -1j * system.guided[system.mechanism.guides.index(part)].normal
+        else:
+            direction = unit(part.direction)
         pull = size * direction * (1.0 if carrier == FIXED else complex(e[carrier]))
         yield part.body, pull
         yield (part.on if isinstance(part, Guide) else GROUND), -pull
