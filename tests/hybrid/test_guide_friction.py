@@ -12,6 +12,7 @@ from exchange import assert_directional, integrate
 from guides import CRANK, ROD, cart, incline, mechanism, rough, slider_crank, slotted_arm, trammel
 from kernel_simulation import KernelSimulation
 from prbm.analysis.linear_model import linearize
+from prbm.base.errors import PrbmError
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.contact_state import ContactMode
 from prbm.mechanics.inputs import input_names
@@ -385,6 +386,8 @@ def test_a_loaded_guide_sticks_in_small_motions():
     coil = Spring("coil", "block.c", "ground.up", 50.0)
     loaded = linearize(rough(incline(10.0, (coil,)), 0.3), inputs=["push.x"], outputs=["block.x"])
     assert ("way", "sticking") in loaded.contacts
+    with pytest.raises(PrbmError, match="because friction holds the bodies at way:"):
+        loaded.default_range()
 
 
 def test_a_guide_changes_sides_only_while_it_slips():

@@ -150,7 +150,13 @@ class LinearModel:
         found = self.space.modes
         acting = found.frequency[found.frequency > found.rounding]
         if not len(acting):
-            raise ParameterError("no mode vibrates: give the range of frequencies of the response")
+            sticking = [name for name, how in self.contacts if how == "sticking"]
+            held = (
+                f", because friction holds the bodies at {', '.join(sticking)}" if sticking else ""
+            )
+            raise ParameterError(
+                f"no mode vibrates{held}: give the range of frequencies of the response"
+            )
         return 0.1 * float(acting[0]), 3.0 * float(acting[:6][-1])
 
     def measures(self, frequencies: Real, response: Complex) -> dict[tuple[str, str], Response]:
