@@ -105,6 +105,8 @@ class KernelSimulation:
         Parameters and inputs that differ from their defaults.
     exchange : bool
         Whether the simulation is for model exchange.
+    described : bool
+        Whether the tables describe the variables of FMI, which needs the start in Python.
     changes : tuple
         Changes of the sources of the kernel.
     """
@@ -117,6 +119,7 @@ class KernelSimulation:
         start_time: float = 0.0,
         tolerance: float = 0.0,
         exchange: bool = False,
+        described: bool = True,
         changes: Changes = (),
     ) -> None:
         self.tables, self.inner, self.states_of = None, None, None
@@ -127,7 +130,7 @@ class KernelSimulation:
         self.springs = len(mechanism.springs) if phased else 0
         chosen = independent(mechanism)
         self.slots = slots(mechanism, chosen)
-        data = tables(mechanism, interface(mechanism, {}), "token", chosen)
+        data = tables(mechanism, interface(mechanism, {}) if described else (), "token", chosen)
         self.tables = self.library.mechanism_open(data, len(data), self.sentence)
         self._check(self.tables is not None)
         self.inner = self.library.simulation_open(self.tables)
@@ -175,6 +178,11 @@ class KernelSimulation:
 
     def restore(self, state: np.ndarray) -> None:
         self.call("simulation_restore", pointer(state))
+
+    def pending(self) -> tuple[int, int, float]:
+        """Return kind, contact and time [s] of the pending event, see ``simulation_save``."""
+        kind, contact, _, time = self.state[5:9]
+        return int(kind), int(contact), float(time)
 
     def modes(self) -> list[int]:
         """Return the modes of all contacts."""

@@ -30,6 +30,8 @@ def moved(given: Mechanism, place, *, turn: float = 0.0, sign: float = 1.0) -> M
                 changes |= dict(zip(axes, (new.real, new.imag), strict=True))
         return changes
 
+    angle = given.release.angle
+    turned_release = {} if angle is None else {"angle": sign * angle}
     along = place(complex(*given.gravity)) - place(0j)
     return replace(
         given,
@@ -60,6 +62,6 @@ def moved(given: Mechanism, place, *, turn: float = 0.0, sign: float = 1.0) -> M
             direction(rub, normal_stiffness=sign * rub.normal_stiffness) for rub in given.frictions
         ),
         forces=tuple(replace(force, point=point(force.point)) for force in given.forces),
-        release=direction(given.release),
+        release=direction(given.release, **turned_release),
         gravity=(along.real, along.imag),
     )

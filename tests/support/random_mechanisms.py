@@ -8,10 +8,11 @@ chance::
     def test_...(mechanism): ...
 
     mechanism = seeded(7)                   # the same mechanism each time
+    mechanism = everything(7)               # the same with all kinds of parts and starts
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -28,6 +29,7 @@ from prbm.mechanism import flexure
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.flexure import CLAMP, FREE, PIN
 from prbm.mechanism.parts import (
+    COMPLIANT,
     GROUND,
     SIDES,
     Body,
@@ -59,6 +61,7 @@ MODELS = tuple((name, given) for name in flexure.MODELS for given in OPTIONS.get
 ENDS = ((CLAMP, CLAMP), (CLAMP, PIN), (PIN, CLAMP), (CLAMP, FREE), (FREE, CLAMP), (PIN, PIN))
 RUBBER = {"thickness": (2e-3, 3e-3), "modulus": (5e6, 4e7)}  # Axial modes of some hundred Hz.
 STEEL = {"thickness": (2e-4, 3e-4), "modulus": (1e9, 1e10)}
+DIRECTIONS = (0.0, 90.0, 180.0, 31.7, 200.3)  # deg
 MOBILITY_RATIO_MIN = 1e-2  # Mobility of the released body with loops over that without.
 
 
@@ -139,60 +142,58 @@ def build(
     springs: int = 0,
     guides: int = 0,
     torsion: bool = False,
+    adrift: bool = False,
+    varied: bool = False,
 ) -> Mechanism:
     """Return a mechanism, which may be over-constrained.
 
     ``bodies``, ``loops``, ``stops``, ``springs`` and ``guides`` are the largest numbers of these
     parts.  With ``free``, one or two more bodies fly freely, alone or connected to each other,
-    unless springs or guides hold them.  With ``torsion``, joints have springs and dampers.
+    unless springs or guides hold them.  With ``torsion``, joints have springs and dampers.  With
+    ``adrift``, nothing joins a body to the ground, and there is no gravity.  With ``varied``, there
+    are compliant stops, strained flexures, start values, weight, and all kinds of releases.
     """
     b = _Builder(choose, rng)
+    grounds = () if adrift else (GROUND,)
     for _ in range(choose((1, 2, 3))):
         b.add_type()
     names: list[str] = []
-    for k in range(choose(range(1, bodies + 1))):
+    for k in range(choose(range(2 if adrift else 1, bodies + 1))):
         name = b.add_body(complex(k, (0, 1, 0, -1)[k % 4]))
-        parent = choose((GROUND, *names))
-        b.connect(parent, name, joint=bool(names) and choose((False, True)))
+        if names or grounds:
+            parent = choose((*grounds, *names))
+            b.connect(parent, name, joint=bool(names) and choose((False, True)))
         names.append(name)
     for _ in range(choose(range(loops + 1))):
-        first, second = choose((GROUND, *names)), choose(names)
+        first, second = choose((*grounds, *names)), choose(names)
         if first != second:
             b.connect(first, second, joint=choose((False, False, True)))
     if free:
         names += _add_free_bodies(b)
-    directions = (0.0, 90.0, 180.0, 31.7, 200.3)
     coefficient = (0.0, 0.3) if friction else (0.0,)
-    walls = []
-    for i in range(choose(range(stops + 1))):
-        body, on = choose(names), choose((GROUND, *names))
-        z = b.near(body)
-        walls.append(
-            Stop(
-                f"stop{i}", body, (z.real, z.imag), choose(directions), b.real(1e-4, 8e-4),
-                b.real(-3e-3, 3e-3), choose((0.6, 0.0, 1.0)), choose(coefficient),
-                on=GROUND if on == body else on,
-            )
-        )  # fmt: skip
-    rubs = []
-    for i in range(choose((0, 1)) if friction else 0):
-        z = b.near(body := choose(names))
-        point = choose((None, (z.real, z.imag)))
-        rubs.append(Friction(f"rub{i}", body, choose(directions), 0.2, 0.1, 3.0, point))
+    walls = _stops(b, choose(range(stops + 1)), names, grounds, coefficient)
+    rubs = _rubs(b, choose((0, 1)) if friction and not adrift else 0, names)
     pushes = []
     for i in range(choose((0, 1, 2))):
         z = b.near(body := choose(names))
         pushes.append(Force(f"force{i}", body, choose((None, (z.real, z.imag)))))
+    if not b.points[names[-1]]:
+        b.point(names[-1], b.near(names[-1]))
     probes = [Probe("probe", f"{names[-1]}.p0")]
     aimed = [(stop.body, stop.direction) for stop in walls]
-    body, direction = choose((*aimed, *aimed, (choose(names), choose(directions))))
-    coils = [_spring(b, i, names) for i in range(choose(range(1, springs + 1)) if springs else 0)]
+    body, direction = choose((*aimed, *aimed, (choose(names), choose(DIRECTIONS))))
+    pairs = not adrift or len(names) > 1
+    coils = [
+        _spring(b, i, names, grounds)
+        for i in range(choose(range(1, springs + 1)) if springs and pairs else 0)
+    ]
     along = (None, 0.0, 0.2) if friction else (None,)
     ways = [
-        _guide(b, i, names, along) for i in range(choose(range(1, guides + 1)) if guides else 0)
+        _guide(b, i, names, along, grounds)
+        for i in range(choose(range(1, guides + 1)) if guides and pairs else 0)
     ]
     gravity = choose(((0.0, 0.0), (0.0, -1.0), (0.3, 0.4)))
-    return Mechanism(
+    made = Mechanism(
         name="Random",
         title="A random mechanism",
         ground=b.ground,
@@ -212,16 +213,109 @@ def build(
         forces=tuple(pushes),
         probes=tuple(probes),
         release=Release(body, direction, velocity=b.real(0.2, 0.6)),
-        gravity=gravity,
-        damping_zeta=choose((0.0, 0.02)) if damping and not free else 0.0,
+        gravity=(0.0, 0.0) if adrift else gravity,
+        damping_zeta=choose((0.0, 0.02)) if damping and not (free or adrift) else 0.0,
         damping_beta=choose((0.0, 1e-5)) if damping else 0.0,
     )
+    return _varied(b, made, adrift=adrift) if varied else made
 
 
-def _spring(b: _Builder, i: int, names: list[str]) -> Spring:
+def _stops(
+    b: _Builder,
+    count: int,
+    names: list[str],
+    grounds: Sequence[str],
+    coefficients: Sequence[float],
+) -> list[Stop]:
+    """Return stops on the ground or, if a body is drawn that is not the stopped one, on it."""
+    walls = []
+    for i in range(count):
+        body, on = b.choose(names), b.choose((*grounds, *names))
+        if not grounds and on == body:
+            continue
+        z = b.near(body)
+        walls.append(
+            Stop(
+                f"stop{i}", body, (z.real, z.imag), b.choose(DIRECTIONS), b.real(1e-4, 8e-4),
+                b.real(-3e-3, 3e-3), b.choose((0.6, 0.0, 1.0)), b.choose(coefficients),
+                on=GROUND if on == body else on,
+            )
+        )  # fmt: skip
+    return walls
+
+
+def _rubs(b: _Builder, count: int, names: list[str]) -> list[Friction]:
+    """Return friction points."""
+    rubs = []
+    for i in range(count):
+        z = b.near(body := b.choose(names))
+        point = b.choose((None, (z.real, z.imag)))
+        rubs.append(Friction(f"rub{i}", body, b.choose(DIRECTIONS), 0.2, 0.1, 3.0, point))
+    return rubs
+
+
+def _varied(b: _Builder, made: Mechanism, *, adrift: bool) -> Mechanism:
+    """Return the mechanism with more kinds of stops, flexures, guides, loads and starts."""
+    stops = tuple(_law(b, stop) for stop in made.stops)
+    types = tuple(
+        replace(kind, initial_strain=b.choose((None, b.real(-1e-4, 1e-4)))) if kind.axial else kind
+        for kind in made.flexure_types
+    )
+    guides = tuple(
+        replace(one, friction=b.choose((None, 0.1, 0.4, 1.3))) if one.friction else one
+        for one in made.guides
+    )
+    heavy = not adrift and b.choose((False, True))
+    made = replace(made, stops=stops, flexure_types=types, guides=guides)
+    made = replace(made, gravity=(1.7, -9.6)) if heavy else made
+    body, release = b.choose(made.bodies), made.release
+    kind = b.choose(("velocity", "velocity", "displacement", "angle", "mode", "positions", "rates"))
+    if kind == "displacement":
+        point = b.near(release.body)
+        release = replace(release, displacement=b.real(-3e-4, 3e-4), point=(point.real, point.imag))
+    elif kind == "angle":
+        release = replace(release, displacement=None, angle=b.real(-0.01, 0.01))
+    elif kind == "mode":
+        release = replace(release, displacement=None, mode=1, amplitude=b.real(-3e-4, 3e-4))
+    elif kind in ("positions", "rates"):
+        made = replace(made, bodies=_started(b, made.bodies, body, velocity=kind == "rates"))
+        release = replace(release, velocity=0.0) if kind == "rates" else release
+    return replace(made, release=release)
+
+
+def _law(b: _Builder, stop: Stop) -> Stop:
+    """Return a stop with another law, shift of its hit point, and coefficient of friction."""
+    friction = b.choose((stop.friction, 0.0, 0.9))
+    stop = replace(stop, offset=b.choose((0.0, b.real(-2e-3, 2e-3))), friction=friction)
+    exponent, stiffness = b.choose(((1.0, 3e4), (1.5, 2e6)))
+    if b.choose((False, False, True)):
+        restitution = max(0.3, float(stop.restitution))
+        return replace(
+            stop, law=COMPLIANT, restitution=restitution, exponent=exponent,
+            stiffness=stiffness * b.real(0.5, 2.0),
+        )  # fmt: skip
+    return stop
+
+
+def _started(
+    b: _Builder, bodies: Sequence[Body], chosen: Body, *, velocity: bool
+) -> tuple[Body, ...]:
+    """Return the bodies of which one has positions at the start, or velocities."""
+    size = 0.5 if velocity else 2e-4
+    names = ("start_omega", "start_vx", "start_vy") if velocity else (
+        "start_angle", "start_x", "start_y",
+    )  # fmt: skip
+    drawn = dict(zip(names, (b.real(-size, size) for _ in names), strict=True))
+    first = b.choose((0, 1, 1, 3))  # Only the angle, only the displacement, or all.
+    kept = names[:1] if first == 0 else names[1:] if first == 1 else names
+    given = {name: drawn[name] for name in kept}
+    return tuple(replace(body, **given) if body is chosen else body for body in bodies)
+
+
+def _spring(b: _Builder, i: int, names: list[str], grounds: Sequence[str]) -> Spring:
     """Return a soft spring between two bodies, or a body and the ground, with pretension or not."""
     body = b.choose(names)
-    other = b.choose([GROUND, *(name for name in names if name != body)])
+    other = b.choose([*grounds, *(name for name in names if name != body)])
     end = b.near(body)
     start = end + b.disc(CELL) if other == GROUND else b.near(other)
     free = b.choose((None, b.real(0.95, 1.05) * abs(end - start)))
@@ -240,10 +334,16 @@ def _torsion(b: _Builder, joint: Joint, *, damped: bool) -> Joint:
     return replace(joint, stiffness=stiffness, free_angle=free, damping=damping)
 
 
-def _guide(b: _Builder, i: int, names: list[str], frictions: Sequence[float | None]) -> Guide:
+def _guide(
+    b: _Builder,
+    i: int,
+    names: list[str],
+    frictions: Sequence[float | None],
+    grounds: Sequence[str],
+) -> Guide:
     """Return a guide of a point of a body, on a line of the ground or of another body."""
     body = b.choose(names)
-    other = b.choose([GROUND, *(name for name in names if name != body)])
+    other = b.choose([*grounds, *(name for name in names if name != body)])
     at = b.near(body)
     start = b.point(other, at)
     return Guide(
@@ -287,6 +387,11 @@ def starts(mechanism: Mechanism) -> bool:
         sim = Simulation(mechanism)
     except (EquilibriumError, ParameterError):
         return False
+    return moves(sim)
+
+
+def moves(sim: Simulation) -> bool:
+    """Return whether the released body can move along its release at the start."""
     system = sim.system
     e = system.directions(sim.front.q)
     M, _ = inertia(system.H, np.diag(system.J), e)
@@ -319,8 +424,8 @@ def mechanisms(draw, *, starting: bool = False, **most) -> Mechanism:
     return made
 
 
-def seeded(seed: int, *, starting: bool = True, **most) -> Mechanism:
-    """Return a valid mechanism that depends on the seed only."""
+def attempts(seed: int, **most) -> Iterator[Mechanism]:
+    """Yield valid mechanisms that can be assembled, which depend on the seed only."""
     rng = np.random.default_rng(seed)
 
     def choose(options: Sequence) -> object:
@@ -331,5 +436,26 @@ def seeded(seed: int, *, starting: bool = True, **most) -> Mechanism:
             made = build(choose, rng, **most)
         except PrbmError:
             continue
-        if assembles(made) and (not starting or starts(made)):
-            return replace(made, name=f"Random{seed}")
+        if assembles(made):
+            yield replace(made, name=f"Random{seed}")
+
+
+def seeded(seed: int, *, starting: bool = True, **most) -> Mechanism:
+    """Return a valid mechanism that depends on the seed only."""
+    return next(made for made in attempts(seed, **most) if not starting or starts(made))
+
+
+def varied_attempts(seed: int) -> Iterator[Mechanism]:
+    """Yield mechanisms that can be assembled, with parts of all kinds; a quarter is adrift."""
+    rng = np.random.default_rng([seed, 1])
+    free, torsion, adrift = rng.uniform(size=3) < (0.4, 0.7, 0.25)
+    springs, guides = int(rng.integers(3)), int(rng.integers(3))
+    return attempts(
+        seed, free=bool(free), torsion=bool(torsion), springs=springs, guides=guides,
+        adrift=bool(adrift), varied=True,
+    )  # fmt: skip
+
+
+def everything(seed: int) -> Mechanism:
+    """Return a mechanism with parts of all kinds, which depends on the seed only."""
+    return next(made for made in varied_attempts(seed) if starts(made))

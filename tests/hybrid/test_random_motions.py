@@ -1,0 +1,28 @@
+"""Random mechanisms with parts of all kinds obey the laws of :mod:`random_motions`."""
+
+import pytest
+
+from random_motions import Findings, judge
+
+SEEDS = (9, 11, 22)
+FURTHER_SEEDS = range(23, 44)
+COSTLY_SEEDS = (23,)  # The searches for their equilibria take minutes.
+
+
+@pytest.mark.native
+@pytest.mark.parametrize(
+    "seed",
+    [
+        *SEEDS,
+        *(
+            pytest.param(seed, marks=pytest.mark.slow)
+            for seed in FURTHER_SEEDS
+            if seed not in COSTLY_SEEDS
+        ),
+    ],
+)
+def test_a_random_mechanism_obeys_the_laws_of_motion_in_both_engines(seed):
+    findings = Findings()
+    judge(seed, findings)
+    assert not findings.failures
+    assert findings.results
