@@ -9,7 +9,19 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from exchange import assert_directional, integrate
-from guides import CRANK, ROD, cart, incline, mechanism, rough, slider_crank, slotted_arm, trammel
+from guides import (
+    CRANK,
+    ROD,
+    cart,
+    energy,
+    incline,
+    mechanism,
+    rough,
+    slider_crank,
+    slotted_arm,
+    start,
+    trammel,
+)
 from kernel_simulation import KernelSimulation
 from prbm.analysis.linear_model import linearize
 from prbm.base.errors import PrbmError
@@ -17,21 +29,11 @@ from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.contact_state import ContactMode
 from prbm.mechanics.inputs import input_names
 from prbm.mechanism.parts import Body, Force, Guide, Release, Spring
-from prbm.runs.engine import simulation as started
 
 G = 9.81
 engines = pytest.mark.parametrize(
     "engine", ["python", pytest.param("kernel", marks=pytest.mark.native)]
 )
-
-
-def start(model, engine, tolerance=1e-11, changes=None):
-    return started(model, changes or {}, engine=engine, tolerance=tolerance)
-
-
-def energy(out):
-    kinds = ("kinetic", "elastic", "gravitational", "dissipated")
-    return sum(out[f"energy.{kind}"] for kind in kinds)
 
 
 @engines

@@ -9,28 +9,18 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 
 from exchange import assert_directional, integrate
-from guides import CRANK, ROD, cart, incline, slider_crank, slotted_arm, trammel
+from guides import CRANK, ROD, cart, energy, incline, slider_crank, slotted_arm, start, trammel
 from kernel_simulation import KernelSimulation
 from moved_drawings import moved
 from prbm.base.errors import PrbmError
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.inputs import input_names
 from prbm.mechanism.parts import Body, Guide, Joint, Spring, Stop
-from prbm.runs.engine import simulation as started
 
 G = 9.81
 engines = pytest.mark.parametrize(
     "engine", ["python", pytest.param("kernel", marks=pytest.mark.native)]
 )
-
-
-def start(model, engine, tolerance=1e-11, changes=None):
-    return started(model, changes or {}, engine=engine, tolerance=tolerance)
-
-
-def energy(out):
-    kinds = ("kinetic", "elastic", "gravitational", "dissipated")
-    return sum(out[f"energy.{kind}"] for kind in kinds)
 
 
 @engines

@@ -6,6 +6,7 @@ from dataclasses import replace
 from many_parts import anvil
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.parts import Body, Force, Guide, Joint, Probe, Release, Spring
+from prbm.runs.engine import simulation
 
 CRANK, ROD = 0.1, 0.3  # m, lengths of the links of the slider-crank.
 
@@ -130,3 +131,14 @@ def beaded():
 def rough(model, friction):
     """Return a mechanism whose guides have a coefficient of friction."""
     return replace(model, guides=tuple(replace(g, friction=friction) for g in model.guides))
+
+
+def start(model, engine, tolerance=1e-11, changes=None):
+    """Return a simulation of a mechanism in an engine."""
+    return simulation(model, changes or {}, engine=engine, tolerance=tolerance)
+
+
+def energy(out):
+    """Return kinetic, elastic, gravitational and dissipated energy [J], without the work."""
+    kinds = ("kinetic", "elastic", "gravitational", "dissipated")
+    return sum(out[f"energy.{kind}"] for kind in kinds)
