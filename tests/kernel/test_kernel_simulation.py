@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from guides import various
 from kernel_simulation import KernelMistake, KernelSimulation, library
 from many_parts import anvil, beams, elastic, profiles, two_stops
 from prbm.base.errors import PrbmError
@@ -185,9 +186,17 @@ def test_a_restored_state_continues_bit_by_bit(model):
         kernel.restore(state)
 
 
-def test_a_damaged_state_is_rejected_and_a_valid_one_can_still_be_restored():
-    kernel = KernelSimulation(mechanism("PRBDM2R"))
-    kernel.advance(0.05)
+@pytest.mark.parametrize(
+    ("model", "time"),
+    [
+        (lambda: mechanism("PRBDM2R"), 0.05),
+        pytest.param(various, 1e-3, marks=pytest.mark.slow),
+    ],
+    ids=["2R", "parts"],
+)
+def test_a_damaged_state_is_rejected_and_a_valid_one_can_still_be_restored(model, time):
+    kernel = KernelSimulation(model())
+    kernel.advance(time)
     state, rng = kernel.state, np.random.default_rng(0)
     rejected = 0
     for _ in range(300):
@@ -195,7 +204,7 @@ def test_a_damaged_state_is_rejected_and_a_valid_one_can_still_be_restored():
         damaged[rng.integers(len(state))] = rng.choice([np.nan, np.inf, -1.0, 1e300, 0.5])
         try:
             kernel.restore(damaged)
-            kernel.advance(max(kernel.get("time"), 0.05) + 1e-3)
+            kernel.advance(max(kernel.get("time"), time) + time / 50)
         except KernelMistake:
             rejected += 1
         kernel.restore(state)

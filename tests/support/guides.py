@@ -128,6 +128,22 @@ def beaded():
     )  # fmt: skip
 
 
+def various():
+    """Return the beaded mechanism with a flap on a joint with torsion, and springs of each kind."""
+    model = beaded()
+    stage = next(body for body in model.bodies if body.name == "stage")
+    x, y = stage.points["left"]
+    flap = Body(
+        "flap", 3e-3, 1e-7, (f"{x} + 0.002", y), {"h": (x, y)}, start_omega=0.3,
+    )  # fmt: skip
+    coil, pair = model.springs
+    return replace(
+        model, name="Various", bodies=(*model.bodies, flap),
+        joints=(*model.joints, Joint("hinge", "stage.left", "flap.h", 1e-3, 0.1, 1e-6)),
+        springs=(replace(coil, acts="tension"), replace(pair, acts="compression")),
+    )  # fmt: skip
+
+
 def rough(model, friction):
     """Return a mechanism whose guides have a coefficient of friction."""
     return replace(model, guides=tuple(replace(g, friction=friction) for g in model.guides))
