@@ -29,6 +29,7 @@ from c_importer import (
     native,
     needs,
 )
+from guides import various
 from many_parts import elastic
 from prbm.interface.tables import tables
 from prbm.mechanics.independent import independent
@@ -132,9 +133,11 @@ def fuzz_tables(folder: Path, seconds: float, seed: int) -> Found:
         content = (native(model, 3) / "resources" / "mechanism.bin").read_bytes()
         seeds.append(corpus / f"{model}.bin")
         seeds[-1].write_bytes(content)
-    whole = elastic()  # It has parts that the other models lack: a joint, a bar, a chain.
-    seeds.append(corpus / f"{whole.name}.bin")
-    seeds[-1].write_bytes(tables(whole, (), "token", independent(whole)))
+    # They have parts that the other models lack: a joint, a bar, a chain; guides with friction,
+    # torsion, springs that act on one side, start values.
+    for whole in (elastic(), various()):
+        seeds.append(corpus / f"{whole.name}.bin")
+        seeds[-1].write_bytes(tables(whole, (), "token", independent(whole)))
     target = _target("tables")
     if has_libfuzzer():
         longest = 2 * max(path.stat().st_size for path in seeds)
