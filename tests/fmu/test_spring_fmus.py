@@ -2,18 +2,15 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 
-from fmu_host import simulate_fmu
-from prbm.hybrid.simulation import Simulation
+from fmu_motion import Motion
 from prbm.mechanism.parts import Stop
 from springs import one_sided
 from support import own_fmu
 
-END, STEP = 0.2, 2e-3
 STARTS = {"two.stiffness": 90.0, "one.free_length": 0.09, "three.cubic_stiffness": 2e4}
 OUTPUTS = (
     "plate.x", "ring.angle", "one.force", "two.length", "four.length_rate", "energy.elastic",
@@ -49,12 +46,8 @@ def fmu(kind, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def expected(kind):
-    simulation, rows = Simulation(walled(kind[1]), STARTS), []
-    for k in range(round(END / STEP) + 1):
-        simulation.advance(k * STEP)
-        rows.append(simulation.outputs())
-    return rows
+def motion(kind):
+    return Motion(walled(kind[1]), STARTS, OUTPUTS, 0.2)
 
 
 def test_springs_are_parameters_and_outputs(fmu):
@@ -81,25 +74,10 @@ def test_one_sided_springs_have_event_indicators(kind, fmu):
     assert description.numberOfEventIndicators == len(names) == 3 + 5 - kind[1].count("both")
 
 
-def test_the_fmu_equals_the_engine_with_other_start_values(fmu, expected):
-    result = simulate_fmu(
-        str(fmu), fmi_type="CoSimulation", stop_time=END, output_interval=STEP, output=OUTPUTS,
-        start_values=STARTS,
-    )  # fmt: skip
-    assert expected[-1]["wall.impact_count"] > 0
-    for name in OUTPUTS:
-        wanted = np.array([row[name] for row in expected])
-        assert np.abs(result[name] - wanted).max() <= 1e-5 * max(1e-3, np.abs(wanted).max()), name
+def test_the_fmu_equals_the_engine_with_other_start_values(fmu, motion):
+    assert motion.expected[-1]["wall.impact_count"] > 0
+    motion.check_co_simulation(fmu)
 
 
-def test_model_exchange_equals_co_simulation(fmu, expected):
-    if read_model_description(str(fmu)).modelExchange is None:
-        pytest.skip("co-simulation only")
-    result = simulate_fmu(
-        str(fmu), fmi_type="ModelExchange", stop_time=END, output_interval=STEP, output=OUTPUTS,
-        start_values=STARTS, relative_tolerance=1e-9,
-    )  # fmt: skip
-    assert result["wall.impact_count"][-1] == expected[-1]["wall.impact_count"]
-    for name in OUTPUTS[:-1]:
-        wanted = expected[-1][name]
-        assert result[name][-1] == pytest.approx(wanted, rel=1e-4, abs=1e-6), name
+def test_model_exchange_equals_co_simulation(fmu, motion):
+    motion.check_model_exchange(fmu)
