@@ -7,9 +7,11 @@ The coordinates of a mechanism depend on the version: a beam that closes a loop 
 either end.  Its mass points do not, so that they give the state.  The new version draws states on
 the constraints.  The old one solves for its coordinates with the same positions and velocities of
 all mass points and bodies, and computes the accelerations of the points, too.  The differences are
-relative to the largest acceleration, and in units of the spread that round-off allows: epsilon
-times the condition of the scaled equations, and the change by the remaining difference of the
-states.  A mechanism with nodes at other places in the old version is not compared.
+relative to the largest acceleration, and in units of the spread that round-off allows.  This is
+epsilon times the condition of the scaled equations times the norm of their solution, multipliers
+included, and the change by the remaining difference of the states.  A mechanism with nodes at other
+places in the old version is not compared, and neither is a state that the old one does not find, or
+in which a part is half a turn or more from its drawing.
 """
 
 import argparse
@@ -27,7 +29,7 @@ MODELS = (
     "FoldedSuspension", "Bistable",
 )  # fmt: skip
 SAME = 1e-11  # Largest relative difference of positions and velocities of a state.
-SPREAD = 100.0  # Largest difference in units of epsilon times the condition.
+SPREAD = 10.0  # Largest difference in units of the spread.
 COMMON = """
 import pickle, sys
 import numpy as np
@@ -52,8 +54,12 @@ def points(system, q):
     J = 1j * A[:, system.arm] * e
     return c + A[:, arms] @ e[arms], J @ system.Phi.of(np.eye(system.n)).T
 
+def turned(system, q):
+    "Return whether a part is half a turn or more from its drawn direction."
+    return np.abs(system.Phi.of(q - system.q0)).max() > np.pi
+
 def solved(system, equations, q, v):
-    "Return the accelerations of the mass points and the condition of the equations."
+    "Return the accelerations of the mass points, and the spread by rounding of their solution."
     e, (_, J) = system.directions(q), points(system, q)
     turn, arms = system.Phi.of(v), system.arm == np.arange(system.A.shape[1])
     w = turn.astype(complex) * arms
@@ -64,7 +70,11 @@ def solved(system, equations, q, v):
     scale = 1.0 / np.sqrt(found.M.diagonal())
     scale = np.append(scale, 1.0 / np.abs(rows * scale).max(axis=1))
     bent = system.A[:, arms] @ (w[arms] ** 2 * e[arms])
-    return (J @ found.a)[: len(bent)] - bent, float(np.linalg.cond(scale[:, None] * kkt * scale))
+    solution = np.linalg.norm(np.append(found.a, found.lam) / scale)
+    reach = np.linalg.norm(J[: len(bent)] * scale[: system.n], axis=1).max()
+    condition = np.linalg.cond(scale[:, None] * kkt * scale)
+    spread = np.finfo(float).eps * condition * solution * reach
+    return (J @ found.a)[: len(bent)] - bent, float(spread)
 """
 MAKE = """
 import sys
@@ -90,6 +100,8 @@ for k, (name, mechanism) in enumerate(given.items()):
         y[n : 2 * n] = rng.normal(size=n)
         try:
             y = equations.project(0.0, y)
+            if turned(system, y[:n]):
+                continue
             z, J = points(system, y[:n])
             v = y[n : 2 * n]
             states.append((z, J @ v, *solved(system, equations, y[:n], v)))
@@ -112,7 +124,7 @@ for name, straight, masses, states in drawn:
     fits = len(mine) == len(straight) and len(own) == p and apart[own, theirs].max() < 1e-9
     order = np.append(theirs[np.argsort(own)], np.arange(len(masses), len(straight)))
     rng = np.random.default_rng(0)
-    for z, speed, acceleration, condition in states if fits else ():
+    for z, speed, acceleration, spread in states if fits else ():
         q, real = system.q0.copy(), lambda x: np.concatenate([x.real, x.imag])
         for _ in range(20):
             now, J = points(system, q)
@@ -124,12 +136,21 @@ for name, straight, masses, states in drawn:
         v = np.linalg.lstsq(real(J), real(speed[order]), rcond=1e-10)[0]
         off = max(np.abs(z[order] - now).max() / system.length,
                   np.abs(J @ v - speed[order]).max() / np.abs(speed).max())
+        if turned(system, q) or not off < float(sys.argv[1]):
+            found.append((1.0, 0.0, 1.0))
+            continue
         a, other = solved(system, equations, q, v)
         largest = np.abs(acceleration).max()
         error = np.abs(a - acceleration[order[:p]]).max() / largest
-        near = [x + 1e-7 * np.abs(x).max() * rng.normal(size=len(x)) for x in (q, v)]
-        change = np.abs(solved(system, equations, *near)[0] - a).max() / largest / 1e-7
-        found.append((off, error, np.finfo(float).eps * max(condition, other) + off * change))
+        loosest = 1.0 / np.linalg.svd(real(J), compute_uv=False)[-1]  # Change of q by one of z.
+        change = 0.0
+        for x, size in ((q, system.length), (v, np.abs(speed).max())):
+            step = 1e-7 * max(1.0, np.abs(x).max()) * rng.normal(size=len(x))
+            near = (q + step, v) if x is q else (q, v + step)
+            each = np.abs(solved(system, equations, *near)[0] - a).max() / np.abs(step).max()
+            change += (off + np.finfo(float).eps) * size * loosest * each
+        spread = (max(spread, other) + change) / largest
+        found.append((off, error, spread))
     pickle.dump((name, found), sys.stdout.buffer)
 """
 
@@ -170,7 +191,7 @@ def main() -> int:
     # Mechanisms are pickled by the old version; new fields have their defaults.
     given = pickle.loads(run(old, MAKE, support, str(options.random), *names))
     drawn = unpickled(run(new, DRAW, given=(given, options.states)))
-    found = unpickled(run(old, SOLVE, given=(given, drawn)))
+    found = unpickled(run(old, SOLVE, str(SAME), given=(given, drawn)))
     total, good = 0, True
     for name, states in found:
         if not states:
