@@ -14,6 +14,7 @@ PRBM RowIntervals place_intervals(const System *system, size_t rows, Memory *mem
     result.directions = result.coordinates;
     if (system->mapped) {
         result.directions.first = place(memory, rows + 1, sizeof(int));
+        result.directions.repeats = place(memory, rows, sizeof(bool));
         result.directions.list = place(memory, rows * branches, sizeof(Interval));
     }
     result.used = place(memory, n > d ? n : d, sizeof(bool));
@@ -84,15 +85,29 @@ static bool repeats(const Intervals *intervals, int k) {
     return same;
 }
 
+/* Give each row one interval, of all columns. */
+static void set_whole(int count, int end, Intervals *result) {
+    for (int k = 0; k < count; k++) {
+        result->first[k + 1] = k + 1;
+        result->list[k] = (Interval){0, end, FIXED};
+        result->repeats[k] = k > 0;
+    }
+}
+
 PRBM void set_intervals(const Rows *rows, bool whole, RowIntervals *intervals) {
     const System *system = rows->system;
     bool *used = intervals->used;
     intervals->directions.first[0] = intervals->coordinates.first[0] = 0;
+    if (whole) {
+        set_whole(rows->count, system->wide, &intervals->directions);
+        set_whole(rows->count, system->even, &intervals->coordinates);
+        return;
+    }
     for (int k = 0; k < rows->count; k++) {
         const Complex *B = rows->B + k * system->d;
         for (int j = 0; j < system->d; j++) {
             Complex arm = B[arm_of(system, j)];
-            used[j] = whole || arm.re != 0.0 || arm.im != 0.0 || j == seen_from(rows, k);
+            used[j] = arm.re != 0.0 || arm.im != 0.0 || j == seen_from(rows, k);
         }
         if (system->mapped) {
             add_branches(system, used, k, &intervals->directions);

@@ -14,7 +14,7 @@ typedef struct {
 typedef struct {
     int *first; /* (count + 1,) */
     Interval *list;
-    bool *repeats; /* (count,) of coordinates: whether a row has those of the row before it */
+    bool *repeats; /* (count,): whether a row has those of the row before it */
 } Intervals;
 
 /* The intervals of the rows by the directions, and of U^-1 rows^T, with the factor U of the mass
@@ -25,7 +25,7 @@ typedef struct {
 } RowIntervals;
 
 PRBM RowIntervals place_intervals(const System *system, size_t rows, Memory *memory);
-/* Set the intervals of rows.  If whole, they have all columns. */
+/* Set the intervals of rows.  If whole, each row has one, of all columns, without a branch. */
 PRBM void set_intervals(const Rows *rows, bool whole, RowIntervals *intervals);
 /* Return the product of row k of x, or of D x, with y; D is diagonal. */
 PRBM double interval_product(const Intervals *intervals, int k, const double *x, const double *y);

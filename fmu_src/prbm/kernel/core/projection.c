@@ -69,23 +69,30 @@ PRBM void correction_place(Correction *correction, const System *system, Memory 
     zero_placed(memory, begin);
 }
 
+/* The product of an active row with a vector, both of the padded length even. */
+SIZED double product_of_row(int even, const Equations *eq, const Intervals *intervals, int k,
+                            const double *row, const double *x) {
+    return eq->dense ? even_dot(even, row, x) : interval_product(intervals, k, row, x);
+}
+
 /* The value of an active row without its constant. */
-static double active_value(const Equations *eq, const Kinematics *at, int k) {
+SIZED double active_value(int even, const Equations *eq, const Kinematics *at, int k) {
     if (has_shared_arms(eq->system) || eq->on[k] != FIXED) {
         return row_value(&eq->active, k, at->e);
     }
-    Parts B = parts_from(eq->B_conjugate, k * eq->system->wide);
-    return interval_product(&eq->intervals.directions, k, B.re, at->e_parts.re) +
-           interval_product(&eq->intervals.directions, k, B.im, at->e_parts.im);
+    const int wide = eq->system->mapped ? eq->system->wide : even;
+    Parts B = parts_from(eq->B_conjugate, k * wide);
+    return product_of_row(wide, eq, &eq->intervals.directions, k, B.re, at->e_parts.re) +
+           product_of_row(wide, eq, &eq->intervals.directions, k, B.im, at->e_parts.im);
 }
 
 /* Compute the residuals of the positions, and return the largest magnitude. */
-static double position_residuals(const Equations *eq, const Kinematics *at, double t,
-                                 double *residual) {
+SIZED double position_residuals(int even, const Equations *eq, const Kinematics *at, double t,
+                                double *residual) {
     double worst = 0.0;
     for (int k = 0; k < eq->r; k++) {
         bool placed = k < eq->first_stick;
-        residual[k] = placed ? -(active_value(eq, at, k) + offset(eq, k, t)) : 0.0;
+        residual[k] = placed ? -(active_value(even, eq, at, k) + offset(eq, k, t)) : 0.0;
         worst = fabs(residual[k]) <= worst ? worst : fabs(residual[k]); /* a NaN stays */
     }
     return worst;
@@ -104,8 +111,8 @@ SIZED void velocity_residuals(int even, const Equations *eq, double t, Correctio
         rows_dispatch(even, eq, &c->at, c->rows, c->convective);
     }
     for (int k = 0; k < eq->r; k++) {
-        double rate =
-            interval_product(&eq->intervals.coordinates, k, c->rows + k * even, c->at.speed);
+        double rate = product_of_row(even, eq, &eq->intervals.coordinates, k, c->rows + k * even,
+                                     c->at.speed);
         c->residual[k] = -(rate + prescribed(eq, k, t));
     }
 }
@@ -127,11 +134,11 @@ SIZED void correct(int even, const Equations *eq, const Factors *factors, Correc
 SIZED bool corrected_of_length(int even, const Equations *eq, const Evaluation *evaluation,
                                const Reference *near, double t, double *y, Correction *c) {
     int n = eq->system->n;
-    position_residuals(eq, &evaluation->at, t, c->residual);
+    position_residuals(even, eq, &evaluation->at, t, c->residual);
     correct(even, eq, &evaluation->factors, c, y);
     pad_of(even, n, y, c->at.angle);
     arms_at(even, eq->system, near, &c->at);
-    double worst = position_residuals(eq, &c->at, t, c->residual);
+    double worst = position_residuals(even, eq, &c->at, t, c->residual);
     if (!(worst <= CONSTRAINT_RTOL * eq->system->length)) {
         return false;
     }
