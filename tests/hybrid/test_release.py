@@ -17,13 +17,20 @@ from prbm.mechanics.assembly import assemble
 from prbm.mechanics.forces import springs
 from prbm.mechanics.modal import modes
 from prbm.mechanics.statics import equilibrium
-from prbm.mechanism.parts import Release
+from prbm.mechanism.parts import Body, Release
 from support import SUPPORT, mechanism
 
 PIVOT = read_mechanism(SUPPORT / "pivot.toml")
 FINGER = read_mechanism(SUPPORT / "finger.toml")
 GUIDE = mechanism("PRBDM2R")
 GUIDE = replace(GUIDE, stops=(replace(GUIDE.stops[0], position=0.1),))  # Behind the rest.
+OFF_PIVOT = replace(
+    PIVOT,
+    geometry=tuple(
+        replace(p, value=5e-3) if p.name == "eccentricity" else p for p in PIVOT.geometry
+    ),
+    release=Release("wheel", 90.0, 1e-4),
+)
 RIM, TIP = ("span", "span/2"), (0.02, -0.01)
 FAR = {"stop.position": 0.1}
 
@@ -167,15 +174,20 @@ def test_a_centre_of_mass_off_the_pivot_can_be_displaced():
     assert equilibrium(system, 1e-4).q[system.released.j] == pytest.approx(0.02, rel=0.05)
 
 
+@pytest.mark.parametrize("simulation", [Simulation, KernelSimulation])
+def test_a_body_that_flies_freely_does_not_change_whether_a_point_can_be_displaced(simulation):
+    flying = Body("flying", 0.01, 1e-6, (0.1, 0.1), {})
+    model = replace(OFF_PIVOT, bodies=(*PIVOT.bodies, flying))
+    assert simulation(model).outputs()["wheel.angle"] == pytest.approx(0.02, rel=0.05)
+    with pytest.raises((PrbmError, KernelMistake), match="turns the body wheel about its"):
+        simulation(model, {"eccentricity": 1e-4})
+
+
 def test_the_kernel_rejects_starts_that_changed_parameters_make_impossible():
     """An FMU gets these values after its export."""
-    geometry = tuple(
-        replace(p, value=5e-3) if p.name == "eccentricity" else p for p in PIVOT.geometry
-    )
-    wheel = replace(PIVOT, geometry=geometry, release=Release("wheel", 90.0, 1e-4))
     guide = replace(GUIDE, release=Release("shuttle", 90.0, mode=1, amplitude=1e-5))
     for model, changes, message in (
-        (wheel, {"eccentricity": 1e-4}, "turns the body wheel about its released point"),
+        (OFF_PIVOT, {"eccentricity": 1e-4}, "turns the body wheel about its released point"),
         (guide, FAR | {"gravity.x": 0.0}, "this mode does not move the released point of shuttle"),
         (guide, FAR | {"release.amplitude": 0.01}, "no shape along mode 1 has this amplitude"),
     ):

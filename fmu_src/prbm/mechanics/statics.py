@@ -557,9 +557,10 @@ def turns_about_point(system: System) -> bool:
         return False
     e = system.directions(system.q0)
     row = system.gradient(system.release, e)
+    row[system.placed] = 0.0
     loops = system.loop_rows.jacobian(e)
     try:
-        kkt = constraints.saddle(Elements(system).drawn, loops, loops)
+        kkt = _placed(system, constraints.saddle(Elements(system).drawn, loops, loops))
         right = np.append(row, np.zeros(len(loops)))
         response = constraints.solve(kkt, right, system.n, system.length)[: system.n]
     except SimulationError:  # A body without a spring, for instance on a pin.
