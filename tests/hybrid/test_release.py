@@ -13,8 +13,10 @@ from prbm.files.mechanism_file import read_mechanism
 from prbm.fmu.slave.resolved import mechanism_from, resolved
 from prbm.fmu.start import interface
 from prbm.hybrid.simulation import Simulation
+from prbm.mechanics import independent as independent_coordinates
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.forces import springs
+from prbm.mechanics.independent import independent
 from prbm.mechanics.modal import modes
 from prbm.mechanics.statics import equilibrium
 from prbm.mechanism.parts import Body, Release
@@ -181,6 +183,24 @@ def test_a_body_that_flies_freely_does_not_change_whether_a_point_can_be_displac
     assert simulation(model).outputs()["wheel.angle"] == pytest.approx(0.02, rel=0.05)
     with pytest.raises((PrbmError, KernelMistake), match="turns the body wheel about its"):
         simulation(model, {"eccentricity": 1e-4})
+
+
+def test_a_shape_on_the_way_to_the_release_need_not_exist(monkeypatch):
+    """The motion begins in the released shape."""
+    expected = independent(PIVOT)
+    found = {1.0: None, 0.5: None, 0.0: None}
+
+    def start_shape(system, values, fraction=1.0):
+        if found[fraction] is None:
+            raise EquilibriumError(f"no shape at {fraction}")
+        return found[fraction]
+
+    system = assemble(PIVOT, PIVOT.values())
+    monkeypatch.setattr(independent_coordinates, "start_shape", start_shape)
+    with pytest.raises(EquilibriumError, match=r"no shape at 1\.0"):
+        independent(PIVOT)
+    found[1.0] = system.q0
+    assert independent(PIVOT) == expected
 
 
 def test_the_kernel_rejects_starts_that_changed_parameters_make_impossible():

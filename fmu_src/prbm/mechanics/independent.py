@@ -12,10 +12,11 @@ shapes between the straight shape and the release.  Coordinates that the mechani
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 
 import numpy as np
 
-from ..base.errors import MechanismError
+from ..base.errors import EquilibriumError, MechanismError
 from ..base.names import unknown
 from ..base.tolerances import DEPENDENT_PIVOT_RTOL
 from ..mechanism.description import Mechanism
@@ -24,7 +25,7 @@ from .assembly import assemble
 from .start import start_shape
 from .system import System
 
-SHAPES = (0.0, 0.5, 1.0)  # Fractions of the displacement, angle or amplitude of the release.
+SHAPES = (0.0, 0.5)  # Fractions of the displacement, angle or amplitude before the release.
 
 
 def independent(mechanism: Mechanism) -> tuple[int, ...]:
@@ -84,11 +85,18 @@ def named_states(system: System) -> list[int]:
 
 
 def _jacobians(system: System, values: Mapping[str, float]) -> Iterator[Real]:
-    """Yield the Jacobian of the loops at the straight shape and towards the release."""
+    """Yield the Jacobian of the loops at the straight shape and towards the release.
+
+    The motion begins in the released shape, which therefore has to exist.  A shape on the way to it
+    that is not found is left out.
+    """
     loops = system.loop_rows
     yield loops.jacobian(system.directions(system.q0))
     # The released shape comes first, so that an error message has its value.
-    shapes = [start_shape(system, values, fraction) for fraction in reversed(SHAPES)]
+    shapes = [start_shape(system, values)]
+    for fraction in reversed(SHAPES):
+        with suppress(EquilibriumError):
+            shapes.append(start_shape(system, values, fraction))
     for q in reversed(shapes):
         yield loops.jacobian(system.directions(q))
 
