@@ -172,6 +172,27 @@ def test_an_impact_changes_the_phase_of_a_damped_spring_at_once(engine):
 
 
 @engines
+@pytest.mark.parametrize("tolerance", [1e-5, 1e-9])
+def test_a_stretched_spring_never_pushes_however_its_damper_moves(engine, tolerance):
+    """It lags while the damper would push, and acts again: the force is max(0, k x + c x')."""
+    k, c, length = 20.0, 4.0, 0.07
+    model = oscillator()
+    rod = Spring("rod", *(model.springs[0].start, model.springs[0].end), k, length, damping=c,
+                 acts="tension")  # fmt: skip
+    model = replace(model, springs=(*model.springs, rod))
+    sim = started(model, tolerance=tolerance, engine=engine)
+    signs = []
+    for t in np.linspace(0.0, 0.4, 17).tolist():
+        sim.advance(t)
+        out = sim.outputs()
+        force = k * (out["rod.length"] - length) + c * out["rod.length_rate"]
+        assert out["rod.length"] > length
+        assert out["rod.force"] == pytest.approx(max(0.0, force), abs=1e-3 * tolerance**0.25)
+        signs.append(force > 0.0)
+    assert np.count_nonzero(np.diff(signs)) == 2
+
+
+@engines
 @pytest.mark.parametrize("c", [0.0, 5.0])
 def test_a_block_at_the_free_length_stays_there_without_events(engine, c):
     found, sim = events(engine, hanging(c), 0.0)

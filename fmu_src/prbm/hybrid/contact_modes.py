@@ -77,7 +77,7 @@ def slip(configuration: Configuration, front: Front, contact: int) -> Front:
 
 def act(configuration: Configuration, front: Front, spring: int) -> Front:
     """Return the front after a spring has begun or ceased to act."""
-    return choose_modes(configuration, spring_phases.switched(front, spring))
+    return choose_modes(configuration, spring_phases.switched(front, spring), switched=spring)
 
 
 def reverse(configuration: Configuration, front: Front, contact: int) -> Front:
@@ -93,6 +93,7 @@ def choose_modes(
     slipped: int | None = None,
     reversing: int | None = None,
     turned: int | None = None,
+    switched: int | None = None,
 ) -> Front:
     """Return the front with the modes of all contacts chosen anew.
 
@@ -110,6 +111,8 @@ def choose_modes(
         A contact whose sliding velocity has fallen to zero.
     turned : int or None
         A guide that has changed its side: its force is round-off, and does not change it back.
+    switched : int or None
+        A spring that has begun or ceased to act, likewise.
 
     The phases of springs follow the rates, which an impact changes.
 
@@ -118,7 +121,7 @@ def choose_modes(
     SimulationError
         If no forces satisfy the laws of all contacts, or the equations are singular.
     """
-    front = spring_phases.rephased(configuration, front)
+    front = spring_phases.rephased(configuration, front, switched)
     turning = {} if reversing is None else {reversing: _slide_acceleration(front, reversing)}
     candidates, before = _candidates(configuration, front, resting), None
     for _ in range(MODE_ITERATIONS_MAX):

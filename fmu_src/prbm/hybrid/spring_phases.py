@@ -100,15 +100,21 @@ def _force_time(view: StepView, guard: Guard, spring: int) -> float | None:
 
 
 def switched(front: Front, spring: int) -> Front:
-    """Return the front with the phase of a spring after its guard has fallen."""
+    """Return the front with the phase of a spring after its guard has fallen.
+
+    The force of a lagging spring is that of the damper where it is slack, and zero where it acts
+    again.  The time of the event is not exact: the force that is nearer counts.
+    """
     equations, contacts, t, y = front.equations, front.contacts, front.time, front.y
-    k = spring - len(contacts.modes)
-    strained, (acting, rounding) = strain(equations, spring, t, y), force(equations, spring, t, y)
+    k, springs = spring - len(contacts.modes), equations.elements.springs
+    assert springs is not None
+    damper = springs.laws[k].damping * strain_rate(equations, spring, t, y)
+    strained, (acting, _) = strain(equations, spring, t, y), force(equations, spring, t, y)
     phase = SpringPhase.ACTING
     if contacts.springs[k] is SpringPhase.ACTING:
         damped = guards(equations, spring) == (pull,)
         phase = SpringPhase.LAGGING if damped and strained > 0.0 else SpringPhase.SLACK
-    elif contacts.springs[k] is SpringPhase.LAGGING and acting < -rounding:
+    elif contacts.springs[k] is SpringPhase.LAGGING and acting < 0.5 * damper:
         phase = SpringPhase.SLACK
     return front.with_contacts(contacts.with_spring(k, phase))
 
@@ -132,14 +138,19 @@ def begun(configuration: Configuration, front: Front) -> Front:
     return rephased(configuration, front.with_contacts(acting))
 
 
-def rephased(configuration: Configuration, front: Front) -> Front:
-    """Return the front with the phases of damped springs for rates that have jumped."""
+def rephased(configuration: Configuration, front: Front, switched: int | None = None) -> Front:
+    """Return the front with the phases of damped springs for rates that have jumped.
+
+    A spring that has switched keeps its phase: its force is round-off.
+    """
     springs, contacts = front.equations.elements.springs, front.contacts
     if springs is None or not contacts.springs:
         return front
     for k in np.flatnonzero(springs.dampers).tolist():
-        acting, rounding = force(front.equations, len(contacts.modes) + k, front.time, front.y)
-        if springs.laws[k].side and contacts.springs[k] is not SpringPhase.SLACK:
+        spring = len(contacts.modes) + k
+        acting, rounding = force(front.equations, spring, front.time, front.y)
+        changes = springs.laws[k].side and spring != switched
+        if changes and contacts.springs[k] is not SpringPhase.SLACK:
             if acting < -rounding:
                 contacts = contacts.with_spring(k, SpringPhase.LAGGING)
             elif acting > rounding:

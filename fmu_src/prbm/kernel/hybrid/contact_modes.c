@@ -495,7 +495,7 @@ static bool friction_event(Simulation *sim, const Event *event, FrictionEvent *r
                            Problem *problem) {
     FrictionEvent none = {-1, false, 0.0, 0.0, -1};
     *result = none;
-    if (!event) {
+    if (!event || event->kind == EVENT_ACTION) {
         return true;
     }
     if (event->kind == EVENT_SIDE) {
@@ -646,14 +646,14 @@ static void remove_pressed(const Simulation *sim, HoldingSet *stops) {
  * they stay the same.
  *
  * touching: open stops that touch and neither close nor open
- * event: a slip, a reversal or a change of side that has just occurred, or NULL */
+ * event: a slip, a reversal, a change of side or an action of a spring that has just occurred, or NULL */
 PRBM bool choose_modes(Simulation *sim, const int *touching, int touching_count, const Event *event,
                  Problem *problem) {
     FrictionEvent friction;
     int candidates[2 * STOPS_MAX];
     ContactMode modes[CONTACTS_MAX];
     size_t bytes = (size_t)contact_count(sim) * sizeof *modes;
-    rephase_coils(sim);
+    rephase_coils(sim, event && event->kind == EVENT_ACTION ? event->contact : -1);
     if (!friction_event(sim, event, &friction, problem)) {
         return false;
     }

@@ -33,7 +33,7 @@ static bool apply_separation(Simulation *sim, const Event *event, Problem *probl
 
 static bool apply_action(Simulation *sim, const Event *event, Problem *problem) {
     switch_coil(sim, event->contact);
-    return choose_modes(sim, NULL, 0, NULL, problem);
+    return choose_modes(sim, NULL, 0, event, problem);
 }
 
 /* A slip or a reversal. */

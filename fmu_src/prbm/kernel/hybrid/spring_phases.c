@@ -29,23 +29,27 @@ static void set_coil(Simulation *sim, int k, SpringPhase phase) {
     }
 }
 
+/* The force of a lagging spring is that of the damper where it is slack, and zero where it acts again.
+ * The time of the event is not exact: the force that is nearer counts. */
 PRBM void switch_coil(Simulation *sim, int contact) {
     int k = contact - contact_count(sim);
     Strained now = strained_at(sim, k);
+    double damping = system_of(sim)->laws[k].damping;
     SpringPhase last = sim->state.coils[k], phase = COIL_ACTING;
     if (last == COIL_ACTING) {
-        bool lags = system_of(sim)->laws[k].damping > 0.0 && now.strain > 0.0;
+        bool lags = damping > 0.0 && now.strain > 0.0;
         phase = lags ? COIL_LAGGING : COIL_SLACK;
-    } else if (last == COIL_LAGGING && now.pull.force < -now.pull.rounding) {
+    } else if (last == COIL_LAGGING && now.pull.force < 0.5 * damping * now.rate) {
         phase = COIL_SLACK;
     }
     set_coil(sim, k, phase);
 }
 
-PRBM void rephase_coils(Simulation *sim) {
+PRBM void rephase_coils(Simulation *sim, int switched) {
     for (int k = 0; k < phased_coils(sim->configuration.mechanism); k++) {
         const SpringLaw *law = &system_of(sim)->laws[k];
-        if (law->side == 0 || !(law->damping > 0.0) || sim->state.coils[k] == COIL_SLACK) {
+        bool kept = k == switched - contact_count(sim) || sim->state.coils[k] == COIL_SLACK;
+        if (law->side == 0 || !(law->damping > 0.0) || kept) {
             continue;
         }
         CoilPull pull = strained_at(sim, k).pull;
@@ -62,6 +66,6 @@ PRBM bool begin_coils(Simulation *sim) {
         bool slack = now.strain < -near || (now.strain <= near && now.rate < 0.0);
         set_coil(sim, k, system_of(sim)->laws[k].side != 0 && slack ? COIL_SLACK : COIL_ACTING);
     }
-    rephase_coils(sim);
+    rephase_coils(sim, -1);
     return true;
 }

@@ -8,7 +8,8 @@
 PRBM void switch_coil(Simulation *sim, int contact);
 /* Set the phases at the start of a motion; return true. */
 PRBM bool begin_coils(Simulation *sim);
-/* Set the phases of damped springs for rates that have jumped. */
-PRBM void rephase_coils(Simulation *sim);
+/* Set the phases of damped springs for rates that have jumped.  A spring that has switched keeps its
+ * phase: its force is round-off.  switched: its number after the contacts, or -1. */
+PRBM void rephase_coils(Simulation *sim, int switched);
 
 #endif
