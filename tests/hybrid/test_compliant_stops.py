@@ -13,7 +13,9 @@ from prbm.hybrid.compliant import switch
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.compliance import damping_factor
 from prbm.mechanics.contact_state import Phase
+from prbm.mechanism.parts import Stop
 from prbm.runs.engine import simulation
+from springs import oscillator
 from support import energy_balance, mechanism
 
 SPEED = 0.1  # m/s
@@ -177,6 +179,23 @@ def test_friction_holds_or_slides_after_each_reversal(engine, stiffness, e, forc
     out = sim.outputs()
     assert out["stop.impact_count"] > 0
     assert energy_balance(out) == pytest.approx(start, abs=1e-6 * out["energy.dissipated"])
+
+
+@pytest.mark.parametrize("engine", ["kernel", "python"])
+def test_a_hit_off_the_centre_slides_alike_on_either_side(engine):
+    """The velocity along the wall is zero first, and the force turns the body to the side."""
+    angles = []
+    for side in (1.0, -1.0):
+        stop = Stop("stop", "block", (0.11, side * 0.01), 0.0, 0.0, 0.0, 1.0, 0.3, law="compliant",
+                    stiffness=1e5, exponent=1.0)  # fmt: skip
+        model = oscillator(displacement=-0.02, parts={"stops": (stop,)})
+        body = dataclasses.replace(model.bodies[0], inertia=1e-4)
+        sim = simulation(dataclasses.replace(model, bodies=(body,)), engine=engine)
+        sim.advance(0.17)
+        assert sim.outputs()["stop.impact_count"] == 1
+        angles.append(side * sim.outputs()["block.angle"])
+    assert abs(angles[0]) > 0.05
+    assert angles[1] == pytest.approx(angles[0], rel=1e-6)
 
 
 # --- rules of contacts ------------------------------------------------------------------------

@@ -204,15 +204,20 @@ def _moved_inputs(
 def event_difference(one: Motion, other: Motion, end: float = END, factor: float = 1.0) -> str:
     """Return how the events of two motions differ by more than a factor; empty if they do not.
 
-    Events at one time may have another order.
+    Events at one time may have another order.  Directly after another event of a contact, the
+    direction of its sliding may be round-off, which one of the motions then reverses.
     """
     for first, second in ((one, other), (other, one)):
         left = list(second.events)
         for kind, part, t in first.events:
             near = [x for x in left if x[:2] == (kind, part) and abs(x[2] - t) <= factor * end]
-            if not near:
+            begins = kind == EventKind.REVERSAL.name and any(
+                x[1] == part and 0.0 < t - x[2] <= factor * end for x in first.events
+            )
+            if not near and not begins:
                 return f"{kind} of {part} at {t:.9g} s"
-            left.remove(near[0])
+            if near:
+                left.remove(near[0])
     return ""
 
 

@@ -545,7 +545,8 @@ PRBM bool sampled_time(Simulation *sim, const Guard *guard, int contact, Fall *f
 
 /* Find the time at which a sliding velocity changes its sign.  When sliding begins, and while
  * contacts that stick hold this one, the velocity is round-off of either sign.  Then it counts only
- * if it exceeds what an acceleration of round-off adds within the step. */
+ * if it exceeds what an acceleration of round-off adds within the step: as soon as it is no round-off,
+ * or else after the first interval. */
 PRBM bool reversal_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
                         Problem *problem) {
     Search search = {sim, guard, contact, false, problem};
@@ -555,7 +556,8 @@ PRBM bool reversal_time(Simulation *sim, const Guard *guard, int contact, Fall *
         Instant at = sample(sim, k);
         z[k] = guard->value(&sim->equations, &at, contact);
     }
-    bool begins = z[0] <= zero_speed(&sim->configuration);
+    double zero = zero_speed(&sim->configuration);
+    bool begins = z[0] <= zero;
     double noise = begins ? zero_acceleration(&sim->configuration) * sim->state.arc.h : 0.0;
     for (int k = begins; !fall->found && k < GUARD_INTERVALS; k++) {
         if (z[k] > noise && z[k + 1] <= 0.0) {
@@ -566,6 +568,10 @@ PRBM bool reversal_time(Simulation *sim, const Guard *guard, int contact, Fall *
     if (!fall->found && begins && z[GUARD_INTERVALS] < -noise) {
         fall->found = true;
         fall->time = sample_time(sim, 1);
+        if (z[0] >= -zero) {
+            on_arc.offset = 2.0 * zero;
+            fall->time = locate(&on_arc, sample_time(sim, 0), fall->time);
+        }
     }
     return !search.failed;
 }
