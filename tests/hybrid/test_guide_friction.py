@@ -1,6 +1,7 @@
 """Friction along guides: closed forms, independent integrations, both sides, both engines."""
 
 import cmath
+import itertools
 import math
 from dataclasses import replace
 
@@ -25,6 +26,7 @@ from guides import (
 from kernel_simulation import KernelSimulation
 from prbm.analysis.linear_model import linearize
 from prbm.base.errors import PrbmError
+from prbm.hybrid import contact_modes
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.contact_state import ContactMode
 from prbm.mechanics.inputs import input_names
@@ -146,6 +148,55 @@ def _meet(at, pushed, one, other, mu):
     size = -((at - other).conjugate() * pushed).imag / turning
     rest = -pushed - size * direction
     return abs(rest.imag) <= mu * abs(rest.real)
+
+
+RODS = (  # Ends, angles of their lines, coefficients, speed, its direction, push and moment.
+    ((-0.064 - 0.039j, 0.065 - 0.009j), (0.87, 1.32), (0.9, 0.9), -0.5, 90.0, (-3.0 + 0j, -0.13)),
+    ((-0.024 - 0.022j, 0.046 + 0.021j), (2.88, 2.89), (1.5, 0.9), -0.5, 90.0, (0j, -0.11)),
+    ((0.077 + 0.022j, 0.086 + 0.024j), (2.9, 1.62), (0.9, 0.9), 0.5, 90.0, (-3.0 + 2j, 0.16)),
+)
+
+
+@engines
+@pytest.mark.parametrize("case", RODS)
+def test_a_sliding_rod_has_the_forces_of_the_only_sides_that_are_possible(
+    engine, case, monkeypatch
+):
+    """Changes of one side at a time do not find them."""
+    ends, angles, coefficients, speed, direction, (push, moment) = case
+    ways = [cmath.rect(1.0, angle) for angle in angles]
+    lines = {f"{name}{k}": z + u * at for k, (z, u) in enumerate(zip(ends, ways, strict=True))
+             for name, at in (("o", 0.0), ("a", 1.0))}  # fmt: skip
+    points = {f"e{k}": (z.real, z.imag) for k, z in enumerate(ends)}
+    model = mechanism(
+        "Rod", (Body("rod", 1.0, 1e-3, (0.0, 0.0), points),),
+        tuple(Guide(f"way{k}", f"rod.e{k}", f"ground.o{k}", f"ground.a{k}", friction=mu)
+              for k, mu in enumerate(coefficients)),
+        Release("rod", direction, velocity=speed), forces=(Force("push", "rod"),),
+        ground={name: (z.real, z.imag) for name, z in lines.items()},
+    )  # fmt: skip
+    changes = {"push.x": push.real, "push.y": push.imag, "push.moment": moment}
+    out = start(model, engine, changes=changes).outputs()
+    v, w = complex(out["rod.vx"], out["rod.vy"]), out["rod.omega"]
+    found = []
+    for sides in itertools.product((1.0, -1.0), repeat=2):
+        A, b = np.eye(5), np.array([push.real, push.imag, moment, 0.0, 0.0])
+        A[2, 2] = 1e-3
+        for k, (z, u, mu) in enumerate(zip(ends, ways, coefficients, strict=True)):
+            sliding = ((v + 1j * w * z) * u.conjugate()).real
+            f = 1j * u - mu * sides[k] * math.copysign(1.0, sliding) * u
+            A[:3, 3 + k] = -f.real, -f.imag, -(z.conjugate() * f).imag
+            A[3 + k] = 0.0
+            A[3 + k, :3] = (1j * u).real, (1j * u).imag, (u * z.conjugate()).real
+            b[3 + k] = w * w * (z * (1j * u).conjugate()).real
+        N = np.linalg.solve(A, b)[3:]
+        found += [N] if np.array_equal(np.sign(N), sides) else []
+    assert len(found) == 1
+    assert (out["way0.force"], out["way1.force"]) == pytest.approx(found[0], rel=1e-6)
+    if engine == "python":
+        monkeypatch.setattr(contact_modes, "SIDES_TRIED_MAX", 3)
+        with pytest.raises(PrbmError, match="jams"):
+            start(model, engine, changes=changes)
 
 
 @engines
