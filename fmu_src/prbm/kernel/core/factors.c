@@ -341,9 +341,11 @@ SIZED void forward_in_intervals(int count, const Factors *factors, int k) {
                         }
                     }
                 }
-                UNROLLED
-                for (int c = 0; c < count && j < stop; c++) {
-                    rest[c] += row[j] * x[c * even + j];
+                if (j < stop) {
+                    UNROLLED
+                    for (int c = 0; c < count; c++) {
+                        rest[c] += row[j] * x[c * even + j];
+                    }
                 }
             }
             UNROLLED
