@@ -303,16 +303,17 @@ PRBM bool in_any_modes(int k, int m, const double *W, const double *u, const Cou
                        double tolerance, double *P, Scratch scratch) {
     int size = k + m, *pivot = take_integers(&scratch, size);
     double *A = take_matrix(&scratch, size, size), *limit = take(&scratch, (size_t)m);
-    double *scale = take(&scratch, (size_t)size), count = ldexp(1.0, k);
+    double *scale = take(&scratch, (size_t)size);
     bool solved = false;
-    for (int j = 0; j < m; j++) {
-        count *= 3.0;
+    int count = 1;
+    for (int i = 0; i < size && count <= MODES_TRIED_MAX; i++) {
+        count *= i < k ? 2 : 3;
     }
     for (int i = 0; i < size; i++) {
         double mobility = fabs(W[i * size + i]);
         scale[i] = mobility > 0.0 ? 1.0 / square_root(mobility) : 1.0;
     }
-    for (int modes = 0; !solved && count <= MODES_TRIED_MAX && modes < (int)count; modes++) {
+    for (int modes = 0; !solved && count <= MODES_TRIED_MAX && modes < count; modes++) {
         set_modes(k, m, W, u, laws, scale, modes, A, P);
         if (!lu_factor(size, A, pivot)) {
             continue;
