@@ -222,8 +222,7 @@ def coulomb(
     """
     m = len(fixed)
     k = len(u) - m
-    diagonal = np.abs(np.diag(W))
-    scale = np.where(diagonal > 0.0, 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0)), 1.0)
+    scale = _force_scales(W)
     M, spread, constants = _coulomb_problem(scale, W, friction, fixed, normal, carried)
     size = k + 2 * m
     given, u = u, np.where(np.abs(u) <= tolerance / 2, 0.0, u)
@@ -275,8 +274,7 @@ def in_any_modes(
     k = len(u) - m
     if 2.0**k * 3.0**m > MODES_TRIED_MAX:
         return None
-    diagonal = np.abs(np.diag(W))
-    scale = np.where(diagonal > 0.0, 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0)), 1.0)
+    scale = _force_scales(W)
     rates, still = scale[:, None] * W * scale, -scale * u
     loads, constants = _normal_forces(scale, friction, fixed, normal, carried)
     for modes in _all_modes(k, m):
@@ -297,6 +295,13 @@ def in_any_modes(
         if violation(W, u, P, limits(P, friction, fixed, normal, carried)) <= tolerance:
             return P
     return None
+
+
+def _force_scales(W: Real) -> Real:
+    """Return scales of the forces by their own mobilities, with which W has a unit diagonal."""
+    mobility = np.abs(np.diag(W))
+    scale: Real = 1.0 / np.sqrt(np.where(mobility > 0.0, mobility, 1.0))
+    return scale
 
 
 def _all_modes(k: int, m: int) -> Iterator[list[int]]:

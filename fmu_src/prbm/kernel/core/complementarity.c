@@ -265,6 +265,14 @@ static bool follow_path(int k, int m, int size, const double *M, const double *q
     return solved;
 }
 
+/* Compute scales of the forces by their own mobilities, with which W has a unit diagonal. */
+static void force_scales(int size, const double *W, double *scale) {
+    for (int i = 0; i < size; i++) {
+        double mobility = fabs(W[i * size + i]);
+        scale[i] = mobility > 0.0 ? 1.0 / square_root(mobility) : 1.0;
+    }
+}
+
 /* Set the equations of a combination of modes, scaled: a normal is open (0) or closed (1), a tangent
  * sticks (0) or has a friction force of either sign (1, 2). */
 static void set_modes(int k, int m, const double *W, const double *u, const CoulombLaws *laws,
@@ -309,10 +317,7 @@ PRBM bool in_any_modes(int k, int m, const double *W, const double *u, const Cou
     for (int i = 0; i < size && count <= MODES_TRIED_MAX; i++) {
         count *= i < k ? 2 : 3;
     }
-    for (int i = 0; i < size; i++) {
-        double mobility = fabs(W[i * size + i]);
-        scale[i] = mobility > 0.0 ? 1.0 / square_root(mobility) : 1.0;
-    }
+    force_scales(size, W, scale);
     for (int modes = 0; !solved && count <= MODES_TRIED_MAX && modes < count; modes++) {
         set_modes(k, m, W, u, laws, scale, modes, A, P);
         if (!lu_factor(size, A, pivot)) {
@@ -347,10 +352,9 @@ PRBM bool coulomb(int k, int m, const double *W, const double *u, const CoulombL
         first = closes(u[i], tolerance) ? first : 0;
     }
     for (int i = 0; i < k + m; i++) {
-        double mobility = fabs(W[i * (k + m) + i]);
         rates[i] = fabs(u[i]) <= tolerance / 2 ? 0.0 : u[i];
-        scale[i] = mobility > 0.0 ? 1.0 / square_root(mobility) : 1.0;
     }
+    force_scales(k + m, W, scale);
     for (int attempt = first; !solved && attempt < 3; attempt++) {
         set_problem(k, m, W, rates, laws, scale, M, q);
         if (attempt == 0) {
