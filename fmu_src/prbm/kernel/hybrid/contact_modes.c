@@ -602,15 +602,15 @@ static bool change_sides(Simulation *sim, const HoldingSet *touching, const Fric
 static bool choose_on_any_sides(Simulation *sim, const HoldingSet *touching,
                                 const FrictionEvent *event, ContactMode *modes) {
     const System *system = system_of(sim);
-    int count = 0, guides[PLACES_MAX];
+    int count = 0, combinations = 1, guides[PLACES_MAX];
     for (int i = 0; i < system->f; i++) {
         if (is_guide(system, system->s + i) && system->s + i != event->turned) {
             guides[count++] = i;
+            combinations *= combinations <= SIDES_TRIED_MAX ? 2 : 1;
         }
     }
-    bool found = false;
-    for (int sides = 0; !found && count > 0 && count < (int)(8 * sizeof(int)) - 1 &&
-                        1 << count <= SIDES_TRIED_MAX && sides < 1 << count; sides++) {
+    bool found = false, few = count > 0 && combinations <= SIDES_TRIED_MAX;
+    for (int sides = 0; few && !found && sides < combinations; sides++) {
         Problem ignored;
         int wrong = -1;
         for (int k = 0; k < count; k++) {
