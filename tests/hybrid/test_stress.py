@@ -121,6 +121,17 @@ def test_peak_does_not_depend_on_communication_points_and_is_known_only_afterwar
 
 
 @ENGINES
+def test_peak_of_a_rising_stress_is_the_present_stress_within_a_step_too(engine):
+    """The 1R guide is thrown out of its straight shape: its stress rises for 18 ms."""
+    simulation = engine(guide("1R"), THROWN)
+    for t in np.linspace(0.0, 0.018, 78)[1:]:
+        simulation.advance(float(t))
+        out = simulation.outputs()
+        assert out["left_flexure.peak_stress"] == out["left_flexure.stress"]
+        assert out["left_flexure.peak_stress_time"] == t
+
+
+@ENGINES
 def test_a_step_that_an_impulse_shortens_has_no_peak_at_its_end(engine):
     """An impulse stops the shuttle while the stress rises: the rest of the step never happens."""
     simulation = engine(guide("1R"), THROWN)

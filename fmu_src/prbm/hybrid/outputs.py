@@ -13,7 +13,7 @@ from ..mechanics.stress import stresses
 from ..mechanics.system import ANGLE, STRAIN, System
 from ..mechanism.parts import value
 from .front import Latched
-from .peaks import PeakRecord
+from .peaks import PeakRecord, Sample
 
 Outputs = dict[str, float | int | bool]
 
@@ -75,7 +75,7 @@ def all_outputs(
             out[f"{stop.name}.impulse_sum"] = float(extras[own.index(i, CompliantState.IMPULSE)])
             out[f"{stop.name}.contact_loss"] = float(extras[own.index(i, CompliantState.LOSS)])
     out |= _links(system, q, v)
-    out |= _stress(equations, peaks, q, v, evaluation)
+    out |= _stress(equations, peaks, t, q, v, evaluation)
     out |= others
     return out
 
@@ -156,11 +156,12 @@ def _links(system: System, q: Real, v: Real) -> dict[str, float]:
 
 
 def _stress(
-    equations: Equations, peaks: PeakRecord, q: Real, v: Real, evaluation: Evaluation
+    equations: Equations, peaks: PeakRecord, t: float, q: Real, v: Real, evaluation: Evaluation
 ) -> dict[str, float]:
     """Return the stress of flexures and its peaks."""
     out, found = {}, stresses(equations, q, v, evaluation)
-    for (name, one), peak in zip(found.items(), peaks.peaks, strict=True):
+    now = peaks.between(tuple(Sample.of(t, one) for one in found.values()))
+    for (name, one), peak in zip(found.items(), now.peaks, strict=True):
         out[f"{name}.stress_start"], out[f"{name}.stress_end"] = one.start, one.end
         out[f"{name}.stress"] = one.largest
         out[f"{name}.peak_stress"] = peak.stress

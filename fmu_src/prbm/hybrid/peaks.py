@@ -1,9 +1,10 @@
 """Largest stress of flexures so far.
 
 Samples are taken where the stepper has accelerations: at the start, at the end of each step, and at
-both sides of events; never at communication points.  A sample at the front counts once the time has
-reached it.  A parabola through three samples refines a maximum between them, if the motion is
-smooth there and the stress is largest at the same place.
+both sides of events.  A sample at the front counts once the time has reached it; before, the output
+is the present stress where it exceeds the peak and rises to that sample, so that it depends neither
+on the steps nor on earlier communication points.  A parabola through three samples refines a
+maximum between them, if the motion is smooth there and the stress is largest at the same place.
 """
 
 from dataclasses import dataclass, replace
@@ -80,6 +81,12 @@ class Peak:
             return replace(result, stress=value, time=time, position=sample.position)
         return result
 
+    def rising(self, now: Sample, end: Sample) -> "Peak":
+        """Return the peak within a step, given the present sample and that at the step's end."""
+        if not self.stress < now.stress <= end.stress:
+            return self
+        return replace(self, stress=now.stress, time=now.time, position=now.position)
+
     def restarted(self) -> "Peak":
         """Return the peak at an event: no parabola passes it."""
         return replace(self, last=())
@@ -131,6 +138,16 @@ class PeakRecord:
             return self
         pairs = zip(self.peaks, self.ahead, strict=True)
         return PeakRecord(tuple(peak.after(sample) for peak, sample in pairs))
+
+    def between(self, now: tuple[Sample, ...]) -> "PeakRecord":
+        """Return the record at a time within the last step, given the samples there.
+
+        It is the record itself if the samples at the front are in the peaks.
+        """
+        if not self.ahead:
+            return self
+        triples = zip(self.peaks, now, self.ahead, strict=True)
+        return replace(self, peaks=tuple(one.rising(at, end) for one, at, end in triples))
 
     def continued(self, front: Front, *, reached: bool) -> "PeakRecord":
         """Return the record at a new front, from which another motion starts.

@@ -198,7 +198,7 @@ static void output_stresses(Simulation *sim) {
         out[PER_STRESS * i + STRESS_STRESS_START] = found[i].start;
         out[PER_STRESS * i + STRESS_STRESS_END] = found[i].end;
         out[PER_STRESS * i + STRESS_STRESS] = found[i].largest;
-        peak_outputs(sim, i, out + PER_STRESS * i + STRESS_PEAK_STRESS);
+        peak_outputs(sim, i, &found[i], out + PER_STRESS * i + STRESS_PEAK_STRESS);
     }
 }
 

@@ -160,11 +160,22 @@ PRBM bool step_peaks_to_event(Simulation *sim, Problem *problem) {
     return true;
 }
 
-PRBM void peak_outputs(const Simulation *sim, int i, double *out) {
+/* Raise the peak within a step to the present stress, if it rises to that at the step's end. */
+static void rise(Peak *peak, double time, const Stress *now) {
+    if (peak->ahead != 0.0 && now->largest > peak->stress &&
+        now->largest <= peak->next.stress) {
+        peak->stress = now->largest;
+        peak->time = time;
+        peak->position = now->position;
+    }
+}
+
+PRBM void peak_outputs(const Simulation *sim, int i, const Stress *now, double *out) {
     Peak peak = peak_at(sim, i);
     if (sim->state.time >= sim->state.front_time) {
         pass_one(&peak);
     }
+    rise(&peak, sim->state.time, now);
     out[0] = peak.stress;
     out[1] = peak.time;
     out[2] = peak.position;

@@ -21,7 +21,9 @@ PRBM void restart_peaks_from(Simulation *sim, const Evaluation *at);
 PRBM void step_peaks(Simulation *sim, const Evaluation *at);
 /* The same at an event, where the equations have not been evaluated. */
 PRBM bool step_peaks_to_event(Simulation *sim, Problem *problem);
-/* Compute the outputs of the peaks of a flexure (3,): value, time, position. */
-PRBM void peak_outputs(const Simulation *sim, int i, double *out);
+/* Compute the outputs of the peaks of a flexure (3,): value, time, position.
+ *
+ * now: the present stress of the flexure. */
+PRBM void peak_outputs(const Simulation *sim, int i, const Stress *now, double *out);
 
 #endif
