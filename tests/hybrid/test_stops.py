@@ -186,7 +186,8 @@ def test_friction_of_a_contact_pulled_along_its_wall_is_within_the_cone():
         for _ in range(40):
             sim.advance(sim.time + 2.5e-4)
             n, y = sim.system.n, sim.state()
-            a, lam, M, *_ = sim.equations.evaluate(sim.time, y[:n], y[n : 2 * n])
+            found = sim.equations.evaluate(sim.time, y[:n], y[n : 2 * n])
+            a, lam, M = found.a, found.lam, found.M
             if not sim.equations.held:
                 continue
             normal = float(lam[sim.equations.first_hold])

@@ -1676,7 +1676,7 @@ def test_accelerations_and_rates_are_the_same_in_every_discrete_state(name):
         t = theirs.inputs.walls[0].since + 3e-4  # The wall has not reached its reference.
         a, lam = mine.evaluate(t, y[:n], y[n : 2 * n])
         evaluation = theirs.evaluate(t, y[:n], y[n : 2 * n])
-        a_expected, lam_expected, M, *_ = evaluation
+        a_expected, lam_expected, M = evaluation.a, evaluation.lam, evaluation.M
         rel = spread(condition(evaluation))
         assert mine.structure.r == r
         assert_same(a, a_expected, rel)

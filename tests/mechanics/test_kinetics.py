@@ -63,7 +63,8 @@ def test_accelerations_equal_those_of_lagrange_equations(rng):
         angles, rates = rng.normal(size=3), 20 * rng.normal(size=3)
         M, f = evaluate(*angles, *rates)
         expected = np.linalg.solve(np.array(M, float), np.array(f, float).ravel())
-        found, _, mass, *_ = sim.equations.evaluate(sim.time, angles, rates)
+        evaluation = sim.equations.evaluate(sim.time, angles, rates)
+        found, mass = evaluation.a, evaluation.M
         np.testing.assert_allclose(mass, np.array(M, float), rtol=1e-12, atol=1e-20)
         np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-8)
 

@@ -143,26 +143,22 @@ def factor_saddle(kkt: Real, n: int, length: float, scale: Real) -> Factors:
 
 
 def factor_and_solve(
-    kkt: Real, right: Real, n: int, length: float, scale: Real
+    scaled: Real, right: Real, n: int, length: float, scale: Real
 ) -> tuple[Real, Factors]:
-    """Solve as :func:`factor_saddle` and :func:`solve_saddle`, in one call of LAPACK."""
-    lu, pivots, x, _ = _lapack().dgesv(_scaled(kkt, scale), scale * right, overwrite_a=True)
+    """Solve as :func:`factor_saddle` and :func:`solve_saddle`, in one call of LAPACK.
+
+    The matrix and the right side are scaled already: D kkt D and D right.
+    """
+    lu, pivots, x, _ = _lapack().dgesv(scaled, right)
     if _regular(lu.diagonal()):
         return scale * x, Factors(lu, pivots, scale)
-    factors = factor_saddle(kkt, n, length, scale)
-    return solve_saddle(factors, right), factors
-
-
-def _scaled(kkt: Real, scale: Real) -> Real:
-    """Return D A D for the diagonal of D."""
-    scaled: Real = kkt * scale
-    scaled *= scale[:, None]
-    return scaled
+    factors = factor_saddle(scaled / scale / scale[:, None], n, length, scale)
+    return solve_saddle(factors, right / scale), factors
 
 
 def _factored(kkt: Real, scale: Real) -> Factors:
     """Return the factors of a matrix with scales, regular or not."""
-    lu, pivots, _ = _lapack().dgetrf(_scaled(kkt, scale), overwrite_a=True)
+    lu, pivots, _ = _lapack().dgetrf(kkt * scale * scale[:, None], overwrite_a=True)
     return Factors(lu, pivots, scale)
 
 

@@ -37,10 +37,10 @@ class Evaluation(NamedTuple):
     lam : (r,)
         Forces of the loops, then of the stops that hold (> 0 pushes), then of the contacts that
         stick [N].
-    M : (n, n)
-        Mass matrix [kg m^2].
+    scaled : (n + r, n + r)
+        The matrix of the equations, scaled.
     factors : Factors
-        Factors of the equations, for :meth:`Equations.project_near`.
+        Its factors, for :meth:`Equations.project_near`.
     e : (d,) complex
         Directions.
     pressure : Pressure or None
@@ -49,10 +49,16 @@ class Evaluation(NamedTuple):
 
     a: Real
     lam: Real
-    M: Real
+    scaled: Real
     factors: constraints.Factors
     e: Complex
     pressure: Pressure | None = None
+
+    @property
+    def M(self) -> Real:
+        """Mass matrix, (n, n) [kg m^2]."""
+        n = len(self.a)
+        return self.scaled[:n, :n] / self.factors.scale[:n] / self.factors.scale[:n, None]
 
 
 class FrictionLaw(NamedTuple):
@@ -102,7 +108,7 @@ class Equations:
         self._number_contacts()
         self._collect_loads()
         self._stack_rows()
-        self.scale = self._scale()
+        self._scale_terms()
 
     def _number_contacts(self) -> None:
         """Sort the contacts by their modes, and number their rows."""
@@ -146,14 +152,25 @@ class Equations:
             self.rows.c[self.first_hold + k] += self.inputs.walls[i].position
             self.rows.c[self.first_hold + k] += self.contacts.depth(i)
         self.positions = self.rows.first(self.first_stick)
-        self.terms = np.vstack([system.H, 1j * self.rows.repeated, 1j * self.w])
-        self.moves = np.hstack([system.Phi.Phi, np.zeros((len(self.w), 1))]).astype(complex)
 
-    def _scale(self) -> Real:
-        """Return scales with which the elements of the equations are at most near one, (n + r,)."""
-        scale = 1.0 / np.sqrt(self.system.straight_masses)
-        longest = (self.rows.reach() * scale).max(axis=1, initial=0.0)
-        return np.concatenate([scale, 1.0 / np.where(longest > 0.0, longest, 1.0)])
+    def _scale_terms(self) -> None:
+        """Collect the constant terms of the equations, scaled.
+
+        The scales make the elements of the matrix at most near one.  They are powers of two, so
+        that they change no digit.
+        """
+        system, n = self.system, self.n
+        masses = np.sqrt(system.straight_masses)
+        longest = (self.rows.reach() / masses).max(axis=1, initial=0.0)
+        most = np.concatenate([masses, np.where(longest > 0.0, longest, 1.0)])
+        self.scale: Real = np.ldexp(1.0, -np.frexp(most)[1])
+        self.force_scale = self.scale[:n].copy()
+        lines = 1j * self.rows.repeated * self.scale[n:, None]
+        self.terms = np.vstack([system.H, lines, 1j * self.w])
+        self.moves = np.hstack(
+            [system.Phi.Phi * self.force_scale, np.zeros((len(self.w), 1))]
+        ).astype(complex)
+        self.inertia = system.inertia * self.force_scale * self.force_scale[:, None]
 
     def with_contacts(self, contacts: ContactState) -> "Equations":
         """Return the equations for another state of the contacts."""
@@ -199,20 +216,22 @@ class Equations:
         moved[:, n] = e * (w * w)
         terms = self.terms.dot(moved)
         moments = moved.conj().T.dot(terms[:d])
-        kkt, right = np.zeros((len(self.scale),) * 2, order="F"), np.empty(len(self.scale))
-        M, R, Q, bent = kkt[:n, :n], kkt[n:, :n], right[:n], right[n:]
-        np.add(moments.real[:n, :n], system.inertia, out=M)
-        np.add(moments.imag[:n, n], terms.imag[-1, :n], out=Q)
-        Q += self.element.motion_force(q, e, v, self.beta)
+        kkt, right = np.zeros((len(self.scale),) * 2), np.empty(len(self.scale))
+        R, bent = kkt[n:, :n], right[n:]
+        np.add(moments.real[:n, :n], self.inertia, out=kkt[:n, :n])
         R[:], bent[:] = terms.real[d:-1, :n], terms.imag[d:-1, n]
-        self.rows.carry(R, bent, e, v)
+        if len(self.rows.carried):
+            carried, unit = self.rows.carried, self.scale[n + self.rows.carried]
+            slopes, convective = self.rows.carried_terms(e, v)
+            R[carried] = unit[:, None] * slopes * self.force_scale
+            bent[carried] = unit * convective
         kkt[:n, n:] = R.T
         if self.moving_walls:
-            bent[self.first_hold : self.first_stick] -= self.held_motions(t)[2]
+            walls = slice(self.first_hold, self.first_stick)
+            bent[walls] -= self.scale[n:][walls] * self.held_motions(t)[2]
+        Q = self.element.motion_force(q, e, v, self.beta)
         if self.driven:
             Q += self.moment
-        if self.mass_damping:
-            Q -= self.mass_damping * (M @ v)
         pressure = None
         if self.pressed:
             gaps, rates = self.gaps(t, e, extras), self.gap_rates(t, e, v, extras)
@@ -221,12 +240,17 @@ class Equations:
         for c in self.slipping_points:
             limit = self.friction_limit(c, e, pressure)
             Q -= self.contacts.modes[c].slip * limit * self.slip_row(c, e)
+        Q *= self.force_scale
+        if self.mass_damping:
+            Q -= self.mass_damping * (kkt[:n, :n] @ (v / self.force_scale))
+        Q += moments.imag[:n, n]
+        np.add(Q, terms.imag[-1, :n], out=right[:n])
         for c in self.slipping_rows:
             share = self.friction_coefficient(c) * self.contacts.modes[c].slip
-            share *= self.contacts.side(c)
-            kkt[: self.n, self.n + self.normal_row(c)] -= share * self.slip_row(c, e)
-        x, factors = constraints.factor_and_solve(kkt, right, self.n, system.length, self.scale)
-        return Evaluation(x[: self.n], -x[self.n :], M, factors, e, pressure)
+            share *= self.contacts.side(c) * self.scale[n + self.normal_row(c)]
+            kkt[:n, n + self.normal_row(c)] -= share * self.slip_row(c, e) * self.force_scale
+        x, factors = constraints.factor_and_solve(kkt, right, n, system.length, self.scale)
+        return Evaluation(x[:n], -x[n:], kkt, factors, e, pressure)
 
     # -- rates of the state --
 

@@ -80,6 +80,7 @@ class Bending:
 
     def __init__(self, system: System) -> None:
         self.K, self.q0, self.rest = system.K, system.q0, system.rest
+        self._pull = -system.K
 
     def force(self, q: Real, e: Complex, share: float = 1.0) -> Real:
         """Return -K (q - rest), with a share of the initial strains."""
@@ -88,7 +89,7 @@ class Bending:
 
     def motion_force(self, q: Real, e: Complex, v: Real, beta: float) -> Real:
         """Return -K (q - rest + beta v)."""
-        result: Real = -self.K.dot(q - self.rest + beta * v)
+        result: Real = self._pull.dot(q - self.rest + beta * v)
         return result
 
     def tangent(self, e: Complex, share: float = 1.0) -> Real:

@@ -206,11 +206,10 @@ class Rows:
             result[self.carried] = self._carried_convective(e, v)
         return result
 
-    def carry(self, slopes: Real, bent: Real, e: Complex, v: Real) -> None:
-        """Replace the :meth:`jacobian` and the :meth:`convective` terms of the carried rows."""
-        if len(self.carried):
-            slopes[self.carried] = self.system.Phi.to_coordinates(self._carried_by_direction(e))
-            bent[self.carried] = self._carried_convective(e, v)
+    def carried_terms(self, e: Complex, v: Real) -> tuple[Real, Real]:
+        """Return the :meth:`jacobian` and the :meth:`convective` terms of the carried rows."""
+        slopes = self.system.Phi.to_coordinates(self._carried_by_direction(e))
+        return slopes, self._carried_convective(e, v)
 
     def _carried_convective(self, e: Complex, v: Real) -> Real:
         """Return the convective terms of the carried rows [m/s^2]."""
