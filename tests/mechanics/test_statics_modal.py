@@ -9,7 +9,7 @@ from scipy.optimize import minimize
 from kernel_simulation import KernelSimulation
 from many_parts import cantilever
 from prbm.base.errors import EquilibriumError
-from prbm.base.tolerances import STATICS_LOAD_STEP_MIN
+from prbm.base.tolerances import STATICS_LOAD_STEP_MIN, STATICS_LOAD_STEPS_MAX
 from prbm.files.mechanism_file import load
 from prbm.mechanics import statics
 from prbm.mechanics.assembly import assemble
@@ -220,3 +220,20 @@ def test_slow_loading_ends_at_the_largest_load_that_can_be_carried(monkeypatch):
         assert limit - 1.001 * STATICS_LOAD_STEP_MIN <= done <= limit
         assert done < 1.0 or limit == 1.0
         assert max(tried) <= 1.0
+
+
+def test_slow_loading_that_succeeds_in_the_smallest_steps_only_is_given_up(monkeypatch):
+    system = assemble(mechanism("PRBDM"), mechanism("PRBDM").values())
+    tried = []
+
+    def creeping(system, given, start):
+        tried.append(given.share)
+        small = given.share - start[0] <= 1.5 * STATICS_LOAD_STEP_MIN
+        return np.full(system.n, given.share) if small else None
+
+    monkeypatch.setattr(statics, "_newton", creeping)
+    _, done = statics._follow(
+        system, lambda share: statics._Given(None, None, None, share), np.zeros(system.n)
+    )
+    assert len(tried) == STATICS_LOAD_STEPS_MAX
+    assert 0.0 < done < 0.2

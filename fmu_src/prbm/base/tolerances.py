@@ -32,6 +32,7 @@ STATICS_TURN_AIM = 0.45  # rad per load step, at which the control of load steps
 STATICS_CLOSE_SHARE = 0.1  # Of these turns, if a path is followed closely.
 STATICS_TURN_MIN = 1e-300  # rad; any positive number, to divide by.
 STATICS_LOAD_STEP_MIN = 2**-14  # Of the load: smallest continuation step.
+STATICS_LOAD_STEPS_MAX = 2000  # With rejected ones; a path that crawls through slack ends.
 STATICS_HINT_SHARE = 1 / 128  # Of the load: if less is carried, pins may turn freely.
 STATICS_LIMP_RATIO = (
     1e3  # Of the stiffest spring at one radian: a unit may be wrong if weight is more.

@@ -34,6 +34,7 @@ from ..base.tolerances import (
     STATICS_ITERATIONS_MAX,
     STATICS_LIMP_RATIO,
     STATICS_LOAD_STEP_MIN,
+    STATICS_LOAD_STEPS_MAX,
     STATICS_ROUNDING_RTOL,
     STATICS_SHRINK,
     STATICS_SHRINK_MIN,
@@ -321,7 +322,9 @@ def _follow(
     done, step, growth = 0.0, 1.0, STATICS_GROWTH_MAX
     part = STATICS_CLOSE_SHARE if closely else 1.0
     sign = _determinant_sign(system, given(0.0), state) if closely else 0
-    while done < 1.0:
+    for _ in range(STATICS_LOAD_STEPS_MAX):
+        if done == 1.0:
+            break
         target = min(1.0, done + step)
         # The difference of target and done may be rounded to more than the smallest step.
         step, turn, ratio = min(step, 1.0 - done), math.inf, STATICS_SHRINK

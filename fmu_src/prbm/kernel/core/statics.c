@@ -501,7 +501,7 @@ static double load_slowly(const System *system, const Hold *hold, bool closely, 
     bool going = true;
     straighten(system, hold, state);
     int sign = closely ? sign_at(system, hold, 0.0, state, scratch) : 0;
-    while (done < 1.0 && going) {
+    for (int k = 0; k < STATICS_LOAD_STEPS_MAX && done < 1.0 && going; k++) {
         double target = lesser(1.0, done + step), turn = HUGE_VAL, ratio = STATICS_SHRINK;
         int crossed = 0;
         /* The difference of target and done may be rounded to more than the smallest step. */
