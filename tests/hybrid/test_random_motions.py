@@ -6,7 +6,6 @@ from random_motions import Findings, judge
 
 SEEDS = (9, 11, 22)
 FURTHER_SEEDS = range(23, 44)
-COSTLY_SEEDS = (23,)  # The searches for their equilibria take minutes.
 
 
 @pytest.mark.native
@@ -14,11 +13,7 @@ COSTLY_SEEDS = (23,)  # The searches for their equilibria take minutes.
     "seed",
     [
         *SEEDS,
-        *(
-            pytest.param(seed, marks=pytest.mark.slow)
-            for seed in FURTHER_SEEDS
-            if seed not in COSTLY_SEEDS
-        ),
+        *(pytest.param(seed, marks=pytest.mark.slow) for seed in FURTHER_SEEDS),
     ],
 )
 def test_a_random_mechanism_obeys_the_laws_of_motion_in_both_engines(seed):

@@ -55,6 +55,7 @@ GROWN = 1e-5  # Of nominal values, or of the duration: 10,000 times as much as i
 PEAK_RTOL = 1e-2  # Largest of the samples at the ends of steps, whose lengths vary by round-off.
 Nominals = Mapping[str, float]
 PEAKS = ("peak_stress", "peak_stress_time", "peak_stress_position")
+START_SHARE = 1e-2  # Of the duration.
 COUNTED = ("impact_count", "contact")
 LOCKED = "the release is almost locked"
 UNSEEN = EventKind.SWITCH  # A change of the phase of a compliant stop is no event of a step.
@@ -205,7 +206,8 @@ def event_difference(one: Motion, other: Motion, end: float = END, factor: float
     """Return how the events of two motions differ by more than a factor; empty if they do not.
 
     Events at one time may have another order.  Directly after another event of a contact, the
-    direction of its sliding may be round-off, which one of the motions then reverses.
+    direction of its sliding may be round-off, which one of the motions then reverses.  A spring
+    that starts at its free length, at rest, changes its phase within the first steps.
     """
     for first, second in ((one, other), (other, one)):
         left = list(second.events)
@@ -214,6 +216,7 @@ def event_difference(one: Motion, other: Motion, end: float = END, factor: float
             begins = kind == EventKind.REVERSAL.name and any(
                 x[1] == part and 0.0 < t - x[2] <= factor * end for x in first.events
             )
+            begins = begins or (kind == EventKind.ACTION.name and t <= START_SHARE * end)
             if not near and not begins:
                 return f"{kind} of {part} at {t:.9g} s"
             if near:
@@ -347,8 +350,9 @@ def compared(seed: int, model: Mechanism, values: dict[str, float], expected: Mo
     for law, again, reference, names in pairs:
         motion = again()
         if words := difference(nominal, reference, motion, names):
-            if law == "reordered" and starts_elsewhere(nominal, reference, motion, names):
-                return "released in another shape in another order"
+            loose = law == "reordered" or slack(model, reference)
+            if loose and starts_elsewhere(nominal, reference, motion, names):
+                return "released in another shape"
             changed = kernel_motion(model, nudged(values))
             grown = difference(nominal, found, changed, None, GROWN, GROWN)
             return "chaotic" if grown else f"failed: {law}: {words}"
@@ -363,6 +367,12 @@ def starts_elsewhere(nominal: Nominals, one: Motion, other: Motion, names: Itera
     """
     begins = (Motion(samples=motion.samples[:1]) for motion in (one, other))
     return not other.samples or bool(output_difference(nominal, *begins, GROWN * 0.1, names))
+
+
+def slack(model: Mechanism, motion: Motion) -> bool:
+    """Return whether a spring that acts on one side is slack at the start of a motion."""
+    start = motion.samples[0] if motion.samples else {}
+    return any(spring.side and not start.get(f"{spring.name}.force") for spring in model.springs)
 
 
 def joined(model: Mechanism) -> list[str]:

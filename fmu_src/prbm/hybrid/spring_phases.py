@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..base.tolerances import CONSTRAINT_RTOL, GUARD_INTERVALS, PHASE_RTOL
+from ..base.tolerances import CONSTRAINT_RTOL, GUARD_INTERVALS, PHASE_RTOL, ZERO_SPEED_RTOL
 from ..mechanics.arrays import Real
 from ..mechanics.contact_state import SpringPhase
 from ..mechanics.dynamics import Equations
@@ -122,18 +122,20 @@ def switched(front: Front, spring: int) -> Front:
 def begun(configuration: Configuration, front: Front) -> Front:
     """Return the front with the phases of all springs at the start of a motion.
 
-    A spring at its free length acts unless it is shortened away from its side.
+    A spring at its free length acts unless it moves away from its side, faster than round-off.
     """
     springs = front.equations.elements.springs
     if springs is None or not springs.one_sided:
         return front
     acting = replace(front.contacts, springs=(SpringPhase.ACTING,) * len(springs.laws))
     front = front.with_contacts(acting)
-    near = CONSTRAINT_RTOL * configuration.scales.length
+    size, n = configuration.scales.length, front.equations.n
+    near = CONSTRAINT_RTOL * size
+    slow = ZERO_SPEED_RTOL * size * float(np.abs(front.y[n : 2 * n]).max(initial=0.0))
     for k, law in enumerate(springs.laws):
         at = (front.equations, len(acting.modes) + k, front.time, front.y)
         x = strain(*at)
-        if law.side and (x < -near or (x <= near and strain_rate(*at) < 0.0)):
+        if law.side and (x < -near or (x <= near and strain_rate(*at) < -slow)):
             acting = acting.with_spring(k, SpringPhase.SLACK)
     return rephased(configuration, front.with_contacts(acting))
 

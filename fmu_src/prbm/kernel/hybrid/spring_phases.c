@@ -60,10 +60,16 @@ PRBM void rephase_coils(Simulation *sim, int switched) {
 }
 
 PRBM bool begin_coils(Simulation *sim) {
-    double near = CONSTRAINT_RTOL * sim->configuration.scales.length;
+    double size = sim->configuration.scales.length, near = CONSTRAINT_RTOL * size;
+    int n = system_of(sim)->n;
+    double fastest = 0.0;
+    for (int i = 0; i < n; i++) {
+        fastest = greater(fastest, fabs(sim->state.front[n + i]));
+    }
+    double slow = ZERO_SPEED_RTOL * size * fastest;
     for (int k = 0; k < phased_coils(sim->configuration.mechanism); k++) {
         Strained now = strained_at(sim, k);
-        bool slack = now.strain < -near || (now.strain <= near && now.rate < 0.0);
+        bool slack = now.strain < -near || (now.strain <= near && now.rate < -slow);
         set_coil(sim, k, system_of(sim)->laws[k].side != 0 && slack ? COIL_SLACK : COIL_ACTING);
     }
     rephase_coils(sim, -1);
