@@ -38,10 +38,11 @@ SIZED void map_branch(int size, int count, const Branch *branch, const double *R
     const int even = even_length(size), *coordinate = branch->coordinate;
     UNROLLED
     for (int i = 0; i < size; i += LANES) {
-        Lanes angle = NO_LANES, rate = NO_LANES;
+        Lanes each = aligned_lanes(branch->change + i);
+        Lanes angle = x[coordinate[0]] * each, rate = v[coordinate[0]] * each;
         UNROLLED
-        for (int c = 0; c < count; c++) {
-            Lanes each = aligned_lanes(branch->change + c * even + i);
+        for (int c = 1; c < count; c++) {
+            each = aligned_lanes(branch->change + c * even + i);
             angle += x[coordinate[c]] * each;
             rate += v[coordinate[c]] * each;
         }
@@ -71,38 +72,26 @@ PRBM void map_directions(const System *system, const double *x, double *theta) {
     }
 }
 
-/* Add r rows x of derivatives by the directions, wide apart, pulled back to the coordinates, to
- * out, even apart. */
-SIZED void pull_back(int size, int count, const System *system, const Branch *branch, int r,
-                     const double *RESTRICT x, double *RESTRICT out) {
+/* Add derivatives x by the directions of a branch, pulled back to the coordinates, to out. */
+SIZED void pull_back(int size, int count, const Branch *branch, const double *RESTRICT x,
+                     double *RESTRICT out) {
     const int even = even_length(size), paired = size - size % PAIR;
     x += branch->start;
-    for (int row = 0; row < r; row++) {
+    UNROLLED
+    for (int c = 0; c < count; c++) {
+        const double *change = branch->change + c * even;
+        Lanes sum[SUMS] = {NO_LANES};
         UNROLLED
-        for (int c = 0; c < count; c++) {
-            const double *change = branch->change + c * even;
-            Lanes sum[SUMS] = {NO_LANES};
-            UNROLLED
-            for (int i = 0; i < paired; i += LANES) {
-                sum[SUM_OF(i)] += lanes_at(x + i) * aligned_lanes(change + i);
-            }
-            double last = paired < size ? x[paired] * change[paired] : 0.0;
-            out[branch->coordinate[c]] += total(sum) + last;
+        for (int i = 0; i < paired; i += LANES) {
+            sum[SUM_OF(i)] += lanes_at(x + i) * aligned_lanes(change + i);
         }
-        x += system->wide;
-        out += system->even;
+        double *to = &out[branch->coordinate[c]];
+        *to += paired < size ? total(sum) + x[paired] * change[paired] : total(sum);
     }
 }
 
-PRBM void branch_to_coordinates(const System *system, const Branch *branch, int r, const double *x,
-                                double *out) {
-    switch (branch->code) {
-    case LEAF_5: pull_back(5, LEAF_COORDINATES, system, branch, r, x, out); break;
-    case LEAF_5_BODY:
-    case LEAF_6: pull_back(6, LEAF_COORDINATES, system, branch, r, x, out); break;
-    case LEAF_6_BODY: pull_back(7, LEAF_COORDINATES, system, branch, r, x, out); break;
-    case ANY_BRANCH: pull_back(branch->size, branch->count, system, branch, r, x, out);
-    }
+PRBM void branch_to_coordinates(const Branch *branch, const double *x, double *out) {
+    pull_back(branch->size, branch->count, branch, x, out);
 }
 
 /* --- mass ------------------------------------------------------------------------------------- */
@@ -173,9 +162,9 @@ static void add_pairs(const Branch *branch, const double *M, const double *own, 
     }
 }
 
-/* Add the terms of the pairs of directions of a branch. */
-SIZED void own_terms(int size, int real, int count, bool stretching, const Branch *branch,
-                     const double *own, Evaluation *result) {
+/* Add the terms of the pairs of directions of a branch, and pull the loads and r rows back. */
+SIZED void own_terms(int size, int real, int count, bool stretching, const System *system,
+                     const Branch *branch, const double *own, int r, Evaluation *result) {
     const Kinematics *at = &result->at;
     const int start = branch->start;
     double *M = result->block;
@@ -186,14 +175,19 @@ SIZED void own_terms(int size, int real, int count, bool stretching, const Branc
     }
     if (!IS_CONSTANT(size) && branch->identity) {
         add_pairs(branch, M, own + start, result->mass);
-        return;
+    } else {
+        if (stretching) {
+            pad(size, own + start, M + branch->pairs - even_length(size));
+        }
+        const int half = size / PAIR; /* Rows of the lengths 2, 2, 4, 4, and so on. */
+        const int pairs = IS_CONSTANT(size) ? PAIR * half * (half + size % PAIR) : branch->pairs;
+        pull_pairs(pairs, count, branch, M, result->mass);
     }
-    if (stretching) {
-        pad(size, own + start, M + branch->pairs - even_length(size));
+    pull_back(size, count, branch, result->load, result->a);
+    for (int k = 0; k < r; k++) {
+        pull_back(size, count, branch, result->rows + k * system->wide,
+                  result->factors.Z + k * system->even);
     }
-    const int half = size / PAIR; /* Rows of the lengths 2, 2, 4, 4, and so on. */
-    const int pairs = IS_CONSTANT(size) ? PAIR * half * (half + size % PAIR) : branch->pairs;
-    pull_pairs(pairs, count, branch, M, result->mass);
 }
 
 /* Compute the vectors along the arms of a branch, turned (even,), and return the sum of their
@@ -264,20 +258,20 @@ static void root_terms(const System *system, const Branch *branch, Evaluation *r
 }
 
 /* Add the terms of the pairs of directions, by code for this branch if the compiler knows it. */
-static void add_own_terms(const System *system, const Branch *branch, const double *own,
+static void add_own_terms(const System *s, const Branch *branch, const double *own, int r,
                           Evaluation *result) {
     switch (branch->code) {
-    case LEAF_5: own_terms(5, 5, LEAF_COORDINATES, false, branch, own, result); break;
-    case LEAF_5_BODY: own_terms(6, 5, LEAF_COORDINATES, false, branch, own, result); break;
-    case LEAF_6: own_terms(6, 6, LEAF_COORDINATES, false, branch, own, result); break;
-    case LEAF_6_BODY: own_terms(7, 6, LEAF_COORDINATES, false, branch, own, result); break;
+    case LEAF_5: own_terms(5, 5, LEAF_COORDINATES, false, s, branch, own, r, result); break;
+    case LEAF_5_BODY: own_terms(6, 5, LEAF_COORDINATES, false, s, branch, own, r, result); break;
+    case LEAF_6: own_terms(6, 6, LEAF_COORDINATES, false, s, branch, own, r, result); break;
+    case LEAF_6_BODY: own_terms(7, 6, LEAF_COORDINATES, false, s, branch, own, r, result); break;
     case ANY_BRANCH:
-        own_terms(branch->size, branch->real, branch->count, system->stretch_count > 0, branch, own,
-                  result);
+        own_terms(branch->size, branch->real, branch->count, s->stretch_count > 0, s, branch, own,
+                  r, result);
     }
 }
 
-PRBM void branch_terms(const System *system, const double *own, Evaluation *result) {
+PRBM void branch_terms(const System *system, const double *own, int r, Evaluation *result) {
     memcpy(result->mass, system->constant_mass, system->mass_size * sizeof *result->mass);
     for (int k = 0; k < system->branch_count; k++) {
         const Branch *branch = &system->branches[k];
@@ -285,7 +279,6 @@ PRBM void branch_terms(const System *system, const double *own, Evaluation *resu
             move_root(system, branch, result);
             root_terms(system, branch, result);
         }
-        add_own_terms(system, branch, own, result);
-        branch_to_coordinates(system, branch, 1, result->load, result->a);
+        add_own_terms(system, branch, own, r, result);
     }
 }

@@ -453,7 +453,7 @@ static void blocks_to_coordinates(const Equations *eq, Evaluation *result) {
     if (system->stretch_count > 0) {
         find_shift(system, &result->at, result->shift);
     }
-    branch_terms(system, own, result);
+    branch_terms(system, own, eq->dense ? eq->r : 0, result);
 }
 
 /* Compute directions, loads and rows. */
@@ -470,7 +470,10 @@ PRBM void rows_to_coordinates(const Equations *eq, const double *rows, double *o
     if (eq->dense) {
         zeros(eq->r * system->even, out);
         for (int b = 0; b < system->branch_count; b++) {
-            branch_to_coordinates(system, &system->branches[b], eq->r, rows, out);
+            for (int k = 0; k < eq->r; k++) {
+                branch_to_coordinates(&system->branches[b], rows + k * system->wide,
+                                      out + k * system->even);
+            }
         }
         return;
     }
@@ -479,7 +482,7 @@ PRBM void rows_to_coordinates(const Equations *eq, const double *rows, double *o
             zeros(to->list[s].end - to->list[s].start, out + to->list[s].start);
         }
         for (int s = from->first[k]; s < from->first[k + 1]; s++) {
-            branch_to_coordinates(system, &system->branches[from->list[s].branch], 1, rows, out);
+            branch_to_coordinates(&system->branches[from->list[s].branch], rows, out);
         }
         rows += system->wide;
         out += system->even;
@@ -501,8 +504,13 @@ NOINLINE void mapped_terms(const Equations *eq, const Reference *near, Evaluatio
     for (int j = 0; j < even; j += LANES) {
         set_lanes(result->a + j, all_lanes(0.0));
     }
+    if (eq->dense) {
+        zeros(eq->r * even, Z);
+    }
     blocks_to_coordinates(eq, result);
-    rows_to_coordinates(eq, result->rows, Z);
+    if (!eq->dense) {
+        rows_to_coordinates(eq, result->rows, Z);
+    }
     for (int k = 0; system->stretch_count > 0 && k < eq->r; k++) {
         result->lam[k] +=
             interval_product(&eq->intervals.directions, k, result->rows + k * wide, result->shift);
