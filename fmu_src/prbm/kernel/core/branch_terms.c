@@ -150,6 +150,34 @@ SIZED void pull_pairs(int pairs, int count, const Branch *branch, const double *
     }
 }
 
+/* The same for a leaf, all masses at once.  The pairs of a body, in the row behind the real ones,
+ * change the masses of its coordinate only, the last ones. */
+SIZED void pull_leaf_pairs(int size, int real, const Branch *branch, const double *RESTRICT M,
+                           double *RESTRICT mass) {
+    const double *product = branch->products;
+    Lanes sum[LEAF_MASSES] = {NO_LANES};
+    UNROLLED
+    for (int i = 1; i < size; i++) {
+        UNROLLED
+        for (int j = 0; j < size; j++) {
+            if (j < i) {
+                UNROLLED
+                for (int k = 0; k < LEAF_MASSES; k += LANES) {
+                    if (i < real || k >= LEAF_MASSES - LEAF_BODY_MASSES) {
+                        sum[k] += M[j] * aligned_lanes(product + k);
+                    }
+                }
+                product += LEAF_MASSES;
+            }
+        }
+        M += even_length(i);
+    }
+    UNROLLED
+    for (int k = 0; k < LEAF_MASSES; k++) {
+        mass[branch->own[k]] += LANE(sum[k - k % LANES], k % LANES);
+    }
+}
+
 /* Add the masses of the pairs of directions that are coordinates. */
 static void add_pairs(const Branch *branch, const double *M, const double *own, double *mass) {
     const int *index = branch->own;
@@ -173,15 +201,15 @@ SIZED void own_terms(int size, int real, int count, bool stretching, const Syste
     for (int i = 0; stretching && i < size; i++) {
         result->load[start + i] += own[start + i] * result->shift[start + i];
     }
-    if (!IS_CONSTANT(size) && branch->identity) {
+    if (branch->code != ANY_BRANCH) {
+        pull_leaf_pairs(size, real, branch, M, result->mass);
+    } else if (branch->identity) {
         add_pairs(branch, M, own + start, result->mass);
     } else {
         if (stretching) {
             pad(size, own + start, M + branch->pairs - even_length(size));
         }
-        const int half = size / PAIR; /* Rows of the lengths 2, 2, 4, 4, and so on. */
-        const int pairs = IS_CONSTANT(size) ? PAIR * half * (half + size % PAIR) : branch->pairs;
-        pull_pairs(pairs, count, branch, M, result->mass);
+        pull_pairs(branch->pairs, count, branch, M, result->mass);
     }
     pull_back(size, count, branch, result->load, result->a);
     for (int k = 0; k < r; k++) {

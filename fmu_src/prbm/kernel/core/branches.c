@@ -202,7 +202,18 @@ static void set_own(System *system, Branch *branch) {
     }
 }
 
-/* Set the products of the changes of each pair of directions, for one mass. */
+/* Set the products of the changes of each pair of directions of a leaf, for one mass. */
+static void set_leaf_products(const Branch *branch, const double *x, const double *y,
+                              double *next) {
+    for (int i = 1; i < branch->size; i++) {
+        for (int j = 0; j < i; j++) {
+            *next = x[i] * y[j] + x[j] * y[i];
+            next += LEAF_MASSES;
+        }
+    }
+}
+
+/* The same for any branch. */
 static double *set_products(const Branch *branch, const double *x, const double *y,
                             bool stretching, double *next) {
     for (int i = 1; i < branch->size; i++) {
@@ -230,11 +241,16 @@ static void set_all_products(System *system, Branch *branch) {
         for (int b = 0; b <= a; b++) {
             const double *x = branch->change + a * branch->even;
             const double *y = branch->change + b * branch->even;
-            double *mass = &system->constant_mass[branch->own[entry++]];
+            double *mass = &system->constant_mass[branch->own[entry]];
             for (int i = 0; !stretching && i < branch->size; i++) {
                 *mass += system->own[branch->start + i] * x[i] * y[i];
             }
-            next = set_products(branch, x, y, stretching, next);
+            if (branch->code == ANY_BRANCH) {
+                next = set_products(branch, x, y, stretching, next);
+            } else {
+                set_leaf_products(branch, x, y, branch->products + entry);
+            }
+            entry++;
         }
     }
 }
@@ -310,13 +326,25 @@ static void set_path(System *system, Branch *branch) {
     }
 }
 
+/* Whether the last direction of a branch, and of no other, is its last coordinate. */
+static bool ends_with_body(const Branch *branch) {
+    const double *last = branch->change + branch->size - 1;
+    for (int c = 0; c < branch->count; c++) {
+        if (last[c * branch->even] != (c == branch->count - 1 ? 1.0 : 0.0)) {
+            return false;
+        }
+    }
+    return true;
+}
+
 /* Return the code for a branch.  The row of H of a body may be real, too. */
 static BranchCode code_of(const System *system, const Branch *branch) {
     const Step *step = &system->mechanism->steps[branch->step];
     const int nodes = step->flexure ? node_count(kind_of(system->mechanism, step->flexure)) : 0;
     const int bodies = !step->closes;
     bool plain = system->stretch_count == 0 && branch->count == LEAF_COORDINATES;
-    if (!plain || branch->real < nodes || branch->size != nodes + bodies) {
+    if (!plain || branch->real < nodes || branch->size != nodes + bodies ||
+        (bodies && !ends_with_body(branch))) {
         return ANY_BRANCH;
     }
     switch (nodes) {
@@ -342,10 +370,10 @@ PRBM void set_branches(System *system, Scratch scratch) {
         set_parts(system, branch, system->S, branch->S);
         set_own(system, branch);
         branch->identity = is_identity(branch);
+        branch->code = code_of(system, branch);
         if (!branch->identity) {
             set_all_products(system, branch);
         }
-        branch->code = code_of(system, branch);
         set_path(system, branch);
         if (branch->parent != FIXED) {
             set_lever(system, branch);

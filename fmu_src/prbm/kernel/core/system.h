@@ -81,9 +81,10 @@ typedef struct {
 } Block;
 
 /* Branches with code of their own: beams with LEAF_COORDINATES, as clamped ones of the order 3, without
- * stretch, with 5 or 6 nodes, alone or with the body that they reach. */
+ * stretch, with 5 or 6 nodes, alone or with the body that they reach, whose rotation is their last
+ * coordinate.  Of the masses of all pairs of these coordinates, the last ones are the body's. */
 typedef enum { ANY_BRANCH, LEAF_5, LEAF_5_BODY, LEAF_6, LEAF_6_BODY } BranchCode;
-enum { LEAF_COORDINATES = 4 };
+enum { LEAF_COORDINATES = 4, LEAF_MASSES = 10, LEAF_BODY_MASSES = 4 };
 
 /* What a step of the assembly adds: the directions of a flexure and of the body that it reaches,
  * behind a root on another branch or on the ground. */
@@ -100,7 +101,8 @@ typedef struct {
     BranchCode code;       /* The code that is compiled for it. */
     int *own;              /* (count (count + 1) / 2,) indices of the masses of the coordinates */
     int pairs;             /* The padded number of pairs of directions. */
-    double *products;      /* (masses, pairs) changes of each mass with that of each pair */
+    double *products;      /* (masses, pairs) changes of each mass with that of each pair; for leaves
+                            * (pairs, masses) without padding between the pairs */
     int parent;            /* The branch that carries the root; FIXED: the ground. */
     Parts lever;           /* (even of the parent,) displacement of the root with its directions */
     int reach, *path;      /* The coordinates that move the root. */
