@@ -456,14 +456,6 @@ static void blocks_to_coordinates(const Equations *eq, Evaluation *result) {
     branch_terms(system, own, eq->dense ? eq->r : 0, result);
 }
 
-/* Compute directions, loads and rows. */
-SIZED void direction_terms(int wide, const Equations *eq, const Reference *near,
-                           Evaluation *result) {
-    directions_of(wide, eq->system, near, &result->at);
-    find_loads(wide, eq, result);
-    rows_padded(wide, eq, &result->at, result->rows, result->lam);
-}
-
 PRBM void rows_to_coordinates(const Equations *eq, const double *rows, double *out) {
     const System *system = eq->system;
     const Intervals *to = &eq->intervals.coordinates, *from = &eq->intervals.directions;
@@ -489,18 +481,15 @@ PRBM void rows_to_coordinates(const Equations *eq, const double *rows, double *o
     }
 }
 
-/* Compute loads, rows and mass matrix of the directions, and pull them back to the coordinates.
- * The lengths for guides on two beams with 5 or 6 nodes are compiled separately. */
+/* Compute loads, rows and mass matrix of the directions, and pull them back to the coordinates. */
 NOINLINE void mapped_terms(const Equations *eq, const Reference *near, Evaluation *result) {
     const System *system = eq->system;
     const int even = system->even, wide = system->wide;
     double *Z = result->factors.Z;
     map_motion(system, &result->at);
-    switch (wide) {
-    case 12: direction_terms(12, eq, near, result); break;
-    case 14: direction_terms(14, eq, near, result); break;
-    default: direction_terms(wide, eq, near, result);
-    }
+    directions_of(wide, system, near, &result->at);
+    find_loads(wide, eq, result);
+    rows_padded(wide, eq, &result->at, result->rows, result->lam);
     for (int j = 0; j < even; j += LANES) {
         set_lanes(result->a + j, all_lanes(0.0));
     }
