@@ -14,14 +14,13 @@ static const double LARGEST_WEIGHT[STAGES] = LARGEST_WEIGHTS;
 
 /* Compute y + h sum(a_i k_i) for all stages.  The length n is even: y contains angles, as many
  * rates, and two energies. */
-SIZED void combine_length(int n, double h, const double *a, const double *k, const double *y,
-                          double *result) {
+static void combine(int n, double h, const double *a, const double *k, const double *y,
+                    double *result) {
     Lanes weight[STAGES];
     UNROLLED
     for (int i = 0; i < STAGES; i++) {
         weight[i] = all_lanes(a[i]);
     }
-    UNROLLED_BY_LANES
     for (int j = 0; j < n; j += LANES) {
         Lanes sum = weight[0] * lanes_at(k + j);
         UNROLLED
@@ -29,15 +28,6 @@ SIZED void combine_length(int n, double h, const double *a, const double *k, con
             sum += weight[i] * lanes_at(k + i * n + j);
         }
         set_lanes(result + j, lanes_at(y + j) + h * sum);
-    }
-}
-
-static void combine(int n, double h, const double *a, const double *k, const double *y,
-                    double *result) {
-    switch (n) {
-    case 8: combine_length(8, h, a, k, y, result); break;
-    case 16: combine_length(16, h, a, k, y, result); break;
-    default: combine_length(n, h, a, k, y, result);
     }
 }
 
@@ -116,19 +106,10 @@ PRBM bool stages(const Equations *equations, double t, int n, const double *y, d
     return true;
 }
 
-SIZED void errors_of_length(int n, const double *k, double h, double *fine, double *coarse) {
-    UNROLLED_BY_LANES
+PRBM void errors_of(int n, const double *k, double h, double *fine, double *coarse) {
     for (int j = 0; j < n; j += LANES) {
         set_lanes(fine + j, h * weighted(STAGES, ERROR_WEIGHT, n, k + j));
         set_lanes(coarse + j, h * weighted(STAGES, COARSE_ERROR_WEIGHT, n, k + j));
-    }
-}
-
-PRBM void errors_of(int n, const double *k, double h, double *fine, double *coarse) {
-    switch (n) {
-    case 8: errors_of_length(8, k, h, fine, coarse); break;
-    case 16: errors_of_length(16, k, h, fine, coarse); break;
-    default: errors_of_length(n, k, h, fine, coarse);
     }
 }
 
