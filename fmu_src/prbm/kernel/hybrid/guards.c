@@ -518,8 +518,11 @@ PRBM bool closing_time(Simulation *sim, const Guard *guard, int stop, Fall *fall
     return !search.failed;
 }
 
-PRBM bool sampled_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
-                       Problem *problem) {
+/* Find the first time within the step at which a guard falls to zero, from its values at the
+ * samples.  If it begins at most at zero_level, only a fall from above the noise that an acceleration
+ * of round-off adds within the step counts, or a value below it at the end. */
+static bool fall_in_samples(Simulation *sim, const Guard *guard, int contact, double zero_level,
+                            double acceleration, Fall *fall, Problem *problem) {
     Search search = {sim, guard, contact, false, problem};
     ArcGuard on_arc = arc_guard(&search);
     double z[GUARD_INTERVALS + 1];
@@ -527,18 +530,28 @@ PRBM bool sampled_time(Simulation *sim, const Guard *guard, int contact, Fall *f
         Instant at = sample(sim, k);
         z[k] = guard->value(&sim->equations, &at, contact);
     }
-    bool begins = z[0] <= 0.0;
+    bool begins = z[0] <= zero_level;
+    double noise = begins ? acceleration * sim->state.arc.h : 0.0;
     for (int k = begins; !fall->found && k < GUARD_INTERVALS; k++) {
-        if (z[k + 1] <= 0.0 && 0.0 < z[k]) {
+        if (z[k] > noise && z[k + 1] <= 0.0) {
             fall->found = true;
             fall->time = locate(&on_arc, sample_time(sim, k), sample_time(sim, k + 1));
         }
     }
-    if (!fall->found && begins && z[GUARD_INTERVALS] < 0.0) {
+    if (!fall->found && begins && z[GUARD_INTERVALS] < -noise) {
         fall->found = true;
         fall->time = sample_time(sim, 1);
+        if (zero_level > 0.0 && z[0] >= -zero_level) {
+            on_arc.offset = 2.0 * zero_level;
+            fall->time = locate(&on_arc, sample_time(sim, 0), fall->time);
+        }
     }
     return !search.failed;
+}
+
+PRBM bool sampled_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
+                       Problem *problem) {
+    return fall_in_samples(sim, guard, contact, 0.0, 0.0, fall, problem);
 }
 
 /* --- friction and releases -------------------------------------------------------------------- */
@@ -549,60 +562,22 @@ PRBM bool sampled_time(Simulation *sim, const Guard *guard, int contact, Fall *f
  * or else after the first interval. */
 PRBM bool reversal_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
                         Problem *problem) {
-    Search search = {sim, guard, contact, false, problem};
-    ArcGuard on_arc = arc_guard(&search);
-    double z[GUARD_INTERVALS + 1];
-    for (int k = 0; k <= GUARD_INTERVALS; k++) {
-        Instant at = sample(sim, k);
-        z[k] = guard->value(&sim->equations, &at, contact);
-    }
     double zero = zero_speed(&sim->configuration);
-    bool begins = z[0] <= zero;
-    double noise = begins ? zero_acceleration(&sim->configuration) * sim->state.arc.h : 0.0;
-    for (int k = begins; !fall->found && k < GUARD_INTERVALS; k++) {
-        if (z[k] > noise && z[k + 1] <= 0.0) {
-            fall->found = true;
-            fall->time = locate(&on_arc, sample_time(sim, k), sample_time(sim, k + 1));
-        }
-    }
-    if (!fall->found && begins && z[GUARD_INTERVALS] < -noise) {
-        fall->found = true;
-        fall->time = sample_time(sim, 1);
-        if (z[0] >= -zero) {
-            on_arc.offset = 2.0 * zero;
-            fall->time = locate(&on_arc, sample_time(sim, 0), fall->time);
-        }
-    }
-    return !search.failed;
+    return fall_in_samples(sim, guard, contact, zero, zero_acceleration(&sim->configuration), fall,
+                           problem);
 }
 
-/* Find the time at which a guard falls to zero, from its values at the start, the
- * middle and the end of the step. */
-PRBM bool yield_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
-                     Problem *problem) {
+/* Find the time at which a guard falls below -offset, from its values at the start, the middle and
+ * the end of the step.  If ignored, a guard that has fallen at the start counts only if it has in the
+ * middle, too. */
+static bool fall_in_halves(Simulation *sim, const Guard *guard, int contact, double offset,
+                           bool ignored, Fall *fall, Problem *problem) {
     Search search = {sim, guard, contact, false, problem};
     ArcGuard on_arc = arc_guard(&search);
     const Arc *arc = &sim->state.arc;
     double times[3] = {arc->start, arc->start + arc->h / 2, arc->start + arc->h};
-    for (int part = 0; !fall->found && part < 2; part++) {
-        double a = times[part], b = times[part + 1];
-        if (guard_at(&on_arc, b) <= 0.0) {
-            fall->found = true;
-            fall->time = locate(&on_arc, a, b); /* At a if the guard has fallen there. */
-        }
-    }
-    return !search.failed;
-}
-
-/* Find the time at which the force of a slipping guide changes its side by more than round-off.  Directly
- * after a change it may be round-off of either sign, which counts only if it persists. */
-PRBM bool side_time(Simulation *sim, const Guard *guard, int contact, Fall *fall, Problem *problem) {
-    Search search = {sim, guard, contact, false, problem};
-    ArcGuard on_arc = arc_guard(&search);
-    const Arc *arc = &sim->state.arc;
-    double times[3] = {arc->start, arc->start + arc->h / 2, arc->start + arc->h};
-    on_arc.offset = zero_force(&sim->configuration);
-    bool begins = guard_at(&on_arc, times[0]) <= 0.0;
+    on_arc.offset = offset;
+    bool begins = ignored && guard_at(&on_arc, times[0]) <= 0.0;
     for (int part = 0; !fall->found && part < 2; part++) {
         double a = times[part], b = times[part + 1];
         if (guard_at(&on_arc, b) <= 0.0) {
@@ -611,6 +586,18 @@ PRBM bool side_time(Simulation *sim, const Guard *guard, int contact, Fall *fall
         }
     }
     return !search.failed;
+}
+
+/* Find the time at which a guard falls to zero: at the start if it has fallen there. */
+PRBM bool yield_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
+                     Problem *problem) {
+    return fall_in_halves(sim, guard, contact, 0.0, false, fall, problem);
+}
+
+/* Find the time at which the force of a slipping guide changes its side by more than round-off.  Directly
+ * after a change it may be round-off of either sign, which counts only if it persists. */
+PRBM bool side_time(Simulation *sim, const Guard *guard, int contact, Fall *fall, Problem *problem) {
+    return fall_in_halves(sim, guard, contact, zero_force(&sim->configuration), true, fall, problem);
 }
 
 /* Find the time at which the phase of a pressed contact changes. */
