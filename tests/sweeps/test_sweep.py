@@ -30,7 +30,7 @@ from native_host import clocked
 from prbm.base.errors import ParameterError, PrbmError
 from prbm.commands.command_line import main
 from prbm.sweeps import runner
-from prbm.sweeps.fmu import Job, Runner
+from prbm.sweeps.fmu import FmuJob, Runner
 from prbm.sweeps.outputs import Output, evaluate, parse_output, reduce
 from prbm.sweeps.results import OWN
 from prbm.sweeps.results import SETTINGS as KEY
@@ -124,7 +124,7 @@ def test_a_row_equals_a_run_by_fmpy_in_event_mode():
 def test_an_instance_is_reset_only_if_the_reset_works(native, tmp_path, monkeypatch, works):
     """The results are those of new instances in both cases."""
     folder = Path(fmpy.extract(native["PRBDM", 2], tmp_path / "fmu"))
-    job = Job(0.0, 0.05, 1e-3, 1e-8, {}, (Output("x", "shuttle.x"), Output("v", "shuttle.vx")))
+    job = FmuJob(0.0, 0.05, 1e-3, 1e-8, {}, (Output("x", "shuttle.x"), Output("v", "shuttle.vx")))
     rows = [{"release.displacement": x} for x in (-0.01, -0.012, -0.015, -0.018)]
     fresh = [Runner(folder, job).run(row).values for row in rows]
     fmu = Runner(folder, job)
@@ -765,7 +765,7 @@ def test_fixed_columns_differ_from_the_variables_of_the_guide(native):
 def test_logging_is_switched_off_after_many_messages(native, tmp_path):
     """The results stay the same, and failures are still reported."""
     folder = Path(fmpy.extract(native["PRBDM", 3], tmp_path / "fmu"))
-    runner = Runner(folder, Job(0.0, 0.01, 1e-3, 1e-8, {}, (Output("x", "shuttle.x"),)))
+    runner = Runner(folder, FmuJob(0.0, 0.01, 1e-3, 1e-8, {}, (Output("x", "shuttle.x"),)))
     expected = runner.run({}).values
     runner.logged = 1000
     assert runner.run({}).values == expected

@@ -18,10 +18,11 @@ import threading
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
-from typing import Any, BinaryIO, Protocol
+from dataclasses import dataclass, field
+from typing import Any, BinaryIO
 
 from ..base.threads import THREAD_LIMITS
-from .outputs import CRASHED, TIMEOUT, Outcome
+from .outputs import CRASHED, TIMEOUT, Outcome, Output
 
 EXIT_TIMEOUT = 5.0  # Longest wait for the exit of a process before it is killed [s].
 STOPPED = "the study was stopped"
@@ -37,11 +38,52 @@ Task = Callable[[], Callable[[Row], Outcome]]
 """Called once in a process; returns the function that simulates.  It can be pickled."""
 
 
-class Job(Protocol):
-    """A simulation that can be sent to other machines."""
+@dataclass(frozen=True)
+class Job:
+    """A simulation that can be sent to other machines.
+
+    Parameters
+    ----------
+    start, stop, step : float
+        Start time, stop time and time between samples [s].
+    tolerance : float or None
+        Relative tolerance; None: that of the mechanism, or not passed to the FMU.
+    values : mapping
+        Parameters and inputs of all runs, in SI or the units of the FMU.
+    outputs : tuple of Output
+        The outputs.
+    inputs : mapping
+        Inputs over time of all runs.  Names in braces in their texts are columns of the table.
+    """
+
+    start: float
+    stop: float
+    step: float
+    tolerance: float | None
+    values: Mapping[str, float]
+    outputs: tuple[Output, ...]
+    inputs: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Times and tolerance, for the journal."""
+        return {
+            "stop time [s]": self.stop, "step [s]": self.step, "tolerance": self.tolerance,
+        }  # fmt: skip
+
+    def driven(self, row: Row) -> tuple[dict[str, float], dict[str, Any]]:
+        """Return the values and the inputs of a run; columns in braces are in the inputs."""
+        if not self.inputs:
+            return {**self.values, **row}, {}
+        from ..runs.inputs import filled, placeholders  # imported here: few runs of FMUs need it
+
+        within = placeholders(self.inputs)
+        others = {name: x for name, x in row.items() if name not in within}
+        return {**self.values, **others}, filled(self.inputs, row)
 
     def placed(self) -> AbstractContextManager[Task]:
         """Return a context in which the simulation is ready on this machine."""
+        raise NotImplementedError
 
 
 # --- the process --------------------------------------------------------------------------------

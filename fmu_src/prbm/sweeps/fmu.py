@@ -28,7 +28,8 @@ from fmpy.simulation import (  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from ..runs.quantities import FREQUENCY
-from .outputs import ENDED, FAILED, OK, Outcome, Output, evaluate
+from .children import Job, Row, Task
+from .outputs import ENDED, FAILED, OK, Outcome, evaluate
 
 if TYPE_CHECKING:
     from ..runs.driving import Driver
@@ -46,47 +47,27 @@ LOGGED_MAX = 100  # More messages in a run switch logging off for the next runs.
 
 
 @dataclass(frozen=True)
-class Job:
-    """Runs of an FMU, a :class:`prbm.sweeps.children.Job`.
+class FmuJob(Job):
+    """Runs of an FMU.
 
     Parameters
     ----------
-    start, stop, step : float
-        Start time, stop time and communication step [s].
-    tolerance : float or None
-        Relative tolerance passed to the FMU; None: not passed.
-    values : mapping
-        Start values of all runs.
-    outputs : tuple of Output
-        Recorded outputs.
-    inputs : mapping
-        Inputs over time by name.  Names in braces in their texts are columns of the table.
     reuse : bool
         Reset the instance between runs if its reset works (default: True).
     content : bytes
         The FMU.
     """
 
-    start: float
-    stop: float
-    step: float
-    tolerance: float | None
-    values: Mapping[str, float]
-    outputs: tuple[Output, ...]
-    inputs: Mapping[str, Any] = field(default_factory=dict)
     reuse: bool = True
     content: bytes = field(default=b"", repr=False)
 
     @property
     def settings(self) -> dict[str, Any]:
         """Times and tolerance, for the journal."""
-        return {
-            "start time [s]": self.start, "stop time [s]": self.stop, "step [s]": self.step,
-            "tolerance": self.tolerance,
-        }  # fmt: skip
+        return {"start time [s]": self.start, **super().settings}
 
     @contextmanager
-    def placed(self) -> "Iterator[Callable[[], Callable[[Mapping[str, float]], Outcome]]]":
+    def placed(self) -> Iterator[Task]:
         """Unpack the FMU; yield the function that loads it and returns the one that runs it."""
         from ..fmu.unpack import unpacked  # imported here: the processes do not need it
 
@@ -94,7 +75,7 @@ class Job:
             yield partial(_loaded, folder, replace(self, content=b""))
 
 
-def _loaded(folder: Path, job: Job) -> Callable[[Mapping[str, float]], Outcome]:
+def _loaded(folder: Path, job: FmuJob) -> Callable[[Row], Outcome]:
     try:
         return Runner(folder, job).run
     except Exception as error:  # FMPy raises plain exceptions.
@@ -140,7 +121,7 @@ class Runner:
     ----------
     folder : Path
         The unpacked FMU.
-    job : Job
+    job : FmuJob
         Settings of the runs.
 
     Attributes
@@ -154,7 +135,7 @@ class Runner:
         Any exception of FMPy, if the FMU cannot be loaded or instantiated.
     """
 
-    def __init__(self, folder: Path, job: Job) -> None:
+    def __init__(self, folder: Path, job: FmuJob) -> None:
         self.job, self.messages = job, list[tuple[int, str]]()
         self.description = fmpy.read_model_description(str(folder), validate=False)
         # Whether the FMU is of FMI 2.0, not 3.0.
@@ -260,21 +241,16 @@ class Runner:
                 eventModeUsed=self.events, logMessage=self._log3, loggingOn=self.logging
             )
 
-    def _driven(self, row: Mapping[str, float]) -> tuple[dict[str, float], "Driver | None"]:
+    def _driven(self, row: Row) -> tuple[dict[str, float], "Driver | None"]:
         """Return the start values of a run, and the driver of its inputs over time."""
-        if not self.job.inputs:
-            return {**self.job.values, **row}, None
+        values, inputs = self.job.driven(row)
+        if not inputs:
+            return values, None
         from ..runs.driving import Driver  # imported here: few sweeps need it
-        from ..runs.inputs import driving, filled, placeholders
+        from ..runs.inputs import driving
 
-        within = placeholders(self.job.inputs)
-        others = {name: x for name, x in row.items() if name not in within}
-        signals = driving(
-            input_units(self.description), (), filled(self.job.inputs, row),
-            {*others, *self.job.values},
-        )  # fmt: skip
-        driver = Driver(signals, self.job.start)
-        return {**self.job.values, **driver.values(self.job.start), **others}, driver
+        driver = Driver(driving(input_units(self.description), (), inputs, values), self.job.start)
+        return {**values, **driver.values(self.job.start)}, driver
 
     def _simulate(
         self, values: dict[str, float], driver: "Driver | None"

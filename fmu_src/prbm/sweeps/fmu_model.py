@@ -22,9 +22,9 @@ from ..base.names import proposal
 from ..files.settings import in_unit
 from ..mechanics.arrays import Real
 from ..mechanism.parameters import Tolerance
-from ..runs.inputs import Source, driving, filled
-from ..runs.run import ROWS_MAX
-from .fmu import Job, input_units, unit
+from ..runs.inputs import driving, filled
+from ..runs.run import ROWS_MAX, check_duration
+from .fmu import FmuJob, input_units, unit
 from .outputs import Output
 from .runner import StudyError
 from .table import number
@@ -74,6 +74,7 @@ class FmuModel:
 
     def __init__(self, path: str | Path) -> None:
         self.content, self.description = read_fmu(Path(path))
+        self.simulation = self.description.coSimulation
         self.name, self.title = Path(path).stem, self.description.modelName
         self.variables = {v.name: v for v in self.description.modelVariables}
         self.identity = {
@@ -165,63 +166,67 @@ class FmuModel:
 
     def job(
         self,
-        outputs: tuple[Output, ...],
-        values: Mapping[str, float],
-        inputs: Mapping[str, Source],
         row: Mapping[str, float],
-        options: tuple[Any, Any, Any, Any],
-    ) -> Job:
-        """Return the runs, from stop time, step, tolerance and engine, which must be None.
+        stop_time: Any = None,
+        step: Any = None,
+        tolerance: Any = None,
+        engine: str | None = None,
+        **given: Any,
+    ) -> FmuJob:
+        """Return the runs with given values, inputs and outputs.
 
         Raises
         ------
         ParameterError
             If an option is invalid, or the signals with the numbers of the first row.
         """
-        stop_time, step, tolerance, engine = options
         if engine is not None:
             raise ParameterError(f"engine = {engine!r}: an FMU has its own; omit it")
-        varies = self.description.coSimulation.canHandleVariableCommunicationStepSize
+        varies, inputs = self.simulation.canHandleVariableCommunicationStepSize, given["inputs"]
         if inputs and not varies:
             raise ParameterError(
                 "inputs over time need an FMU with variable communication steps; this one has "
                 "fixed steps: leave the inputs out"
             )
         units = input_units(self.description)
-        driving(units, self.values.keys() - units, filled(inputs, row), {*values, *row})
-        times = self._times(stop_time, step, tolerance, varies)
-        return Job(*times, values, outputs, inputs, content=self.content)
+        constants = {*given["values"], *row}
+        driving(units, self.values.keys() - units, filled(inputs, row), constants)
+        times = self._times(stop_time, step, tolerance)
+        return FmuJob(*times, **given, content=self.content)
 
     def _times(
-        self, stop_time: Any, step: Any, tolerance: Any, varies: bool
+        self, stop_time: Any, step: Any, tolerance: Any
     ) -> tuple[float, float, float, float | None]:
         """Return start, stop, step and tolerance; None is replaced by the default experiment."""
-        proposed = {
-            name: None if x is None else float(x)
-            for name in ("startTime", "stopTime", "stepSize", "tolerance")
-            for x in [getattr(self.description.defaultExperiment, name, None)]
-        }
-        start, stop = proposed["startTime"] or 0.0, proposed["stopTime"]
-        stop = start + 1.0 if stop is None else stop
-        stop = stop if stop_time is None else in_unit("stop_time", stop_time, "s")
-        size = proposed["stepSize"]
-        if size is None:
-            size = float(self.description.coSimulation.fixedInternalStepSize or 0.0)
-        size = size or (stop - start) / STEPS
-        size = size if step is None else in_unit("step", step, "s")
-        if tolerance is None:
-            tolerance = proposed["tolerance"]
+
+        def proposed(name: str, otherwise: Any) -> Any:
+            x = getattr(self.description.defaultExperiment, name, None)
+            return otherwise if x is None else float(x)
+
+        start = proposed("startTime", 0.0)
+        if stop_time is None:
+            stop = proposed("stopTime", start + 1.0)
+        else:
+            stop = in_unit("stop_time", stop_time, "s")
         if not (math.isfinite(stop) and stop > start):
             raise ParameterError(f"stop_time = {stop:g} s must be finite and after {start:g} s")
-        for name, x, of_unit in (("step", size, " s"), ("tolerance", tolerance, "")):
-            if x is not None and not (math.isfinite(x) and x > 0.0):
-                raise ParameterError(f"{name} = {x:g}{of_unit} must be positive and finite")
+        if step is None:
+            fixed = float(self.simulation.fixedInternalStepSize or 0.0)
+            size = proposed("stepSize", fixed) or (stop - start) / STEPS
+        else:
+            size = in_unit("step", step, "s")
+        check_duration("step", size)
+        if tolerance is None:
+            tolerance = proposed("tolerance", None)
+        if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0.0):
+            raise ParameterError(f"tolerance = {tolerance:g} must be positive and finite")
         steps = (stop - start) / size
         if steps > ROWS_MAX:
             raise ParameterError(
                 f"step = {size:g} s makes {steps:.0f} steps in {stop - start:g} s: choose a larger "
                 "one"
             )
+        varies = self.simulation.canHandleVariableCommunicationStepSize
         if abs(steps - round(steps)) > 1e-9 * steps and not varies:
             raise ParameterError(
                 f"stop_time = {stop:g} s: must be a multiple of step = {size:g} s, since the FMU "

@@ -1,7 +1,7 @@
 """A mechanism as the model of a study: simulations without an FMU."""
 
 import hashlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -24,9 +24,10 @@ from ..mechanism.description import Mechanism
 from ..mechanism.parameters import Tolerance
 from ..runs.engine import PYTHON, check_engine, kernel_available
 from ..runs.experiment import experiment
-from ..runs.inputs import Source, filled, placeholders, signals
+from ..runs.inputs import Source, filled, signals
 from ..runs.result import names as column_names
 from ..runs.run import communication_points, sampled, simulate
+from .children import Job, Row, Task
 from .outputs import FAILED, OK, Outcome, Output, evaluate, parse_output
 
 STEPS = 4000  # Communication steps of a simulation, which resolve the vibration after impacts.
@@ -98,13 +99,14 @@ class MechanismModel:
 
     def job(
         self,
-        outputs: tuple[Output, ...],
-        values: Mapping[str, float],
-        inputs: Mapping[str, Source],
         row: Mapping[str, float],
-        options: tuple[Any, Any, Any, Any],
+        stop_time: Any = None,
+        step: Any = None,
+        tolerance: Any = None,
+        engine: str | None = None,
+        **given: Any,
     ) -> "MechanismJob":
-        """Return the simulations, from stop time, step, tolerance and engine.
+        """Return the simulations with given values, inputs and outputs.
 
         Raises
         ------
@@ -112,11 +114,11 @@ class MechanismModel:
             If a value or an option is invalid, so that every simulation would fail, or the signals
             with the numbers of the first row.
         """
-        stop_time, step, tolerance, engine = options
         check_engine(engine)
         if engine is None and not kernel_available():  # Compiled and reported here, not by workers.
             engine = PYTHON
-        signals(self.mechanism, filled(inputs, row), {**values, **row})
+        values = given["values"]
+        signals(self.mechanism, filled(given["inputs"], row), {**values, **row})
         start_values(self.mechanism, values, 0.0)
         if stop_time is None:
             stop = experiment(self.mechanism, values, engine).stop_time
@@ -127,29 +129,19 @@ class MechanismModel:
         if tolerance is not None:
             tolerance = checked_tolerance(in_unit("tolerance", tolerance, ""))
         return MechanismJob(
-            self.mechanism, outputs, values, inputs, stop, spacing, tolerance, engine,
-            tuple(self.units),
+            0.0, stop, spacing, tolerance, **given, mechanism=self.mechanism, engine=engine,
+            names=tuple(self.units),
         )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class MechanismJob:
-    """Simulations of a mechanism, a :class:`prbm.sweeps.children.Job`.
+@dataclass(frozen=True, kw_only=True)
+class MechanismJob(Job):
+    """Simulations of a mechanism.
 
     Parameters
     ----------
     mechanism : Mechanism
         The mechanism.
-    outputs : tuple of Output
-        The outputs.
-    values : mapping
-        Parameters and inputs of all simulations, in SI.
-    inputs : mapping
-        Inputs over time of all simulations.
-    stop, step : float
-        Duration, and time between samples [s].
-    tolerance : float or None
-        Relative tolerance; None: ``solver.tolerance``.
     engine : str or None
         As for :func:`prbm.simulate`.
     names : tuple of str
@@ -157,22 +149,13 @@ class MechanismJob:
     """
 
     mechanism: Mechanism
-    outputs: tuple[Output, ...]
-    values: Mapping[str, float]
-    inputs: Mapping[str, Source]
-    stop: float
-    step: float
-    tolerance: float | None
     engine: str | None
     names: tuple[str, ...]
 
     @property
     def settings(self) -> dict[str, Any]:
         """Times, tolerance and engine, for the journal."""
-        return {
-            "stop time [s]": self.stop, "step [s]": self.step, "tolerance": self.tolerance,
-            "engine": self.engine,
-        }  # fmt: skip
+        return {**super().settings, "engine": self.engine}
 
     @property
     def parallel(self) -> bool:
@@ -180,28 +163,27 @@ class MechanismJob:
         return self.engine != PYTHON
 
     @contextmanager
-    def placed(self) -> Iterator[Callable[[], Callable[[Mapping[str, float]], Outcome]]]:
+    def placed(self) -> Iterator[Task]:
         """Yield a function that returns :meth:`run`: the job has all that it needs."""
         yield partial(getattr, self, "run")
 
-    def run(self, values: Mapping[str, float]) -> Outcome:
+    def run(self, row: Row) -> Outcome:
         """Simulate once; errors of the simulation are returned as outcomes."""
         begin = perf_counter()
         try:
-            found = self._values(values)
+            found = self._values(row)
         except PrbmError as error:
             return Outcome(FAILED, str(error), perf_counter() - begin)
         return Outcome(OK, "", perf_counter() - begin, found)
 
-    def _values(self, values: Mapping[str, float]) -> tuple[float, ...]:
+    def _values(self, row: Row) -> tuple[float, ...]:
         """Return the outputs."""
-        within = placeholders(self.inputs)
-        given = {**self.values, **{n: x for n, x in values.items() if n not in within}}
+        given, inputs = self.driven(row)
         static = [output for output in self.outputs if output.static]
         shape = equilibrium(self.mechanism, self._parameters(given)) if static else None
         columns, impacts = {}, ()  # type: ignore[var-annotated]
         if len(static) < len(self.outputs):
-            columns, impacts = self._motion(given, filled(self.inputs, values))
+            columns, impacts = self._motion(given, inputs)
         return tuple(
             output.at_rest(shape) if output.static else evaluate(output, columns, impacts)
             for output in self.outputs

@@ -143,7 +143,7 @@ class Runner:
         count = process_count(max(runs, 1), workers)
         if hasattr(job, "reuse"):  # The check of a reset doubles the duration of a run.
             many = runs >= RESET_RUNS_MIN * count
-            self.job = replace(job, reuse=many and timeout is None)  # type: ignore[type-var]
+            self.job = replace(job, reuse=many and timeout is None)  # type: ignore[call-arg]
         self.executor: Executor | None = None
         if isinstance(executor, str):
             self.executor = self.stack.enter_context(_client(executor)).get_executor(pure=False)

@@ -25,11 +25,11 @@ from ..mechanism.parameters import Tolerance
 from ..runs.inputs import Source
 from ..runs.signals import Signal
 from .design import SENSITIVITY, Sensitivity, Yield, distribution, drawn, sensitivity, yield_of
-from .journal import Journal
+from .journal import Journal, Point
 from .mechanism import MechanismModel
-from .optimum import REFINEMENTS_EXPECTED, Optimum, Samples, Search
-from .outputs import GOOD, Outcome
-from .plan import Model, Outputs, Plan, Vary, planned, with_spread
+from .optimum import REFINEMENTS_EXPECTED, Optimum, Samples, Search, Values
+from .outputs import GOOD
+from .plan import Model, Outputs, Plan, Vary
 from .runner import Runner
 from .table import PARQUET
 
@@ -211,25 +211,17 @@ def study(
         If a text is not a quantity of the right dimension.
     """
     model = model_of(mechanism)
-    plan = planned(
-        model, vary, model.outputs if outputs is None else outputs, runs, (method, seed),
-        _goal(minimise, maximise), subject_to, values, inputs,
-        (stop_time, step, tolerance, engine),
+    plan = Plan(
+        model, vary, model.outputs if outputs is None else outputs, runs=runs, method=method,
+        seed=seed, minimise=minimise, maximise=maximise, subject_to=subject_to,
+        tolerances=tolerances, values=values, inputs=inputs, stop_time=stop_time, step=step,
+        tolerance=tolerance, engine=engine,
     )  # fmt: skip
-    plan = with_spread(plan, model, tolerances or {})
     return computed(
         plan, table, parquet=Path(table or "").suffix.lower() in PARQUET, workers=workers,
         executor=executor, retries=retries, timeout=timeout, overwrite=overwrite,
         retry_failed=retry_failed, progress=progress,
     )  # fmt: skip
-
-
-def _goal(minimise: str | None, maximise: str | None) -> tuple[str, float] | None:
-    if minimise is not None and maximise is not None:
-        raise ParameterError("minimise and maximise are both given; omit one of them")
-    if minimise is not None:
-        return minimise, 1.0
-    return None if maximise is None else (maximise, -1.0)
 
 
 def model_of(mechanism: Mechanism | str | Path) -> Model:
@@ -300,76 +292,71 @@ def computed(
 
 def _run(plan: Plan, runner: Runner, progress: Progress) -> Study:
     """Simulate, search the optimum and its yield."""
-    points, count = plan.points, len(plan.points)
-    extra = REFINEMENTS_EXPECTED * len(plan.names) if plan.goal else 0
+    count, names, whole = len(plan.points), [*plan.varied], plan.whole_grid
+    extra = REFINEMENTS_EXPECTED * len(names) if plan.output is not None else 0
     extra += YIELD_RUNS if plan.spread else 0
 
     def report(done: float) -> None:
         progress(min(done / (count + extra), LAST_FRACTION) if extra else done / count)
 
-    outcomes = runner.outcomes(plan.rows(points), lambda share: report(share * count))
-    table = _table(outcomes, len(plan.texts))
-    messages = tuple("" if x.status in GOOD else x.message for x in outcomes)
-    whole, method, seed = plan.design
-    columns = dict(zip(plan.names, points.T, strict=True))
-    found: dict[str, Any] = {
-        "varied": dict(plan.varied) if whole else columns, "points": points,
-        "outputs": dict(zip(plan.texts, table.T, strict=True)), "units": plan.units,
-        "messages": messages, "whole_grid": whole, "settings": plan.settings,
-        "good": _good(plan, table) & np.array([not message for message in messages]),
-    }  # fmt: skip
-    if method == SENSITIVITY and not whole:
-        indices = {x: sensitivity(plan.names, y, seed) for x, y in found["outputs"].items()}
-        found["sensitivities"] = {x: y for x, y in indices.items() if y is not None}
-    if plan.goal is None:
-        if plan.constraints and not whole:
-            found["share"] = yield_of(found["good"])
-        progress(1.0)
-        return Study(**found)
+    def values(rows: Sequence[Point], progress: Progress | None = None) -> tuple[Real, list[str]]:
+        """Return outputs (n, k), NaN for failed simulations, and messages."""
+        outcomes, nothing = runner.outcomes(rows, progress), (math.nan,) * len(plan.texts)
+        table = np.array([outcome.values or nothing for outcome in outcomes])
+        return table, ["" if x.status in GOOD else x.message for x in outcomes]
 
-    best = _optimum(plan, runner, table, messages)
-    if plan.spread:
-        rows = [tuple(row) for row in _around(plan, best).tolist()]
-        found["share"] = yield_of(_good(plan, _table(runner.outcomes(rows), len(plan.texts))))
+    table, messages = values(plan.rows(plan.points), lambda share: report(share * count))
+    outputs = dict(zip(plan.texts, table.T, strict=True))
+    good = plan.satisfied(table) & np.array([not message for message in messages])
+    best, share, indices = None, None, {}
+    if plan.method == SENSITIVITY and not whole:
+        found = {text: sensitivity(names, y, plan.seed) for text, y in outputs.items()}
+        indices = {text: one for text, one in found.items() if one is not None}
+    if plan.output is not None:
+        best = _optimum(plan, lambda x: values(plan.rows(x))[0], table, messages, runner.journal)
+        if plan.spread:
+            share = yield_of(plan.satisfied(values(_around(plan, best))[0]))
+    elif plan.constraints and not whole:
+        share = yield_of(good)
     progress(1.0)
-    return Study(**found, optimum=best, toleranced=tuple(plan.spread))
+    return Study(
+        plan.varied if whole else dict(zip(names, plan.points.T, strict=True)), plan.points,
+        outputs, plan.units, tuple(messages), best, whole, good, share, tuple(plan.spread), indices,
+        plan.settings,
+    )  # fmt: skip
 
 
-def _optimum(plan: Plan, runner: Runner, table: Real, messages: Sequence[str]) -> Optimum:
+def _optimum(
+    plan: Plan, evaluate: Values, table: Real, messages: Sequence[str], journal: Journal
+) -> Optimum:
     """Search the optimum from the outputs (n, k) of the points and their messages."""
-    assert plan.goal is not None
-    (output, sign), points = plan.goal, plan.points
-
-    def evaluate(x: Real) -> Real:
-        return _table(runner.outcomes(plan.rows(x)), len(plan.texts))
-
+    assert plan.output is not None
+    points = plan.points
     bounds = np.column_stack([points.min(axis=0), points.max(axis=0)])
     for k, given in enumerate(plan.varied.values()):
         if isinstance(given, tuple):  # A range from which the points were drawn.
             bounds[k] = given
-    whole = plan.design[0]
-    spaces = (
-        [len(np.unique(x)) - 1 for x in points.T]
-        if whole
-        else [len(points) ** (1 / len(bounds))] * len(bounds)
-    )
+    if plan.whole_grid:
+        spaces = [len(np.unique(x)) - 1 for x in points.T]
+    else:
+        spaces = [len(points) ** (1 / len(bounds))] * len(bounds)
     sizes = np.ptp(points, axis=0) / np.maximum(spaces, 1)
-    samples = Samples(plan.names, points, plan.texts, table, bounds, sizes)
+    samples = Samples([*plan.varied], points, plan.texts, table, bounds, sizes)
     try:
-        return Search(evaluate, samples, output, sign, plan.constraints).optimum()
+        return Search(evaluate, samples, plan.output, plan.sign, plan.constraints).optimum()
     except ParameterError as error:
         reasons = sorted({message for message in messages if message})
         remedy = "simulate longer, or choose another output"
-        if plan.constraints and np.isfinite(table[:, plan.texts.index(output)]).any():
+        if plan.constraints and np.isfinite(table[:, plan.texts.index(plan.output)]).any():
             remedy = "loosen them, or vary the parameters further"
         raise ParameterError(
             f"{error}; {reasons[0] if reasons else remedy}"
-            + f"; {runner.journal.kept}" * bool(runner.journal.kept)
+            + f"; {journal.kept}" * bool(journal.kept)
         ) from None
 
 
-def _around(plan: Plan, best: Optimum) -> Real:
-    """Return drawn values of all columns around an optimum, (n, columns)."""
+def _around(plan: Plan, best: Optimum) -> list[Point]:
+    """Return drawn values of all columns around an optimum."""
     at = {**best.point, **plan.beside}
     laws = {n: distribution(at[n], x) for n, x in plan.spread.items() if x.at(at[n]) > 0.0}
     rows: Real = np.tile([at[name] for name in plan.columns], (YIELD_RUNS, 1))
@@ -377,17 +364,4 @@ def _around(plan: Plan, best: Optimum) -> Real:
         rows[:, [plan.columns.index(name) for name in laws]] = drawn(
             laws, YIELD_RUNS, YIELD_SEED, "random"
         )
-    return rows
-
-
-def _good(plan: Plan, table: Real) -> Any:
-    """Return which rows of outputs satisfy all constraints."""
-    index = {text: k for k, text in enumerate(plan.texts)}
-    held = [c.holds(table[:, index[c.output]]) for c in plan.constraints]
-    return np.all([np.full(len(table), True), *held], axis=0)
-
-
-def _table(outcomes: Sequence[Outcome], count: int) -> Real:
-    """Return the outputs of simulations, (n, k); NaN for failed ones."""
-    nothing = (math.nan,) * count
-    return np.array([outcome.values or nothing for outcome in outcomes])
+    return [tuple(row) for row in rows.tolist()]

@@ -19,7 +19,7 @@ from ..base.progress import Progress
 from .design import drawn
 from .fmu_model import FmuModel
 from .outputs import GOOD
-from .plan import Outputs, planned
+from .plan import Outputs, Plan
 from .runner import StudyError
 from .study import computed
 
@@ -126,9 +126,9 @@ def sweep(
     out = Path(out)
     _check_name(out)
     model = FmuModel(fmu)
-    plan = planned(
+    plan = Plan(
         model, table, model.outputs if outputs is None else outputs, values=values,
-        inputs=inputs, options=(stop_time, step, tolerance, None),
+        inputs=inputs, stop_time=stop_time, step=step, tolerance=tolerance,
     )  # fmt: skip
     computed(
         plan, out, parquet=True, workers=workers, executor=scheduler, retries=retries,
