@@ -3,7 +3,7 @@
 import argparse
 from collections.abc import Mapping
 
-from ..files.settings import pairs, quantity
+from ..files.settings import optional_quantity, pairs, quantity
 from ..mechanism.description import Mechanism
 from ..runs.experiment import Experiment, experiment
 
@@ -58,3 +58,12 @@ def span(
 def given_inputs(options: argparse.Namespace) -> dict[str, str]:
     """Return the signals that are given by --input, as texts by the names of the inputs."""
     return pairs(options.input, "--input", '--input "force.x=step(1 N, 10 ms)"')
+
+
+def times(options: argparse.Namespace) -> dict[str, float | None]:
+    """Return stop time and step [s] and tolerance of a command; None for those not given."""
+    return {
+        "stop_time": optional_quantity(options.stop_time, "s", "--stop-time"),
+        "step": optional_quantity(options.step, "s", "--step"),
+        "tolerance": optional_quantity(options.tolerance, "", "--tolerance"),
+    }

@@ -32,7 +32,7 @@ from ..sweeps.design import SENSITIVITY, Yield
 from ..sweeps.optimum import EDGE_RTOL, FLAT_RTOL, Optimum
 from ..sweeps.plan import Model
 from ..sweeps.study import Study, model_of, study
-from .duration import given_inputs
+from .duration import given_inputs, times
 from .output import Output, aligned
 from .record import Record
 
@@ -61,14 +61,11 @@ def run_study(options: argparse.Namespace) -> None:
     path = Path(options.mechanism)
     mechanism = None if path.suffix.lower() == ".fmu" else load(path)
     model = model_of(mechanism or path)
-    units = {name: model.units.get(name, "").removeprefix("1") for name in model.values}
-    values = assigned(units, options.set)
     output = Output(options.out)
-    inputs = given_inputs(options)
     table, figure, best, shares, run = (f"{model.name}-{end}" for end in FILES)
     output.check(table, figure, best, shares, run)
     record = Record(options.out, run, path if mechanism is None else file_of(path))
-    arguments = _arguments(options, model, units, values, inputs)
+    arguments = _arguments(options, model)
     found = study(
         mechanism or path, **arguments, workers=options.workers, executor=options.scheduler,
         timeout=optional_quantity(options.timeout, "s", "--timeout"),
@@ -77,8 +74,9 @@ def run_study(options: argparse.Namespace) -> None:
     )  # fmt: skip
     _print_simulations(options, found)
     if options.method == SENSITIVITY:
-        _print_sensitivities(found)
-        output.table(shares, SHARES_HEAD, _shares(found))
+        rows = _shares(found)
+        _print_sensitivities(found, rows)
+        output.table(shares, SHARES_HEAD, rows)
     if found.optimum is not None:
         verb = "least" if options.maximise is None else "largest"
         if len(found.varied) > 1:
@@ -86,7 +84,7 @@ def run_study(options: argparse.Namespace) -> None:
         for line in _optimum_lines(found.optimum, found.units, verb):
             print(line)
         if mechanism is not None:
-            output.text(best, _best_set(mechanism, found.optimum, values))
+            output.text(best, _best_set(mechanism, found.optimum, arguments["values"]))
     if found.share is not None:
         print(_yield_line(found.share, options.subject_to, found.toleranced))
     elif options.subject_to:
@@ -97,20 +95,17 @@ def run_study(options: argparse.Namespace) -> None:
     output.figure(figure, lambda: _figure(model.title, found))
     if options.out is not None:
         print(options.out / table)
-    output.text(run, record.text(model.name, arguments | _times(found), _files(arguments)))
+    files = files_of(arguments["inputs"]) + [str(options.table)] * (options.table is not None)
+    output.text(run, record.text(model.name, arguments | _times(found), files))
     output.write()
     for sentence in record.notes():
         print(sentence)
 
 
-def _arguments(
-    options: argparse.Namespace,
-    model: Model,
-    units: Mapping[str, str],
-    values: Mapping[str, float],
-    inputs: Mapping[str, str],
-) -> dict[str, Any]:
+def _arguments(options: argparse.Namespace, model: Model) -> dict[str, Any]:
     """Return the arguments of the study that its results depend on."""
+    units = {name: model.units.get(name, "").removeprefix("1") for name in model.values}
+    values, inputs = assigned(units, options.set), given_inputs(options)
     names = {**units, **dict.fromkeys(placeholders(inputs), "")}
     return {
         "vary": _vary(options, names, model), "outputs": options.of or [],
@@ -118,11 +113,7 @@ def _arguments(
         "minimise": options.minimise, "maximise": options.maximise,
         "subject_to": options.subject_to,
         "tolerances": pairs(options.tolerance_of, "--tolerance-of", "stop.position=0.1mm"),
-        "values": values, "inputs": inputs,
-        "stop_time": optional_quantity(options.stop_time, "s", "--stop-time"),
-        "step": optional_quantity(options.step, "s", "--step"),
-        "tolerance": optional_quantity(options.tolerance, "", "--tolerance"),
-        "engine": options.engine,
+        "values": values, "inputs": inputs, **times(options), "engine": options.engine,
     }  # fmt: skip
 
 
@@ -133,12 +124,6 @@ def _times(found: Study) -> dict[str, Any]:
         "stop_time": known["stop time [s]"], "step": known["step [s]"],
         "tolerance": known["tolerance"], "engine": known.get("engine", "FMU") or KERNEL,
     }  # fmt: skip
-
-
-def _files(arguments: Mapping[str, Any]) -> list[str]:
-    """Return the paths of the files that a study has read, except for the mechanism file."""
-    vary = arguments["vary"]
-    return [*files_of(arguments["inputs"]), *([str(vary)] if isinstance(vary, Path) else [])]
 
 
 def _print_simulations(options: argparse.Namespace, found: Study) -> None:
@@ -221,36 +206,34 @@ def _text(x: float, unit: str, digits: int = DIGITS) -> str:
     return f"{factor * x:.{digits}g} {shown}".rstrip()
 
 
+def _cells(name: str, x: Real, unit: str, values: Any) -> list[str]:
+    """Return a heading and the cells of values, in the display unit of x."""
+    known = np.abs(x[np.isfinite(x)])
+    factor, shown = prefixed_unit(float(known.max(initial=0.0)), unit)
+    cells = [NOTHING if np.isnan(v) else f"{factor * float(v):.{DIGITS}g}" for v in values]
+    return [f"{name} [{shown or '-'}]", *cells]
+
+
 def _print_table(
     columns: Mapping[str, Real], units: Mapping[str, str], satisfied: Any = True
 ) -> None:
     """Print the samples, unless there are many; a cross marks those that violate a condition."""
     if len(next(iter(columns.values()))) > ROWS_PRINTED_MAX:
         return
-    head, cells = [], []
-    for name, x in columns.items():
-        known = np.abs(x[np.isfinite(x)])
-        largest = float(known.max()) if len(known) else 0.0
-        factor, shown = prefixed_unit(largest, units[name])
-        head.append(f"{name} [{shown or '-'}]")
-        cells.append([NOTHING if np.isnan(v) else f"{factor * v:.{DIGITS}g}" for v in x])
+    shown = [_cells(name, x, units[name], x) for name, x in columns.items()]
     if not np.all(satisfied):
-        head.append("violated")
-        cells.append(["" if held else "x" for held in satisfied])
-    print(aligned(head, list(zip(*cells, strict=True))))
+        shown.append(["violated", *("" if held else "x" for held in satisfied)])
+    head, *rows = zip(*shown, strict=True)
+    print(aligned(head, rows))
 
 
 def _print_spread(columns: Mapping[str, Real], units: Mapping[str, str]) -> None:
     """Print how drawn parameters and their outputs are distributed."""
     rows = []
     for name, x in columns.items():
-        known = x[np.isfinite(x)]
-        if not len(known):
-            continue
-        factor, shown = prefixed_unit(float(np.abs(known).max()), units[name])
-        numbers = [known.mean(), known.std(), *np.quantile(known, SPREAD)]
-        heading = f"{name} [{shown or '-'}]"
-        rows.append([heading, *(f"{factor * float(value):.{DIGITS}g}" for value in numbers)])
+        if len(known := x[np.isfinite(x)]):
+            numbers = [known.mean(), known.std(), *np.quantile(known, SPREAD)]
+            rows.append(_cells(name, known, units[name], numbers))
     heads = ["", "mean", "deviation", *(f"{100 * share:g} %" for share in SPREAD)]
     print(aligned(heads, rows))
 
@@ -324,17 +307,16 @@ def _print_best(optimum: Optimum, units: Mapping[str, str]) -> None:
     _print_table({**columns, optimum.output: optimum.best_values}, units)
 
 
-def _print_sensitivities(found: Study) -> None:
+def _print_sensitivities(found: Study, shares: Sequence[Sequence[Any]]) -> None:
     """Print first-order and total indices of each output with their confidence intervals."""
-    for output, indices in found.sensitivities.items():
+    for output in found.sensitivities:
         rows, without = [], []
-        for k, name in enumerate(indices.names):
-            if not (indices.total[k] or np.ptp(indices.total_interval[k])):
+        for of, name, *numbers in shares:
+            x, a, b, total, c, d = (f"{number:.3f}" for number in numbers)
+            if of == output and (numbers[3] or numbers[4] < numbers[5]):
+                rows.append([name, x, f"{a} to {b}", total, f"{c} to {d}"])
+            elif of == output:
                 without.append(name)
-                continue
-            (a, b), (c, d) = indices.first_interval[k], indices.total_interval[k]
-            rows.append([name, f"{indices.first[k]:.3f}", f"{a:.3f} to {b:.3f}",
-                         f"{indices.total[k]:.3f}", f"{c:.3f} to {d:.3f}"])  # fmt: skip
         print(f"shares of the variance of {output}:")
         print(aligned(["parameter", "alone", "95 %", "in total", "95 %"], rows))
         if without:
@@ -346,7 +328,7 @@ def _print_sensitivities(found: Study) -> None:
             print(f"no shares of the variance of {output}: {reason}")
 
 
-def _shares(found: Study) -> list[list[object]]:
+def _shares(found: Study) -> list[list[Any]]:
     """Return the rows of the table of indices."""
     return [
         [output, name, *map(float, (one.first[k], *one.first_interval[k])),
