@@ -21,9 +21,7 @@ from ..mechanism.parameters import Tolerance
 
 METHODS = ("random", "latin", "sobol")
 SENSITIVITY = "sensitivity"  # Method of Saltelli's design.
-PROBABILITY_MIN = (
-    2.0**-53
-)  # Smallest distance of probabilities from 0 and 1, where quantiles may be infinite.
+PROBABILITY_MIN = 2.0**-53  # Distance of probabilities from 0 and 1, where quantiles are infinite.
 SIGMAS = 3.0  # Standard deviations in the half-width of a tolerance.
 CONFIDENCE = 0.95
 CONSTANT_RTOL = 1e-12  # Values that differ by less than this share of the largest are equal.
@@ -49,14 +47,8 @@ def drawn(distributions: Mapping[str, Any], n: int, seed: int, method: str) -> R
 
     Parameters
     ----------
-    distributions : mapping
-        For each parameter a frozen distribution of ``scipy.stats`` (any object with ``ppf``), or
-        (low, high) for a uniform distribution; in SI units.
-    n : int
-        Number of points; a power of two with ``sobol`` and ``sensitivity``, whose sequence is
-        balanced only then.
-    seed : int
-        The same seed gives the same points.
+    distributions, n, seed
+        As for :func:`prbm.sweeps.sweep.samples`.
     method : str
         ``random``, ``latin``, ``sobol``, or ``sensitivity`` for n (p + 2) points: the rows of A, of
         B, and for each parameter those of A with the column of B.
@@ -73,45 +65,31 @@ def drawn(distributions: Mapping[str, Any], n: int, seed: int, method: str) -> R
     d = len(distributions)
     if not distributions or n < 1:
         raise ParameterError(f"n = {n} rows of {d} parameters: draw at least one of each")
-    unit = _saltelli(n, d, seed) if method == SENSITIVITY else _unit(n, d, seed, method)
-    unit = np.clip(unit, PROBABILITY_MIN, 1.0 - PROBABILITY_MIN)
-    columns = [
-        _quantiles(name, distribution, unit[:, k])
-        for k, (name, distribution) in enumerate(distributions.items())
-    ]
+    unit = np.clip(_unit(n, d, seed, method), PROBABILITY_MIN, 1.0 - PROBABILITY_MIN)
+    columns = [_quantiles(*item, u) for item, u in zip(distributions.items(), unit.T, strict=True)]
     return np.column_stack(columns)
 
 
 def _unit(n: int, d: int, seed: int, method: str) -> Real:
-    """Return probabilities, shape (n, d)."""
+    """Return probabilities, shape (n, d), or those of Saltelli's design, (n (d + 2), d)."""
     if method == "random":
         return np.random.default_rng(seed).random((n, d))
     if method == "latin":
         return np.asarray(qmc.LatinHypercube(d, seed=seed).random(n))
+    if method not in ("sobol", SENSITIVITY):
+        every = ", ".join((*METHODS, SENSITIVITY))
+        raise ParameterError(f"unknown method {method!r}; methods are {every}")
+    if n & (n - 1):
+        near = 2 ** round(math.log2(n))
+        raise ParameterError(f"n = {n}: Sobol's sequence needs a power of two, such as {near}")
     if method == "sobol":
-        _check_power(n)
         return np.asarray(qmc.Sobol(d, seed=seed).random(n))
-    every = ", ".join((*METHODS, SENSITIVITY))
-    raise ParameterError(f"unknown method {method!r}; methods are {every}")
-
-
-def _saltelli(n: int, d: int, seed: int) -> Real:
-    """Return the probabilities of Saltelli's design, (n (d + 2), d)."""
-    _check_power(n)
     if d < 2:
         raise ParameterError(
             "the method sensitivity needs two parameters: a single one has the whole variance"
         )
-    both = np.asarray(qmc.Sobol(2 * d, seed=seed).random(n))
-    a, b = both[:, :d], both[:, d:]
-    mixed = [np.where(np.arange(d) == k, b, a) for k in range(d)]
-    return np.vstack([a, b, *mixed])
-
-
-def _check_power(n: int) -> None:
-    if n & (n - 1):
-        near = 2 ** round(math.log2(n))
-        raise ParameterError(f"n = {n}: Sobol's sequence needs a power of two, such as {near}")
+    a, b = np.hsplit(qmc.Sobol(2 * d, seed=seed).random(n), 2)
+    return np.vstack([a, b, *(np.where(np.arange(d) == k, b, a) for k in range(d))])
 
 
 def _quantiles(name: str, distribution: Any, u: Real) -> Real:
@@ -238,18 +216,15 @@ def sensitivity(names: Sequence[str], values: Real, seed: int = 0) -> Sensitivit
     with warnings.catch_warnings():  # The indices of a parameter without effect have no spread.
         warnings.simplefilter("ignore", RuntimeWarning)
         spread: Any = found.bootstrap(confidence_level=CONFIDENCE, n_resamples=RESAMPLES)
-
-    first, total = np.ravel(found.first_order), np.ravel(found.total_order)
-
-    def interval(index: Real, x: Any) -> Real:
-        ends = np.column_stack([np.ravel(x.confidence_interval.low),
-                                np.ravel(x.confidence_interval.high)])  # fmt: skip
-        return np.where(np.isfinite(ends), ends, index[:, None])
-
-    return Sensitivity(
-        tuple(names), first, total,
-        interval(first, spread.first_order), interval(total, spread.total_order),
-    )  # fmt: skip
+    indices, intervals = [], []
+    for index, x in (
+        (found.first_order, spread.first_order),
+        (found.total_order, spread.total_order),
+    ):
+        ends = np.stack([x.confidence_interval.low, x.confidence_interval.high], axis=-1)
+        indices.append(np.ravel(index))
+        intervals.append(np.where(np.isfinite(ends), ends, index[..., None]).reshape(p, 2))
+    return Sensitivity(tuple(names), *indices, *intervals)
 
 
 def constant(values: Real) -> bool:

@@ -80,28 +80,14 @@ def sweep(
         of the FMU.
     values : mapping
         Start values of all runs.
-    inputs : mapping
-        Inputs over time of all runs: texts such as ``"half-sine({height} g, 0.5 ms)"``.  A name in
-        braces is a column of the table with numbers.
     stop_time, step, tolerance : float
         End of the runs [s], communication step [s], relative tolerance; None: those of the FMU's
         default experiment, or else 1 s, a thousandth of the run, no tolerance.
     scheduler : str, Executor or None
-        Address of a Dask scheduler, as ``tcp://host:8786``, whose workers need this package; or a
-        ``concurrent.futures`` executor, such as that of ``Client.get_executor()``.  None: this
-        machine.
-    workers : int or None
-        Number of parallel runs; None: one per core of this machine, or those of the executor.
-    retries : int
-        Number of repetitions of a run whose process crashed.
-    timeout : float or None
-        Longest duration of a run [s]; None: no limit.
-    overwrite : bool
-        Replace earlier results in ``out`` (default: False).
-    retry_failed : bool
-        Repeat failed runs (default: False).
-    progress : callable or None
-        Called with the completed fraction, from 0 to 1.
+        As ``executor`` of :func:`prbm.study`: the address of a Dask scheduler, as
+        ``tcp://host:8786``, whose workers need this package, or an executor.
+    inputs, workers, retries, timeout, overwrite, retry_failed, progress
+        As for :func:`prbm.study`.
 
     Returns
     -------
@@ -124,7 +110,13 @@ def sweep(
     """
     _check_packages("distributed" if isinstance(scheduler, str) else "pandas")
     out = Path(out)
-    _check_name(out)
+    if out.suffix.lower() in FILES:
+        raise ParameterError(
+            f"out = {out}: the results are a Parquet file, not a {out.suffix} file; choose a name "
+            f"such as {out.with_suffix('.parquet')}; pandas.read_parquet(name).to_csv(...) makes a "
+            "CSV file of it"
+        )
+    check_file(out)
     model = FmuModel(fmu)
     plan = Plan(
         model, table, model.outputs if outputs is None else outputs, values=values,
@@ -150,7 +142,7 @@ def samples(
         For each parameter a frozen distribution of ``scipy.stats`` (any object with ``ppf``), or
         (low, high) for a uniform distribution; in SI units.
     n : int
-        Number of rows; a power of two with ``sobol``.
+        Number of rows; a power of two with ``sobol``, whose sequence is balanced only then.
     seed : int
         Seed (default: 0).  The same seed gives the same table.
     method : str
@@ -174,26 +166,9 @@ def samples(
 
 
 def _check_packages(*names: str) -> None:
-    """Check that packages of the extra ``sweep`` are installed.
-
-    Raises
-    ------
-    StudyError
-        If one is not installed.
-    """
     for name in {*EXTRA, *names}:
         if importlib.util.find_spec(name) is None:
             raise StudyError(f"sweeps need the package {name}; {REMEDY}")
-
-
-def _check_name(out: Path) -> None:
-    if out.suffix.lower() in FILES:
-        raise ParameterError(
-            f"out = {out}: the results are a Parquet file, not a {out.suffix} file; choose a name "
-            f"such as {out.with_suffix('.parquet')}; pandas.read_parquet(name).to_csv(...) makes a "
-            "CSV file of it"
-        )
-    check_file(out)
 
 
 def summary(results: "pd.DataFrame", out: str | os.PathLike[str]) -> str:
