@@ -22,7 +22,7 @@ from prbm.sweeps import runner
 from prbm.sweeps import study as module
 from prbm.sweeps.design import grid
 from prbm.sweeps.journal import Journal
-from prbm.sweeps.optimum import FLAT_RTOL, Constraint, Optimum, Samples, Search
+from prbm.sweeps.optimum import FLAT_RTOL, Constraint, Optimum, Search
 from prbm.sweeps.study import Study, study
 from support import ROOT
 
@@ -39,8 +39,9 @@ def searched(function, *samples: np.ndarray, sign: float = 1.0, constraints=()) 
     outputs = ["f", "g", "h"][: values.shape[1]]
     bounds = np.array([[x[0], x[-1]] for x in samples])
     sizes = np.array([np.ptp(x) / (len(x) - 1) for x in samples])
-    kept = Samples(names, points, outputs, values, bounds, sizes)
-    return Search(evaluate, kept, "f", sign, constraints).optimum()
+    return Search(
+        evaluate, names, points, outputs, values, bounds, sizes, "f", sign, constraints
+    ).optimum()
 
 
 def test_the_optimum_of_a_parabola_and_its_flat_range_are_exact():

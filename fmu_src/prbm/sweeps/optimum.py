@@ -7,10 +7,11 @@ the number of impacts changes; all searches therefore compare values and use no 
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize, minimize_scalar
+from scipy import optimize
 
 from ..base.errors import ParameterError
 from ..mechanics.arrays import Real
@@ -31,6 +32,8 @@ DISTINCT = 0.1  # Distance of different points in the table of the best ones, li
 MARGIN = 1e-4  # The search aims at this relative distance from bounds, so that constraints hold.
 STARTS = 3  # Best samples from which a search under constraints begins.
 
+minimize: Any = optimize.minimize  # Their type hints exclude such functions and options.
+minimize_scalar: Any = optimize.minimize_scalar
 Values = Callable[[Real], Real]
 """Values (m, k) of all outputs at points (m, p); NaN for failed simulations."""
 
@@ -171,34 +174,6 @@ class Optimum:
         return f"<Optimum of {self.output}: {self.value:.6g} at {place}>"
 
 
-@dataclass(frozen=True)
-class Samples:
-    """Samples from which a search begins.
-
-    Parameters
-    ----------
-    names : sequence of str
-        The parameters.
-    points : (n, p)
-        The samples.
-    outputs : sequence of str
-        The outputs.
-    values : (n, k)
-        Their values; NaN for failed simulations.
-    bounds : (p, 2)
-        Least and largest value of each parameter.
-    sizes : (p,)
-        Distance of samples along each parameter.
-    """
-
-    names: Sequence[str]
-    points: Real
-    outputs: Sequence[str]
-    values: Real
-    bounds: Real
-    sizes: Real
-
-
 class Search:
     """The search of an optimum around the best samples.
 
@@ -206,12 +181,14 @@ class Search:
     ----------
     evaluate : callable
         Simulates at points (m, p) and returns all outputs (m, k).
-    samples : Samples
-        The samples.
-    output : str
-        The output.
-    sign : float
-        1 to minimise, -1 to maximise.
+    names, outputs : sequence of str
+        The p parameters and k outputs.
+    points, values : (n, p), (n, k)
+        The samples and their outputs; NaN for failed simulations.
+    bounds, sizes : (p, 2), (p,)
+        Least and largest value, and distance of samples, of each parameter.
+    output, sign : str, float
+        The output that is searched, and 1 to minimise or -1 to maximise it.
     constraints : sequence of Constraint
         Conditions on outputs.
 
@@ -224,29 +201,41 @@ class Search:
     def __init__(
         self,
         evaluate: Values,
-        samples: Samples,
+        names: Sequence[str],
+        points: Real,
+        outputs: Sequence[str],
+        values: Real,
+        bounds: Real,
+        sizes: Real,
         output: str,
         sign: float,
         constraints: Sequence[Constraint] = (),
     ) -> None:
-        self.evaluate, self.samples, self.output, self.sign = evaluate, samples, output, sign
-        self.constraints = constraints
-        self.index = {name: k for k, name in enumerate(samples.outputs)}
-        self.points: list[Real] = [*samples.points]
-        self.found: list[Real] = [*samples.values]
-        self.costs: list[float] = [self._cost(row) for row in samples.values]
+        self.evaluate, self.names, self.bounds, self.sizes = evaluate, names, bounds, sizes
+        self.output, self.sign, self.constraints = output, sign, constraints
+        self.index = {name: k for k, name in enumerate(outputs)}
+        self.points, self.found = [*points], [*values]
+        self.costs = [self._cost(row) for row in values]
         self.count = len(self.costs)
 
     def _cost(self, values: Real) -> float:
         """Return the output with its sign; infinite if it has no value or a constraint fails."""
-        value = self.sign * values[self.index[self.output]]
+        value = self.sign * float(values[self.index[self.output]])
         allowed = all(c.holds(values[self.index[c.output]]) for c in self.constraints)
-        return float(value) if allowed and math.isfinite(value) else math.inf
+        return value if allowed and math.isfinite(value) else math.inf
+
+    @property
+    def best(self) -> int:
+        """Index of the best point."""
+        return int(np.argmin(self.costs))
+
+    def _excess(self, values: Real) -> list[float]:
+        """Return by how much outputs satisfy the constraints."""
+        return [c.excess(values[self.index[c.output]]) for c in self.constraints]
 
     def _row(self, x: Any) -> Real:
         """Return the outputs at a point (p,), and keep them."""
-        low, high = self.samples.bounds.T
-        point = np.clip(np.atleast_1d(np.asarray(x, float)), low, high)
+        point = np.clip(np.atleast_1d(np.asarray(x, float)), *self.bounds.T)
         values: Real = self.evaluate(point[None, :])[0]
         self.points.append(point)
         self.found.append(values)
@@ -265,24 +254,25 @@ class Search:
         if not np.isfinite(self.costs).any():
             which = " that satisfies the constraints" if self.constraints else ""
             raise ParameterError(f"no simulation has a value of {self.output}{which}")
-        names = self.samples.names
-        refine = self._between_neighbours if len(names) == 1 else self._simplex
-        if self.constraints and len(names) > 1:
+        single = len(self.names) == 1
+        if self.constraints and not single:
             self._descend_from_best()
         for _ in range(ROUNDS_MAX):
-            refine()
+            if single:
+                self._between_neighbours()
+            else:
+                self._simplex()
             limit = self._limit()
-            ends = {n: [self._end(j, s, limit) for s in (-1.0, 1.0)] for j, n in enumerate(names)}
-            if len(names) > 1 or self._limit() == limit:
+            ends = {
+                n: [self._end(j, s, limit) for s in (-1.0, 1.0)] for j, n in enumerate(self.names)
+            }
+            if not single or self._limit() == limit:
                 break  # Otherwise the output jumps, and the search for the ends met a better point.
         return self._result(ends)
 
     def _result(self, ends: Mapping[str, Sequence[tuple[float, bool]]]) -> Optimum:
-        order = np.argsort(self.costs, kind="stable")
-        k, names = int(order[0]), self.samples.names
-        points, found = np.array(self.points), self.found[k]
+        names, points, k, best = self.names, np.array(self.points), self.best, self._distinct()
         costs = np.array(self.costs[self.count :])
-        best = self._distinct(order)
         return Optimum(
             self.output,
             dict(zip(names, points[k].tolist(), strict=True)),
@@ -295,16 +285,16 @@ class Search:
             self.constraints,
             points[best],
             self.sign * np.array(self.costs)[best],
-            dict(zip(self.samples.outputs, map(float, found), strict=True)),
-            dict(zip(names, self.samples.sizes.tolist(), strict=True)),
-            dict(zip(names, map(tuple, self.samples.bounds.tolist()), strict=True)),
+            dict(zip(self.index, map(float, self.found[k]), strict=True)),
+            dict(zip(names, self.sizes.tolist(), strict=True)),
+            dict(zip(names, map(tuple, self.bounds.tolist()), strict=True)),
         )
 
-    def _distinct(self, order: Sequence[int] | Any) -> list[int]:
+    def _distinct(self) -> list[int]:
         """Return the best points that differ by more than :data:`DISTINCT` from better ones."""
         found: list[int] = []
-        for j in order:
-            gaps = [np.abs(self.points[j] - self.points[i]) / self.samples.sizes for i in found]
+        for j in np.argsort(self.costs, kind="stable"):
+            gaps = [np.abs(self.points[j] - self.points[i]) / self.sizes for i in found]
             if math.isfinite(self.costs[j]) and all(gap.max() > DISTINCT for gap in gaps):
                 found.append(int(j))
             if len(found) == BEST:
@@ -313,7 +303,6 @@ class Search:
 
     def _robust(self) -> tuple[float, float, float] | None:
         """Return the neighbouring samples whose worst output is best, and this output."""
-        x = self.samples.points[:, 0]
         if self.count < WINDOWS_MIN * NEIGHBOURS:
             return None
         windows = np.lib.stride_tricks.sliding_window_view(self.costs[: self.count], NEIGHBOURS)
@@ -321,7 +310,8 @@ class Search:
         k = int(np.argmin(worst))
         if not math.isfinite(worst[k]):
             return None
-        return float(x[k]), float(x[k + NEIGHBOURS - 1]), float(self.sign * worst[k])
+        first, last = self.points[k], self.points[k + NEIGHBOURS - 1]
+        return float(first[0]), float(last[0]), float(self.sign * worst[k])
 
     def _limit(self) -> float:
         """Return the cost up to which the output is within 5 % of its optimum."""
@@ -330,10 +320,9 @@ class Search:
 
     def _between_neighbours(self) -> None:
         """Refine the best point of one parameter between its neighbours."""
-        x, k = np.unique(self.points), float(self.points[int(np.argmin(self.costs))][0])
+        x, k = np.unique(self.points), float(self.points[self.best][0])
         low, high = max(x[x < k], default=x[0]), min(x[x > k], default=x[-1])
-        bounded: Any = minimize_scalar  # Its type hints exclude arrays and options.
-        bounded(
+        minimize_scalar(
             self.value, bounds=(low, high), method="bounded",
             options={"xatol": float(REFINED_RTOL * (high - low)), "maxiter": REFINEMENTS_MAX},
         )  # fmt: skip
@@ -345,10 +334,10 @@ class Search:
         and the first one outside; it is false with the end of the samples if no point is outside.
         """
         points, costs = np.array(self.points), np.array(self.costs)
-        point = points[int(np.argmin(costs))]
+        point = points[self.best]
         on_line = (np.delete(points, j, 1) == np.delete(point, j)).all(axis=1)
         x, outside = sign * points[on_line, j], ~(costs[on_line] <= limit)
-        last = max(sign * self.samples.bounds[j])
+        last = max(sign * self.bounds[j])
         first = min(x[outside & (x > sign * point[j])], default=math.inf)  # Outside.
         inside = max(x[~outside & (x < first)])
 
@@ -357,35 +346,30 @@ class Search:
             return self.value(point) <= limit
 
         while math.isinf(first) and inside < last:
-            ahead = min(inside + self.samples.sizes[j], last)
+            ahead = min(inside + self.sizes[j], last)
             inside, first = (ahead, first) if good(ahead) else (inside, ahead)
         if math.isinf(first):
             return float(sign * inside), False
-        while first - inside > EDGE_RTOL * self.samples.sizes[j]:
+        while first - inside > EDGE_RTOL * self.sizes[j]:
             middle = 0.5 * (inside + first)
             inside, first = (middle, first) if good(middle) else (inside, middle)
         return float(sign * inside), True
 
     def _simplex(self) -> None:
         """Refine the best point by the simplex of Nelder and Mead, in units of the distances."""
-        sizes, bounds = self.samples.sizes, self.samples.bounds
-        start = self.points[int(np.argmin(self.costs))]
-        inward = np.where(start + 0.5 * sizes <= bounds[:, 1], 0.5, -0.5)
+        sizes, start = self.sizes, self.points[self.best]
+        inward = np.where(start + 0.5 * sizes <= self.bounds[:, 1], 0.5, -0.5)
         corners = start / sizes + np.vstack([np.zeros(len(sizes)), np.diag(inward)])
-        options: Any = {
-            "initial_simplex": corners, "maxfev": REFINEMENTS_MAX * len(sizes) // 2,
-            "xatol": REFINED_RTOL, "fatol": 0.0,
-        }  # fmt: skip
-        simplex: Any = minimize  # Its type hints exclude this function.
-        simplex(
+        minimize(
             lambda z: min(self.value(z * sizes), 1e300), corners[0], method="Nelder-Mead",
-            bounds=bounds / sizes[:, None], options=options,
+            bounds=self.bounds / sizes[:, None],
+            options={"initial_simplex": corners, "maxfev": REFINEMENTS_MAX * len(sizes) // 2,
+                     "xatol": REFINED_RTOL, "fatol": 0.0},
         )  # fmt: skip
 
     def _violation(self, values: Real) -> float:
         """Return the sum of the relative violations of the constraints."""
-        excess = [c.excess(values[self.index[c.output]]) for c in self.constraints]
-        return sum(-min(x, 0.0) if math.isfinite(x) else 1e3 for x in excess)
+        return sum(-min(x, 0.0) if math.isfinite(x) else 1e3 for x in self._excess(values))
 
     def _descend_from_best(self) -> None:
         """Search under constraints from the best samples, and again around the best point."""
@@ -393,35 +377,26 @@ class Search:
             self._descend(int(k))
         for _ in range(ROUNDS_MAX):
             before = min(self.costs)
-            self._descend(int(np.argmin(self.costs)), RESTART_RADIUS)
+            self._descend(self.best, RESTART_RADIUS)
             if before - min(self.costs) <= REFINED_RTOL * abs(before):
                 break
 
     def _descend(self, k: int, radius: float = 0.5) -> None:
         """Search under constraints from point k by COBYQA, in units of the distances."""
-        sizes, bounds = self.samples.sizes, self.samples.bounds
-        last: dict[bytes, Real] = {}
-
-        def row(z: Real) -> Real:
-            key = np.asarray(z).tobytes()
-            if key not in last:
-                last[key] = self._row(z * sizes)
-            return last[key]
-
+        sizes = self.sizes
         scale = max((abs(x) for x in self.costs if math.isfinite(x)), default=1.0) or 1.0
+        row = cache(lambda *z: self._row(z * sizes))  # For the cost and for the constraints.
 
         def cost(z: Real) -> float:
-            value = self.sign * float(row(z)[self.index[self.output]]) / scale
+            value = self.sign * float(row(*z)[self.index[self.output]]) / scale
             return value if math.isfinite(value) else 1e3
 
         def excess(z: Real) -> list[float]:
-            values = row(z)
-            found = [c.excess(values[self.index[c.output]]) - MARGIN for c in self.constraints]
+            found = [x - MARGIN for x in self._excess(row(*z))]
             return [x if math.isfinite(x) else -1e3 for x in found]
 
-        search: Any = minimize
-        search(
-            cost, self.points[k] / sizes, method="COBYQA", bounds=bounds / sizes[:, None],
+        minimize(
+            cost, self.points[k] / sizes, method="COBYQA", bounds=self.bounds / sizes[:, None],
             constraints={"type": "ineq", "fun": excess},
             options={"maxfev": REFINEMENTS_MAX * len(sizes), "initial_tr_radius": radius,
                      "final_tr_radius": 0.1 * REFINED_RTOL},

@@ -27,7 +27,7 @@ from ..runs.signals import Signal
 from .design import SENSITIVITY, Sensitivity, Yield, distribution, drawn, sensitivity, yield_of
 from .journal import Journal, Point
 from .mechanism import MechanismModel
-from .optimum import REFINEMENTS_EXPECTED, Optimum, Samples, Search, Values
+from .optimum import REFINEMENTS_EXPECTED, Optimum, Search, Values
 from .outputs import GOOD
 from .plan import Model, Outputs, Plan, Vary
 from .runner import Runner
@@ -341,9 +341,12 @@ def _optimum(
     else:
         spaces = [len(points) ** (1 / len(bounds))] * len(bounds)
     sizes = np.ptp(points, axis=0) / np.maximum(spaces, 1)
-    samples = Samples([*plan.varied], points, plan.texts, table, bounds, sizes)
+    search = Search(
+        evaluate, [*plan.varied], points, plan.texts, table, bounds, sizes, plan.output, plan.sign,
+        plan.constraints,
+    )  # fmt: skip
     try:
-        return Search(evaluate, samples, plan.output, plan.sign, plan.constraints).optimum()
+        return search.optimum()
     except ParameterError as error:
         reasons = sorted({message for message in messages if message})
         remedy = "simulate longer, or choose another output"
