@@ -5,7 +5,7 @@ The module imports NumPy only, and so starts quickly.
 
 import re
 from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import nan
 from typing import Any
 
@@ -29,8 +29,8 @@ SMOOTH = ("x", "y", "angle", "vx", "vy", "omega", "gap", "gap_rate")
 """Ends of names of outputs that are smooth between impacts, so that a parabola finds extremes."""
 CLOSE = 1e-3  # Points with less than this share of the usual distance belong to an impact.
 PULSES = {
-    ".force": "peak_force", ".stress": "peak_stress", ".stress_start": "peak_stress",
-    ".stress_end": "peak_stress",
+    "force": "peak_force", "stress": "peak_stress", "stress_start": "peak_stress",
+    "stress_end": "peak_stress",
 }  # fmt: skip
 """Ends of the names of outputs with pulses shorter than a step, and the quantity that sees them."""
 OF_IMPACTS = (
@@ -39,6 +39,7 @@ OF_IMPACTS = (
 )  # fmt: skip
 """Outputs of stops that each impact replaces."""
 
+EXTREMES = ("max", "min")  # Reductions.
 TIMES = ("first", "since")  # Reductions whose value is a time.
 PLACES = {"x": "m", "y": "m", "angle": "rad"}  # Outputs of a rest position, and their units.
 NAMES_LISTED_MAX = 12  # Messages about unknown variables do not list more names.
@@ -79,17 +80,17 @@ class Output:
         return self.reduction in (MODE, REST)
 
     @property
-    def latched(self) -> bool:
-        """Whether impacts set the variable, so that its extremes are those of the impacts."""
-        return self.variable.rpartition(".")[2] in OF_IMPACTS
+    def last(self) -> str:
+        """Last word of the variable."""
+        return self.variable.rpartition(".")[2]
 
     @property
     def history(self) -> bool:
         """Whether all communication points are needed, not only the last one and the impacts."""
         if self.reduction == QUANTITY:
             return QUANTITIES[self.variable].history
-        extreme = self.reduction in ("max", "min")
-        return self.reduction in ("mean", "first", "since") or (extreme and not self.latched)
+        extreme = self.reduction in EXTREMES and self.last not in OF_IMPACTS
+        return extreme or self.reduction in ("mean", *TIMES)
 
     @property
     def at_impacts(self) -> bool:
@@ -103,7 +104,7 @@ class Output:
         if self.reduction == MODE:
             return "Hz"
         if self.reduction == REST:
-            return PLACES[self.variable.rpartition(".")[2]]
+            return PLACES[self.last]
         return "s" if self.reduction in TIMES else units[self.variable]
 
     def at_rest(self, shape: Any) -> float:
@@ -115,8 +116,8 @@ class Output:
             If the mechanism has fewer modes.
         """
         if self.reduction == REST:
-            body, _, what = self.variable.rpartition(".")
-            return float(getattr(shape.positions[body], what))
+            body = self.variable.rpartition(".")[0]
+            return float(getattr(shape.positions[body], self.last))
         if self.variable == FUNDAMENTAL:
             return float(shape.fundamental)
         found, k = shape.modes.frequency, int(self.variable)
@@ -143,31 +144,28 @@ class Output:
         Raises
         ------
         ParameterError
-            If a variable is unknown; or if the output is the extreme of a pulse that samples can
-            miss, the force of a compliant stop or a stress, and its peak is a variable.
-
-        Examples
-        --------
-        >>> Output("max(s.force)", "s.force", "max").check(["s.force"], "the mechanism")
+            If a variable is unknown; or if samples can miss the extreme, that of the force of a
+            compliant stop or of a stress, and the peak is a variable.
         """
-        part, dot, last = self.variable.rpartition(".")
-        if self.reduction == REST and (last not in PLACES or self.variable not in names):
+        part = self.variable.rpartition(".")[0]
+        if self.reduction == REST and (self.last not in PLACES or self.variable not in names):
             raise self._error("write rest(BODY.x), rest(BODY.y) or rest(BODY.angle)")
         if self.static:
             return
-        peak = PULSES.get(dot + last, "")
-        if self.reduction in ("max", "min") and peak and f"{part}.{peak}" in names:
+        peak = PULSES.get(self.last, "") if part else ""
+        if self.reduction in EXTREMES and peak and f"{part}.{peak}" in names:
             raise self._error(
                 f"{self.variable} is a pulse that may pass between two samples; use {peak}, the "
                 f"largest of the whole motion, or max({part}.{peak})"
             )
-        quantity = QUANTITIES[self.variable] if self.reduction == QUANTITY else None
-        if quantity is not None and (lacking := quantity.lacking(names)):
-            remedy = f"; {quantity.remedy}" * bool(quantity.remedy)
-            raise self._error(
-                f"{owner} has no variable {lacking}, from which it is computed{remedy}"
-            )
-        if quantity is None and self.variable not in names:
+        if self.reduction == QUANTITY:
+            quantity = QUANTITIES[self.variable]
+            if lacking := quantity.lacking(names):
+                remedy = f"; {quantity.remedy}" * bool(quantity.remedy)
+                raise self._error(
+                    f"{owner} has no variable {lacking}, from which it is computed{remedy}"
+                )
+        elif self.variable not in names:
             hint = proposal(self.variable, dict.fromkeys([*names, *QUANTITIES]))
             if hint.startswith("known") and len(names) > NAMES_LISTED_MAX:
                 hint = f"named quantities are {', '.join(QUANTITIES)}"
@@ -215,9 +213,11 @@ def parse_output(text: str, known: Container[str], column: str | None = None) ->
     if text in QUANTITIES:
         return Output(name, text, QUANTITY)
     call = _REDUCTION.fullmatch(text)
-    output = Output(name, call[2].strip(), call[1]) if call else Output(name, text)
-    condition = _CONDITION.fullmatch(output.variable)
-    if condition and output.reduction in TIMES and output.variable not in known:
+    reduction, variable = (call[1], call[2].strip()) if call else ("final", text)
+    relation, bound = ">", 0.0
+    condition = _CONDITION.fullmatch(variable)
+    if condition and reduction in TIMES and variable not in known:
+        variable, relation = condition[1].rstrip(), condition[2]
         try:
             bound = float(condition[3])
         except ValueError:
@@ -225,13 +225,9 @@ def parse_output(text: str, known: Container[str], column: str | None = None) ->
                 f"output {text}: bound {condition[3].strip()!r} must be a number, as in "
                 "first(shuttle.x > 0.001)"
             ) from None
-        output = replace(
-            output, variable=condition[1].rstrip(), relation=condition[2], bound=bound
-        )  # fmt: skip
-    absolute = _ABSOLUTE.fullmatch(output.variable)
-    if absolute and output.variable not in known:
-        return replace(output, variable=absolute[1].strip(), absolute=True)
-    return output
+    inner = None if variable in known else _ABSOLUTE.fullmatch(variable)
+    variable = inner[1].strip() if inner else variable
+    return Output(name, variable, reduction, relation, bound, inner is not None)
 
 
 def evaluate(
@@ -249,8 +245,8 @@ def evaluate(
         ``time`` and the variables of the output; only the last value is needed for ``final``.
     impacts : sequence of Impact
         All impacts, if the engine has recorded them; named quantities and extremes then see each
-        of them, also of several between two communication points.  Extremes of positions and
-        velocities are then those of parabolas through the points.
+        of them, also of several between two communication points, and extremes of positions and
+        velocities are those of parabolas through the points.
 
     Examples
     --------
@@ -261,7 +257,7 @@ def evaluate(
     if output.reduction == QUANTITY:
         return QUANTITIES[output.variable].value(columns, impacts or ())
     x = np.asarray(columns[output.variable], np.float64)
-    if output.reduction in ("max", "min"):
+    if output.reduction in EXTREMES:
         between = np.empty(0)
         if impacts is not None:
             between = _between(output, columns["time"], x, [impact.time for impact in impacts])
@@ -282,7 +278,7 @@ def _between(output: Output, t: Real, x: Real, hits: Sequence[float]) -> Real:
     >>> found.tolist(), _between(Output("y", "b.y", "max"), t, t * (3.0 - t), [1.2]).tolist()
     ([7.0], [])
     """
-    if output.variable.rpartition(".")[2] not in SMOOTH or len(t) < 3:
+    if output.last not in SMOOTH or len(t) < 3:
         return np.empty(0)
     h, slope = np.diff(t), np.diff(x) / np.diff(t)
     before, after = slope[:-1], slope[1:]
@@ -312,24 +308,11 @@ def _at_impacts(variable: str, impacts: Sequence[Impact]) -> list[float]:
 
 
 def reduce(output: Output, t: Real, x: Real) -> float:
-    """Return the value of an output for a trajectory.
+    """Return the value of an output for the values x of its variable at times t [s], (m,).
 
-    Parameters
-    ----------
-    output : Output
-        The reduction and its condition.
-    t : (m,)
-        Communication points [s].
-    x : (m,)
-        Values of the variable at these times.
-
-    Returns
-    -------
-    float
-        ``final``, ``max``, ``min``: in the unit of the variable.  ``mean``: average over time by
-        the trapezoidal rule.  ``first``: the first communication point at which the condition
-        holds [s]; ``since``: the first one from which on it holds to the end [s]; NaN if no point
-        qualifies.
+    ``final``, ``max``, ``min``: in the unit of the variable.  ``mean``: average over time by the
+    trapezoidal rule.  ``first``: the first communication point at which the condition holds [s];
+    ``since``: the first one from which on it holds to the end [s]; NaN if no point qualifies.
 
     Examples
     --------
