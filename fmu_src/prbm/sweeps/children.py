@@ -91,13 +91,15 @@ class Job:
 
 def main() -> None:
     """Run the rows; end this process at once, while its other thread waits for more."""
+    code = 1
     try:
         _run_rows()
+        code = 0
     except BaseException:
         traceback.print_exc()
+    finally:
         sys.stderr.flush()
-        os._exit(1)
-    os._exit(0)
+        os._exit(code)
 
 
 def _run_rows() -> None:
@@ -113,11 +115,11 @@ def _run_rows() -> None:
         _send(replies, f"{error}" or type(error).__name__)
         return
     _send(replies, "")
-    while True:
+    spent = False
+    while not spent:  # An FMU may hang after an error when its library is unloaded.
         outcome = run(received.get())
         _send(replies, outcome)
-        if outcome.spent:
-            return  # An FMU may hang after an error when its library is unloaded.
+        spent = outcome.spent
 
 
 def _read(stream: BinaryIO, received: "queue.Queue[Any]") -> None:
@@ -169,16 +171,15 @@ class Child:
 
     def receive(self, timeout: float | None) -> Any:
         """Return a reply; None if the process ended or was killed after ``timeout`` [s]."""
-        timer = threading.Timer(timeout, self._time_out) if timeout is not None else None
-        if timer:
+        timer = threading.Timer(timeout or 0.0, self._time_out)
+        if timeout is not None:
             timer.start()
         try:
             return pickle.load(self.process.stdout)  # type: ignore[arg-type]
         except (EOFError, OSError, ValueError, pickle.UnpicklingError):
             return None
         finally:
-            if timer:
-                timer.cancel()
+            timer.cancel()
 
     def _time_out(self) -> None:
         self.late = True
@@ -208,12 +209,8 @@ def ending(code: int) -> str:
     >>> ending(-11), ending(3)
     ('killed by SIGSEGV', 'exit code 3')
     """
-    if code >= 0:
-        return f"exit code {code}"
-    try:
-        return f"killed by {signal.Signals(-code).name}"
-    except ValueError:
-        return f"killed by signal {-code}"
+    names = {int(known): known.name for known in signal.Signals}
+    return f"exit code {code}" if code >= 0 else f"killed by {names.get(-code, f'signal {-code}')}"
 
 
 # --- the processes of this machine --------------------------------------------------------------
@@ -222,19 +219,8 @@ def ending(code: int) -> str:
 class Processes:
     """The processes that run a job on this machine, at most one per thread.
 
-    Parameters
-    ----------
-    job : Job
-        The simulation.
-    retries : int
-        Number of repetitions of a run whose process crashed.
-    timeout : float or None
-        Longest duration of a run [s]; None: no limit.
-
-    Raises
-    ------
-    Exception
-        If the simulation cannot be made ready here.
+    A run whose process crashes is repeated ``retries`` times; it may take ``timeout`` [s], if that
+    is not None.  Any exception means that the simulation cannot be made ready here.
     """
 
     def __init__(self, job: Job, retries: int, timeout: float | None) -> None:
@@ -255,8 +241,7 @@ class Processes:
             child = self._child()
             child.send(row)
             outcome: Outcome | None = child.receive(self.timeout)
-            if outcome is not None and not outcome.spent:
-                self._keep(child)
+            if outcome is not None and not outcome.spent and self._keep(child):
                 return outcome
             late, end = child.late, self._drop(child)
             if self.closed:
@@ -272,29 +257,27 @@ class Processes:
     def _child(self) -> Child:
         """Return an idle process, or a new one."""
         with self.lock:
-            if self.closed:
-                raise Unusable(STOPPED)
             child = self.idle.pop() if self.idle else None
         if child is not None and child.process.poll() is None:
             child.stderr.truncate(0)
             return child
         if child is not None:  # It was killed while it had no work.
             self._drop(child)
-        child = Child(self.task)
-        with self.lock:
-            self.all.add(child)
-        if self.closed:
+        if not self.closed:
+            child = Child(self.task)
+            with self.lock:
+                self.all.add(child)
+            if not self.closed:
+                return child
             self._drop(child)
-            raise Unusable(STOPPED)
-        return child
+        raise Unusable(STOPPED)
 
-    def _keep(self, child: Child) -> None:
-        """Keep a process for further runs, unless the study was stopped."""
+    def _keep(self, child: Child) -> bool:
+        """Keep a process for further runs, unless the study was stopped; return whether it was."""
         with self.lock:
             if not self.closed:
                 self.idle.append(child)
-                return
-        self._drop(child)
+            return not self.closed
 
     def _drop(self, child: Child) -> str:
         """End a process; return the text of :meth:`Child.close`."""

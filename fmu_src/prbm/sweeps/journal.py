@@ -65,12 +65,7 @@ class Journal:
     def opened(self, overwrite: bool = False, retry_failed: bool = False) -> Iterator[None]:
         """Read the journal of an interrupted study, and keep other processes from it.
 
-        Parameters
-        ----------
-        overwrite : bool
-            Forget the rows of an earlier study.
-        retry_failed : bool
-            Forget the rows of runs that have failed.
+        The rows of an earlier study are forgotten to overwrite them, or those that have failed.
 
         Raises
         ------
@@ -227,17 +222,14 @@ def _short(value: object) -> str:
 
 def _owner(path: Path) -> str:
     """Return the text about the process that writes to a journal."""
-    with suppress(OSError), path.open("rb") as file:
-        lines = file.read().decode(errors="replace").splitlines()
-        named = [line.removeprefix("# ") for line in lines if line.startswith(OWNER)]
-        if named:
-            return named[-1]
-    return "another process"
+    named = ["another process"]
+    with suppress(OSError):
+        lines = path.read_bytes().decode(errors="replace").splitlines()
+        named += [line.removeprefix("# ") for line in lines if line.startswith(OWNER)]
+    return named[-1]
 
 
 def _line(cells: Sequence[object]) -> str:
     out = io.StringIO()
-    csv.writer(out, lineterminator="").writerow(
-        [float.__repr__(x) if isinstance(x, float) else x for x in cells]
-    )
+    csv.writer(out, lineterminator="").writerow(cells)
     return out.getvalue()

@@ -102,21 +102,13 @@ class Runner:
         The completed rows.
     runs : int
         Expected number of rows, which limits that of the workers.
-    workers : int or None
-        Number of parallel runs; None: one per core, or those of the executor.
-    executor : Executor, str or None
-        A ``concurrent.futures`` executor, or the address of a Dask scheduler.  None: threads of
-        this process.
-    retries : int
-        Number of repetitions of a run whose process crashed.
-    timeout : float or None
-        Longest duration of a run [s]; None: no limit.  With a limit, other processes simulate.
+    workers, executor, retries, timeout
+        As for :func:`prbm.study`.  With a timeout, other processes simulate.
 
     Raises
     ------
     ParameterError
-        If the number of workers or the longest duration of a run [s] is not positive, or the number
-        of repetitions is negative.
+        If workers or timeout are not positive, or retries negative.
     StudyError
         If the scheduler does not respond or has no workers.
     """
@@ -180,10 +172,9 @@ class Runner:
         done, total = len(points) - len(rest), max(len(points), 1)
         report = progress or (lambda fraction: None)
         report(done / total)
-        for point, outcome in self._computed(rest):
+        for k, (point, outcome) in enumerate(self._computed(rest), done + 1):
             self.journal.add(point, outcome)
-            done += 1
-            report(done / total)
+            report(k / total)
         return [known[point] for point in points]
 
     def __enter__(self) -> Self:
@@ -201,13 +192,13 @@ class Runner:
         if kind is KeyboardInterrupt and self.journal.kept:
             raise KeyboardInterrupt(f"interrupted; {self.journal.kept}") from None
 
-    def _run_here(self, rows: Sequence[Row]) -> list[Outcome]:
+    def _run_here(self, batch: Sequence[Point]) -> list[Outcome]:
         """Simulate in this thread, until the study ends."""
         assert self.run is not None
         thread = threading.get_ident()
         self.busy.add(thread)
         try:
-            return [self.run(row) for row in rows if not self.stopped]
+            return [self.run(self._row(point)) for point in batch if not self.stopped]
         except Stopped:
             return []
         finally:
@@ -217,7 +208,7 @@ class Runner:
         """Yield points with their outcomes as they come."""
         if self.executor is None:
             for point in points:
-                yield point, self._run_here(self._rows([point]))[0]
+                yield point, self._run_here([point])[0]
             return
         rest = deque(points)
         self._submit(rest)
@@ -246,18 +237,17 @@ class Runner:
                 size = max(1, min(int(seconds / median(self.recent)), fair))
             self._send([rest.popleft() for _ in range(size)])
 
-    def _rows(self, batch: Sequence[Point]) -> list[Row]:
-        return [dict(zip(self.parameters, point, strict=True)) for point in batch]
-
     def _send(self, batch: list[Point], given: bool = False) -> None:
         assert self.executor is not None
-        rows = self._rows(batch)
         if self.run is not None:
-            future = self.executor.submit(self._run_here, rows)
+            future = self.executor.submit(self._run_here, batch)
         else:
             job = (self.job, self.retries, self.timeout) if given else None
-            future = self.executor.submit(run_batch, self.study, rows, job)
+            future = self.executor.submit(run_batch, self.study, [*map(self._row, batch)], job)
         self.running[future] = batch
+
+    def _row(self, point: Point) -> Row:
+        return dict(zip(self.parameters, point, strict=True))
 
     def _outcomes(self, future: "Future[Any]", batch: list[Point]) -> list[Outcome]:
         """Return the outcomes of a batch; none if it has to be repeated."""
@@ -267,12 +257,12 @@ class Runner:
             raise StudyError(f"the simulation cannot run: {error}") from None
         except CancelledError:
             raise StudyError(f"the cluster has ended; {self.journal.kept}") from None
+        except BrokenExecutor:
+            kept = self.journal.kept
+            raise StudyError(f"a process of the executor has ended early; {kept}") from None
         except Exception as error:
             if type(error).__name__ == "KilledWorker":  # Of Dask, which may not be installed.
                 return self._after_crash(batch)
-            if isinstance(error, BrokenExecutor):
-                kept = self.journal.kept
-                raise StudyError(f"a process of the executor has ended early; {kept}") from None
             if MISSING_MODULE in str(error):
                 raise StudyError(
                     "a worker cannot import prbm; install it there: "
