@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, Self
 
 import fmpy  # type: ignore[import-untyped]
-import numpy as np
 from fmpy.simulation import (  # type: ignore[import-untyped]
     settable_in_initialization_mode,
     settable_in_instantiated,
@@ -20,21 +19,16 @@ from ..base.archives import UNPACKED_SIZE_MAX, check_unpacked_size
 from ..base.errors import ParameterError
 from ..base.names import proposal
 from ..files.settings import in_unit
-from ..mechanics.arrays import Real
 from ..mechanism.parameters import Tolerance
 from ..runs.inputs import driving, filled
 from ..runs.run import ROWS_MAX, check_duration
 from .fmu import FmuJob, input_units, unit
-from .outputs import Output
 from .runner import StudyError
-from .table import number
+from .table import BITS, number
 
 STEPS = 1000  # Communication steps for an FMU without a proposed step.
 NAMES_LISTED_MAX = 10  # Messages with more settable variables refer to "fmpy info" instead.
-NO_NUMBERS = ("String", "Binary", "Clock")  # Types of variables.
-RANGES = {"Boolean": 1, "Int8": 7, "Int16": 15, "Int32": 31, "Integer": 31, "Enumeration": 31,
-          "Int64": 53, "UInt8": 8, "UInt16": 16, "UInt32": 32, "UInt64": 53}  # fmt: skip
-"""Bits of FMI's integer types; a float represents 53 bits exactly."""
+FLOATS = ("Real", "Float32", "Float64")  # Types of variables.
 
 
 def read_fmu(path: Path) -> tuple[bytes, Any]:
@@ -69,7 +63,7 @@ class FmuModel:
         If it cannot be read, or has no co-simulation of FMI 2.0 or 3.0.
     """
 
-    owner = "the FMU"
+    owner, static = "the FMU", False
     tolerances: Mapping[str, Tolerance] = {}
 
     def __init__(self, path: str | Path) -> None:
@@ -81,16 +75,33 @@ class FmuModel:
             "FMU": hashlib.sha256(self.content).hexdigest(), "model": self.description.modelName,
         }  # fmt: skip
         self.units = {name: unit(v) for name, v in self.variables.items()}
+        self.types = {
+            v.name: v.type + (f" and shape {v.shape}" if v.shape else "")
+            for v in self.variables.values()
+            if v.type not in FLOATS or v.shape
+        }
 
     @cached_property
     def values(self) -> dict[str, float]:
         """The start values of all variables that can be set; NaN for those without."""
-        return {name: number(v.start) for name, v in self.variables.items() if _settable(v)}
+        return {n: number(v.start) for n, v in self.variables.items() if self._settable(v)}
 
     @property
     def outputs(self) -> list[str]:
         """The outputs that are numbers."""
-        return [n for n, v in self.variables.items() if v.causality == "output" and _numeric(v)]
+        every = self.variables.values()
+        return [v.name for v in every if v.causality == "output" and self._numeric(v.name)]
+
+    def _numeric(self, name: str) -> bool:
+        return name not in self.types or self.types[name] in BITS
+
+    def _settable(self, variable: Any) -> bool:
+        """Return whether FMPy can set a variable to a number before or during initialization."""
+        if not self._numeric(variable.name) or variable.causality in (
+            "structuralParameter", "calculatedParameter", "independent"
+        ):  # fmt: skip
+            return False
+        return bool(settable_in_instantiated(variable) or settable_in_initialization_mode(variable))
 
     def needing(self, outputs: object) -> Self:
         """Return the FMU, which has the same variables for all outputs."""
@@ -103,49 +114,9 @@ class FmuModel:
             hint = "fmpy info lists the variables"
         if name not in self.variables:
             return f"the FMU has no variable {name!r}; {hint}"
-        variable = self.variables[name]
-        kind = f"{variable.causality or 'local'} variable of type {variable.type}"
-        shape = f" and shape {variable.shape}" if variable.shape else ""
-        return f"{name} ({kind}{shape}) cannot be set by a table; {hint}"
-
-    def check_output(self, output: Output) -> None:
-        """Reject an output that is not a number of the FMU.
-
-        Raises
-        ------
-        ParameterError
-            If a variable is unknown, an array, or not a number; or the output is that of a
-            mechanism.
-        """
-        if output.static:
-            raise ParameterError(f"output {output.column}: needs a mechanism; use prbm study")
-        output.check(self.variables, self.owner)
-        for variable in map(self.variables.__getitem__, output.variables(self.variables)):
-            if not _numeric(variable):
-                shape = f" and shape {variable.shape}" if variable.shape else ""
-                raise ParameterError(
-                    f"output {output.column}: {variable.name} is of type {variable.type}{shape}, "
-                    "not one number; leave it out"
-                )
-
-    def check_column(self, name: str, x: Real) -> None:
-        """Reject values (n,) that are not of the type of a variable.
-
-        Raises
-        ------
-        ParameterError
-            If one of them is not.
-        """
-        kind = self.variables[name].type if name in self.variables else ""
-        if kind not in RANGES:
-            return
-        high = 2.0 ** RANGES[kind]
-        low = 0.0 if kind[0] in "UB" else -high
-        wrong = (x != np.round(x)) | (x < low) | (x >= high)
-        if wrong.any():
-            row = int(wrong.argmax())
-            required = "0 or 1 (Boolean)" if kind == "Boolean" else f"a whole number ({kind})"
-            raise ParameterError(f"row {row} of the table: {name} = {x[row]:g} must be {required}")
+        kind, causality = self.variables[name].type, self.variables[name].causality or "local"
+        kind = f"{causality} variable of type {self.types.get(name, kind)}"
+        return f"{name} ({kind}) cannot be set by a table; {hint}"
 
     def fixed(self, values: Mapping[str, float | str] | None) -> dict[str, float]:
         """Return start values of all runs in the units of the FMU.
@@ -233,16 +204,3 @@ class FmuModel:
                 "has a fixed step; choose a step that divides it"
             )
         return start, stop, size, tolerance
-
-
-def _numeric(variable: Any) -> bool:
-    return variable.type not in NO_NUMBERS and not variable.shape
-
-
-def _settable(variable: Any) -> bool:
-    """Return whether FMPy can set a variable to a number before or during initialization."""
-    if not _numeric(variable) or variable.causality in (
-        "structuralParameter", "calculatedParameter", "independent"
-    ):  # fmt: skip
-        return False
-    return bool(settable_in_instantiated(variable) or settable_in_initialization_mode(variable))

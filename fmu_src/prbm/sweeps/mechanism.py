@@ -18,7 +18,6 @@ from ..hybrid.given import start_values
 from ..hybrid.simulation import Simulation
 from ..interface.tables import tables
 from ..interface.variables import variables
-from ..mechanics.arrays import Real
 from ..mechanics.stress import with_stress
 from ..mechanism.description import Mechanism
 from ..mechanism.parameters import Tolerance
@@ -28,7 +27,7 @@ from ..runs.inputs import Source, filled, signals
 from ..runs.result import names as column_names
 from ..runs.run import communication_points, sampled, simulate
 from .children import Job, Row, Task
-from .outputs import FAILED, OK, Outcome, Output, evaluate, parse_output
+from .outputs import FAILED, OK, Outcome, evaluate, parse_output
 
 STEPS = 4000  # Communication steps of a simulation, which resolve the vibration after impacts.
 
@@ -36,8 +35,9 @@ STEPS = 4000  # Communication steps of a simulation, which resolve the vibration
 class MechanismModel:
     """A mechanism, a :class:`prbm.sweeps.plan.Model`."""
 
-    owner = "the mechanism"
-    outputs = ()
+    owner, static = "the mechanism", True
+    outputs: tuple[str, ...] = ()
+    types: Mapping[str, str] = {}
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism, self.name, self.title = mechanism, mechanism.name, mechanism.title
@@ -71,19 +71,6 @@ class MechanismModel:
     def refusal(self, name: str) -> str:
         """Return why a variable cannot be set: it is unknown."""
         return unknown(name, self.values)
-
-    def check_output(self, output: Output) -> None:
-        """Reject an output that the mechanism does not have.
-
-        Raises
-        ------
-        ParameterError
-            As :meth:`Output.check`.
-        """
-        output.check(self.units, self.owner)
-
-    def check_column(self, name: str, x: Real) -> None:
-        """Accept values (n,): a simulation reports those that are out of bounds."""
 
     def fixed(self, values: Mapping[str, float | str] | None) -> dict[str, float]:
         """Return values of all simulations in SI.

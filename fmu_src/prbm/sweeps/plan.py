@@ -20,7 +20,7 @@ from .journal import Point
 from .mechanism import MechanismModel
 from .optimum import Constraint
 from .outputs import parse_output
-from .table import check_separator, numbers, read_table
+from .table import BITS, check_separator, check_type, numbers, read_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -102,14 +102,22 @@ class Plan:
         known = model.units
         kept = tuple(parse_output(text, known, column) for column, text in named.items())
         for output in kept:
-            model.check_output(output)
+            if output.static and not model.static:
+                raise ParameterError(f"output {output.column}: needs a mechanism; use prbm study")
+            output.check(known, model.owner)
+            for name in output.variables(known):
+                if (kind := model.types.get(name, "")) and kind not in BITS:
+                    raise ParameterError(
+                        f"output {output.column}: {name} is of type {kind}, not one number; leave "
+                        "it out"
+                    )
         sources, given = dict(inputs or {}), model.fixed(values)
         self.values = {**model.values, **given}
         columns = self._columns(vary, runs)
         self._check_names(columns, placeholders(sources), given)
         self.varied, self.points = self._points(columns, listed, runs)
         for name, x in zip(self.varied, self.points.T, strict=True):
-            model.check_column(name, x)
+            check_type(name, x, model.types.get(name, ""))
         self.units = {n: known.get(n, "") for n in self.varied}
         self.units |= {output.column: output.unit(known) for output in kept}
         self.constraints = tuple(

@@ -18,6 +18,9 @@ PARQUET = (".parquet", ".pq")  # Suffixes.
 WORDS = {"true": 1.0, "false": 0.0}
 FILE_SIZE_MAX = 1 << 30  # bytes of a table in CSV; a million rows of 50 columns have 900 MB.
 HEAD = re.compile(r"([^\[\]]*)\[([^\[\]]*)\]")  # A name and a unit in brackets.
+BITS = {"Boolean": 1, "Int8": 7, "Int16": 15, "Int32": 31, "Integer": 31, "Enumeration": 31,
+        "Int64": 53, "UInt8": 8, "UInt16": 16, "UInt32": 32, "UInt64": 53}  # fmt: skip
+"""Bits of FMI's integer types; a float represents 53 bits exactly."""
 Cells = Sequence[Any]
 
 
@@ -133,3 +136,22 @@ def number(cell: Any) -> float:
         return WORDS[text] if text in WORDS else float(cell)
     except (TypeError, ValueError):
         return math.nan
+
+
+def check_type(name: str, x: Real, kind: str) -> None:
+    """Reject values (n,) that are not of a type of FMI.
+
+    Raises
+    ------
+    ParameterError
+        If one of them is not.
+    """
+    if kind not in BITS:
+        return
+    high = 2.0 ** BITS[kind]
+    low = 0.0 if kind[0] in "UB" else -high
+    wrong = (x != np.round(x)) | (x < low) | (x >= high)
+    if wrong.any():
+        row = int(wrong.argmax())
+        required = "0 or 1 (Boolean)" if kind == "Boolean" else f"a whole number ({kind})"
+        raise ParameterError(f"row {row} of the table: {name} = {x[row]:g} must be {required}")
