@@ -7,7 +7,7 @@ reset and with a new instance.  Unless both agree to the last bit, every run get
 
 import io
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from ctypes import c_uint
 from dataclasses import dataclass, field, replace
@@ -151,23 +151,25 @@ class Runner:
             "CoSimulation",
             event_mode_used=self.events,
             debug_logging=self.logging,
-            logger=self._log2 if self.two else self._log3,
+            logger=self._log,
             require_functions=False,
         )
         self.named = {variable.name: variable for variable in variables}
         self.time = job.start
         self.ended: float | None = None  # The time at which the FMU ended the simulation [s].
-        history, final = (
-            {
-                name: self.named[name]
-                for output in job.outputs
-                if (output.reduction == "final") == at_end
-                for name in output.variables(self.named)
-            }
+        self.history, self.final = (
+            _Recorder(
+                self.fmu,
+                {
+                    name: self.named[name]
+                    for output in job.outputs
+                    if (output.reduction == "final") == at_end
+                    for name in output.variables(self.named)
+                },
+                self.two,
+            )
             for at_end in (False, True)
         )
-        self.history = _Recorder(self.fmu, history.values(), self.two)
-        self.final = _Recorder(self.fmu, final.values(), self.two)
 
     def run(self, values: Mapping[str, float]) -> Outcome:
         """Run once with start values; errors are returned as outcomes, not raised."""
@@ -208,10 +210,9 @@ class Runner:
         texts = list(dict.fromkeys(worst or [text for _, text in self.messages]))[-MESSAGES_MAX:]
         return "; ".join(texts) or str(error) or type(error).__name__
 
-    def _log2(self, _: object, __: bytes, status: int, category: bytes, text: bytes) -> None:
-        self._log3(None, status, category, text)
-
-    def _log3(self, _: object, status: int, __: bytes, text: bytes) -> None:
+    def _log(self, *arguments: Any) -> None:
+        """Keep a message; in FMI 2.0, the name of the instance is before its status."""
+        status, _, text = arguments[-3:]
         self.logged += 1
         if status > 0:
             self.messages.append((status, (text or b"").decode(errors="replace").strip()))
@@ -238,7 +239,7 @@ class Runner:
             self.fmu.instantiate(callbacks=self.fmu.callbacks, loggingOn=self.logging)
         else:
             self.fmu.instantiate(
-                eventModeUsed=self.events, logMessage=self._log3, loggingOn=self.logging
+                eventModeUsed=self.events, logMessage=self._log, loggingOn=self.logging
             )
 
     def _driven(self, row: Row) -> tuple[dict[str, float], "Driver | None"]:
@@ -272,11 +273,9 @@ class Runner:
             if self.ended is not None:
                 status, message = ENDED, f"the FMU ended the run at t = {self.ended:.9g} s"
                 break
-        last = self.final.named(self.final.read())
+        columns = self.final.columns([self.final.read()])
         self.fmu.terminate()
-        history = self.history.named(np.array(rows, dtype=np.float64).T)
-        columns = {name: np.array([x], np.float64) for name, x in last.items()}
-        columns |= history | {"time": np.array(times)}
+        columns |= self.history.columns(rows) | {"time": np.array(times)}
         return status, message, tuple(evaluate(output, columns) for output in self.job.outputs)
 
     def _initialize(self, values: dict[str, float]) -> None:
@@ -344,19 +343,19 @@ class Runner:
 class _Recorder:
     """Reads variables into memory allocated once; FMPy's getters allocate at each call."""
 
-    def __init__(self, fmu: Any, variables: Iterable[Any], two: bool) -> None:
-        groups: dict[str, list[Any]] = {}  # by type: one call of FMI per type
-        for variable in variables:
+    def __init__(self, fmu: Any, variables: Mapping[str, Any], two: bool) -> None:
+        groups: dict[str, list[str]] = {}  # by type: one call of FMI per type
+        for name, variable in variables.items():
             whole = "Integer" if two else "Int64"
             kind = whole if variable.type == "Enumeration" else variable.type
-            groups.setdefault(kind, []).append(variable)
+            groups.setdefault(kind, []).append(name)
         self.fmu, self.calls = fmu, list[tuple[Any, tuple[Any, ...], Any]]()
-        self.names = [variable.name for group in groups.values() for variable in group]
+        self.names = [name for group in groups.values() for name in group]
         for kind, group in groups.items():
             n = len(group)
             kept = TYPES_2[kind] if two else np.dtype(kind.lower().replace("boolean", "bool"))
             values = np.ctypeslib.as_ctypes(np.zeros(n, kept))
-            references = (c_uint * n)(*(variable.valueReference for variable in group))
+            references = (c_uint * n)(*(variables[name].valueReference for name in group))
             function = getattr(fmu, f"fmi{2 if two else 3}Get{kind}")
             self.calls.append((function, (references, n, values) + (() if two else (n,)), values))
 
@@ -368,9 +367,9 @@ class _Recorder:
             row += values
         return row
 
-    def named(self, columns: Sequence[Any] | NDArray[np.float64]) -> dict[str, Any]:
-        """Return values in the order of :meth:`read` by the names of the variables."""
-        return dict(zip(self.names, columns, strict=True))
+    def columns(self, rows: Sequence[Sequence[float]]) -> dict[str, NDArray[np.float64]]:
+        """Return the columns of rows of :meth:`read` by the names of the variables."""
+        return dict(zip(self.names, np.array(rows, np.float64).T, strict=True))
 
 
 def _bits(outcome: Outcome) -> tuple[str, bytes]:
