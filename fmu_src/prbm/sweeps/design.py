@@ -108,7 +108,7 @@ def _quantiles(name: str, distribution: Any, u: Real) -> Real:
     return x
 
 
-def distribution(value: float, tolerance: Tolerance) -> Any:
+def distribution(name: str, value: float, tolerance: Tolerance) -> Any:
     """Return the distribution of a parameter with a tolerance, for :func:`drawn`.
 
     It is normal, and the half-width of the tolerance is three standard deviations: 0.27 % of the
@@ -121,12 +121,14 @@ def distribution(value: float, tolerance: Tolerance) -> Any:
 
     Examples
     --------
-    >>> distribution(2.0, Tolerance(0.5, uniform=True))
+    >>> distribution("length", 2.0, Tolerance(0.5, uniform=True))
     (1.5, 2.5)
     """
     half = tolerance.at(value)
     if half == 0.0:
-        raise ParameterError("a tolerance in % of the value 0 has no width; give it in its unit")
+        raise ParameterError(
+            f"{name}: a tolerance in % of the value 0 has no width; give it in its unit"
+        )
     return (value - half, value + half) if tolerance.uniform else norm(value, half / SIGMAS)
 
 
@@ -206,7 +208,7 @@ def sensitivity(names: Sequence[str], values: Real, seed: int = 0) -> Sensitivit
     """
     p = len(names)
     n = len(values) // (p + 2)
-    if not np.isfinite(values).all() or constant(values):
+    if not np.isfinite(values).all() or np.ptp(values) <= CONSTANT_RTOL * np.abs(values).max():
         return None
     a, b, mixed = values[:n], values[n : 2 * n], values[2 * n :].reshape(p, n)
     found: Any = sobol_indices(
@@ -225,14 +227,3 @@ def sensitivity(names: Sequence[str], values: Real, seed: int = 0) -> Sensitivit
         indices.append(np.ravel(index))
         intervals.append(np.where(np.isfinite(ends), ends, index[..., None]).reshape(p, 2))
     return Sensitivity(tuple(names), *indices, *intervals)
-
-
-def constant(values: Real) -> bool:
-    """Return whether values differ by round-off only.
-
-    Examples
-    --------
-    >>> constant(np.array([3.0, 3.0 + 1e-15])), constant(np.array([0.0, 1e-15]))
-    (True, False)
-    """
-    return bool(np.ptp(values) <= CONSTANT_RTOL * np.abs(values).max())

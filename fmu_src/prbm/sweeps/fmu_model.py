@@ -4,7 +4,6 @@ import hashlib
 import io
 import math
 from collections.abc import Mapping
-from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
@@ -81,27 +80,11 @@ class FmuModel:
             if v.type not in FLOATS or v.shape
         }
 
-    @cached_property
-    def values(self) -> dict[str, float]:
-        """The start values of all variables that can be set; NaN for those without."""
-        return {n: number(v.start) for n, v in self.variables.items() if self._settable(v)}
-
-    @property
-    def outputs(self) -> list[str]:
-        """The outputs that are numbers."""
-        every = self.variables.values()
-        return [v.name for v in every if v.causality == "output" and self._numeric(v.name)]
-
-    def _numeric(self, name: str) -> bool:
-        return name not in self.types or self.types[name] in BITS
-
-    def _settable(self, variable: Any) -> bool:
-        """Return whether FMPy can set a variable to a number before or during initialization."""
-        if not self._numeric(variable.name) or variable.causality in (
-            "structuralParameter", "calculatedParameter", "independent"
-        ):  # fmt: skip
-            return False
-        return bool(settable_in_instantiated(variable) or settable_in_initialization_mode(variable))
+        others = {name for name, kind in self.types.items() if kind not in BITS}
+        numeric = {name: v for name, v in self.variables.items() if name not in others}
+        self.outputs = [name for name, v in numeric.items() if v.causality == "output"]
+        # The start values of all variables that can be set; NaN for those without.
+        self.values = {name: number(v.start) for name, v in numeric.items() if _settable(v)}
 
     def needing(self, outputs: object) -> Self:
         """Return the FMU, which has the same variables for all outputs."""
@@ -204,3 +187,10 @@ class FmuModel:
                 "has a fixed step; choose a step that divides it"
             )
         return start, stop, size, tolerance
+
+
+def _settable(variable: Any) -> bool:
+    """Return whether FMPy can set a variable before or during initialization."""
+    if variable.causality in ("structuralParameter", "calculatedParameter", "independent"):
+        return False
+    return bool(settable_in_instantiated(variable) or settable_in_initialization_mode(variable))

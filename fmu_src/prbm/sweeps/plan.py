@@ -20,7 +20,7 @@ from .journal import Point
 from .mechanism import MechanismModel
 from .optimum import Constraint
 from .outputs import parse_output
-from .table import BITS, check_separator, check_type, numbers, read_table
+from .table import BITS, check_type, numbers, read_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -129,7 +129,7 @@ class Plan:
         self.spread = self._spread(tolerances or {})
         self.beside = {n: self.values[n] for n in self.spread if n not in self.varied}
         for name, value in self.beside.items():
-            _law(name, value, self.spread[name])  # Report mistakes.
+            distribution(name, value, self.spread[name])  # Report mistakes.
 
     @property
     def columns(self) -> list[str]:
@@ -201,7 +201,6 @@ class Plan:
         for name in columns:
             known = name in self.model.values
             if not known and name not in within:
-                check_separator(name)
                 raise ParameterError(self.model.refusal(name))
             if known and name in within:
                 raise ParameterError(
@@ -265,7 +264,7 @@ class Plan:
         if isinstance(given, Tolerance):
             if not math.isfinite(value):
                 raise ParameterError(f"{name} has a tolerance, but no value; write it before +-")
-            return _law(name, value, given)
+            return distribution(name, value, given)
         if hasattr(given, "ppf"):
             return given
         ends = self._samples(name, given)
@@ -291,14 +290,6 @@ class Plan:
                 _, text = tolerance(text, self._unit(name), f"{name} =")
             found[name] = text
         return found
-
-
-def _law(name: str, value: float, tolerance: Tolerance) -> Any:
-    """Return the distribution of a parameter with a tolerance."""
-    try:
-        return distribution(value, tolerance)
-    except ParameterError as error:
-        raise ParameterError(f"{name}: {error}") from None
 
 
 def _condition(text: str) -> tuple[str, str, str, str]:

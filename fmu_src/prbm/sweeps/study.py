@@ -361,7 +361,7 @@ def _optimum(
 def _around(plan: Plan, best: Optimum) -> list[Point]:
     """Return drawn values of all columns around an optimum."""
     at = {**best.point, **plan.beside}
-    laws = {n: distribution(at[n], x) for n, x in plan.spread.items() if x.at(at[n]) > 0.0}
+    laws = {n: distribution(n, at[n], x) for n, x in plan.spread.items() if x.at(at[n]) > 0.0}
     rows: Real = np.tile([at[name] for name in plan.columns], (YIELD_RUNS, 1))
     if laws:
         rows[:, [plan.columns.index(name) for name in laws]] = drawn(

@@ -38,7 +38,8 @@ def read_table(table: Any, known: Container[str] = ()) -> dict[str, tuple[Cells,
     Raises
     ------
     ParameterError
-        If the file cannot be read, or the table has no row, no column or two of one name.
+        If the file cannot be read, or the table has no row, no column, two of one name, or one
+        that looks like several.
     """
     path = Path(table) if isinstance(table, str | Path) else None
     if path is not None and path.suffix.lower() not in PARQUET:
@@ -52,6 +53,12 @@ def read_table(table: Any, known: Container[str] = ()) -> dict[str, tuple[Cells,
         name, unit = head.strip(), ""
         if name not in known and (parts := HEAD.fullmatch(name)):
             name, unit = parts[1].strip(), parts[2].strip().strip("-")
+        for sign, word in SEPARATORS.items():
+            if sign in name and name not in known:
+                raise ParameterError(
+                    f"the table has the column {name!r}: its columns seem to be separated by "
+                    f"{word}; separate them by commas, and write numbers with a decimal point"
+                )
         if name in found:
             raise ParameterError(f"{where} has the column {name!r} twice; keep one")
         found[name] = cells, unit
@@ -93,22 +100,6 @@ def _read_parquet(path: Path) -> Any:
     except (OSError, ValueError) as error:  # Errors of pandas and pyarrow are subclasses.
         reason = " ".join(str(error).split()) or type(error).__name__
         raise ParameterError(f"{path} cannot be read as a table: {reason}") from None
-
-
-def check_separator(name: str) -> None:
-    """Reject an unknown name that looks like several columns.
-
-    Raises
-    ------
-    ParameterError
-        If it has semicolons or tabs.
-    """
-    for sign, word in SEPARATORS.items():
-        if sign in name:
-            raise ParameterError(
-                f"the table has the column {name!r}: its columns seem to be separated by {word}; "
-                "separate them by commas, and write numbers with a decimal point"
-            )
 
 
 def numbers(name: str, cells: Cells, factor: float = 1.0) -> Real:
