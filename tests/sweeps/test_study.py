@@ -1,5 +1,6 @@
 """Parameter studies: grids, optima, flat ranges, failed simulations, mistakes."""
 
+import itertools
 import math
 import os
 import re
@@ -20,7 +21,6 @@ from prbm.runs.run import simulate
 from prbm.sweeps import mechanism as simulations
 from prbm.sweeps import runner
 from prbm.sweeps import study as module
-from prbm.sweeps.design import grid
 from prbm.sweeps.journal import Journal
 from prbm.sweeps.optimum import FLAT_RTOL, Constraint, Optimum, Search
 from prbm.sweeps.study import Study, study
@@ -30,7 +30,7 @@ from support import ROOT
 def searched(function, *samples: np.ndarray, sign: float = 1.0, constraints=()) -> Optimum:
     """Return the optimum of the first of several functions of the parameters, sampled on a grid."""
     names = ["a", "b", "c"][: len(samples)]
-    points = grid(dict(zip(names, samples, strict=True)))
+    points = np.array([*itertools.product(*samples)])
 
     def evaluate(x: np.ndarray) -> np.ndarray:
         return np.array([np.atleast_1d(function(*point)) for point in x.tolist()])

@@ -78,11 +78,7 @@ def run_study(options: argparse.Namespace) -> None:
         _print_sensitivities(found, rows)
         output.table(shares, SHARES_HEAD, rows)
     if found.optimum is not None:
-        verb = "least" if options.maximise is None else "largest"
-        if len(found.varied) > 1:
-            _print_best(found.optimum, found.units)
-        for line in _optimum_lines(found.optimum, found.units, verb):
-            print(line)
+        _print_optimum(found.optimum, found.units, options.maximise is not None)
         if mechanism is not None:
             output.text(best, _best_set(mechanism, found.optimum, arguments["values"]))
     if found.share is not None:
@@ -238,8 +234,13 @@ def _print_spread(columns: Mapping[str, Real], units: Mapping[str, str]) -> None
     print(aligned(heads, rows))
 
 
-def _optimum_lines(optimum: Optimum, units: Mapping[str, str], verb: str) -> list[str]:
-    """Return the lines about an optimum."""
+def _print_optimum(optimum: Optimum, units: Mapping[str, str], largest: bool) -> None:
+    """Print the best points of several parameters, the best one first, and the optimum."""
+    if len(optimum.point) > 1:
+        print(f"best {len(optimum.best)} points:")
+        columns = dict(zip(optimum.point, optimum.best.T, strict=True))
+        _print_table({**columns, optimum.output: optimum.best_values}, units)
+    verb = "largest" if largest else "least"
     place = ", ".join(f"{name} = {_text(x, units[name])}" for name, x in optimum.point.items())
     lines = [
         f"{verb} {optimum.output}: {_text(optimum.value, units[optimum.output])} at {place}, with "
@@ -264,12 +265,12 @@ def _optimum_lines(optimum: Optimum, units: Mapping[str, str], verb: str) -> lis
     if optimum.robust is not None:
         ((name, _),) = optimum.point.items()
         low, high, worst = optimum.robust
-        bound = "most" if verb == "least" else "least"
+        bound = "least" if largest else "most"
         lines.append(
             f"best five neighbouring samples: at {bound} {_text(worst, units[optimum.output])} "
             f"with {name} from {_text(low, units[name])} to {_text(high, units[name])}"
         )
-    return lines
+    print("\n".join(lines))
 
 
 def _design_lines(optimum: Optimum, units: Mapping[str, str]) -> list[str]:
@@ -298,13 +299,6 @@ def _design_lines(optimum: Optimum, units: Mapping[str, str]) -> list[str]:
                 what += ", which is narrower than the distance of the samples"
         lines.append(f"design {name}: {what}")
     return lines
-
-
-def _print_best(optimum: Optimum, units: Mapping[str, str]) -> None:
-    """Print the best points of all simulations, the best one first."""
-    print(f"best {len(optimum.best)} points:")
-    columns = dict(zip(optimum.point, optimum.best.T, strict=True))
-    _print_table({**columns, optimum.output: optimum.best_values}, units)
 
 
 def _print_sensitivities(found: Study, shares: Sequence[Sequence[Any]]) -> None:

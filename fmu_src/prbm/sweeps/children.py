@@ -198,19 +198,9 @@ class Child:
         self.stderr.seek(0)
         lines = self.stderr.read().decode(errors="replace").strip().splitlines()
         self.stderr.close()
-        return ending(code) + (f" ({lines[-1].strip()})" if lines else "")
-
-
-def ending(code: int) -> str:
-    """Return the text of an exit code.
-
-    Examples
-    --------
-    >>> ending(-11), ending(3)
-    ('killed by SIGSEGV', 'exit code 3')
-    """
-    names = {int(known): known.name for known in signal.Signals}
-    return f"exit code {code}" if code >= 0 else f"killed by {names.get(-code, f'signal {-code}')}"
+        names = {-known: known.name for known in signal.Signals}
+        end = f"killed by {names.get(code, f'signal {-code}')}" if code < 0 else f"exit code {code}"
+        return end + (f" ({lines[-1].strip()})" if lines else "")
 
 
 # --- the processes of this machine --------------------------------------------------------------

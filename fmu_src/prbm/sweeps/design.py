@@ -5,7 +5,6 @@ sequence of Sobol.  Drawn points give the share of good runs with its confidence
 Saltelli's design give first-order and total sensitivity indices.
 """
 
-import itertools
 import math
 import warnings
 from collections.abc import Mapping, Sequence
@@ -26,17 +25,6 @@ SIGMAS = 3.0  # Standard deviations in the half-width of a tolerance.
 CONFIDENCE = 0.95
 CONSTANT_RTOL = 1e-12  # Values that differ by less than this share of the largest are equal.
 RESAMPLES = 999  # Of the bootstrap that gives the confidence intervals of indices.
-
-
-def grid(samples: Mapping[str, Real]) -> Real:
-    """Return all combinations of samples, (n, p); the last parameter varies fastest.
-
-    Examples
-    --------
-    >>> grid({"a": np.array([0.0, 1.0]), "b": np.array([2.0, 3.0])}).tolist()
-    [[0.0, 2.0], [0.0, 3.0], [1.0, 2.0], [1.0, 3.0]]
-    """
-    return np.array(list(itertools.product(*samples.values())))
 
 
 def drawn(distributions: Mapping[str, Any], n: int, seed: int, method: str) -> Real:

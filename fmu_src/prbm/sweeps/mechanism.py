@@ -167,7 +167,8 @@ class MechanismJob(Job):
         """Return the outputs."""
         given, inputs = self.driven(row)
         static = [output for output in self.outputs if output.static]
-        shape = equilibrium(self.mechanism, self._parameters(given)) if static else None
+        own = {p.name: given[p.name] for p in self.mechanism.parameters if p.name in given}
+        shape = equilibrium(self.mechanism, own) if static else None  # Without inputs.
         columns, impacts = {}, ()  # type: ignore[var-annotated]
         if len(static) < len(self.outputs):
             columns, impacts = self._motion(given, inputs)
@@ -175,10 +176,6 @@ class MechanismJob(Job):
             output.at_rest(shape) if output.static else evaluate(output, columns, impacts)
             for output in self.outputs
         )
-
-    def _parameters(self, given: Mapping[str, float]) -> dict[str, float]:
-        """Return the parameters among values; a static shape has no inputs."""
-        return {p.name: given[p.name] for p in self.mechanism.parameters if p.name in given}
 
     def _motion(self, given: Mapping[str, float], inputs: Mapping[str, Source]) -> tuple[Any, Any]:
         """Return the columns that the outputs need, and the impacts."""

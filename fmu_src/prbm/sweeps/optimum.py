@@ -74,10 +74,6 @@ class Constraint:
         sign = 1.0 if self.relation[0] == ">" else -1.0
         return sign * (value - self.bound) / (abs(self.bound) or 1.0)
 
-    def active(self, value: float) -> bool:
-        """Return whether a value is at the bound."""
-        return abs(self.excess(value)) < ACTIVE_RTOL
-
 
 @dataclass(frozen=True, repr=False)
 class Optimum:
@@ -167,7 +163,9 @@ class Optimum:
     @property
     def active(self) -> tuple[str, ...]:
         """Texts of the constraints whose output is within 1 % of the bound."""
-        return tuple(c.text for c in self.constraints if c.active(self.others[c.output]))
+        return tuple(
+            c.text for c in self.constraints if abs(c.excess(self.others[c.output])) < ACTIVE_RTOL
+        )
 
     def __repr__(self) -> str:
         place = ", ".join(f"{name} = {x:.6g}" for name, x in self.point.items())
@@ -250,7 +248,9 @@ class Search:
     def optimum(self) -> Optimum:
         """Refine the best samples and determine the range around the optimum."""
         if not np.isfinite(self.costs).any() and self.constraints:
-            self._descend(int(np.argmin([self._violation(row) for row in self.found])))
+            excess = np.array([self._excess(row) for row in self.found])
+            excess = np.nan_to_num(excess, nan=-1e3, posinf=-1e3, neginf=-1e3)
+            self._descend(int(np.argmax(np.minimum(excess, 0.0).sum(axis=1))))
         if not np.isfinite(self.costs).any():
             which = " that satisfies the constraints" if self.constraints else ""
             raise ParameterError(f"no simulation has a value of {self.output}{which}")
@@ -366,10 +366,6 @@ class Search:
             options={"initial_simplex": corners, "maxfev": REFINEMENTS_MAX * len(sizes) // 2,
                      "xatol": REFINED_RTOL, "fatol": 0.0},
         )  # fmt: skip
-
-    def _violation(self, values: Real) -> float:
-        """Return the sum of the relative violations of the constraints."""
-        return sum(-min(x, 0.0) if math.isfinite(x) else 1e3 for x in self._excess(values))
 
     def _descend_from_best(self) -> None:
         """Search under constraints from the best samples, and again around the best point."""

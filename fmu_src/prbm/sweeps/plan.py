@@ -1,5 +1,6 @@
 """The plan of a study: which simulations it has, checked before the first one."""
 
+import itertools
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -15,7 +16,7 @@ from ..files.settings import in_unit, is_tolerance, tolerance
 from ..mechanics.arrays import Real
 from ..mechanism.parameters import Tolerance
 from ..runs.inputs import Source, placeholders
-from .design import SENSITIVITY, distribution, drawn, grid
+from .design import SENSITIVITY, distribution, drawn
 from .journal import Point
 from .mechanism import MechanismModel
 from .optimum import Constraint
@@ -233,9 +234,9 @@ class Plan:
             count = runs * (len(varied) + 2 if self.method == SENSITIVITY else 1)
         if count > RUNS_MAX:
             raise ParameterError(f"the study has {count} simulations; reduce them to {RUNS_MAX}")
-        return varied, grid(varied) if runs is None else drawn(
-            varied, runs, self.seed, self.method
-        )  # fmt: skip
+        if runs is None:  # The last parameter varies fastest.
+            return varied, np.array(list(itertools.product(*varied.values())))
+        return varied, drawn(varied, runs, self.seed, self.method)
 
     def _unit(self, name: str) -> str:
         return self.model.units.get(name, "")

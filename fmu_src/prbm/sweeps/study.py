@@ -239,15 +239,6 @@ def model_of(mechanism: Mechanism | str | Path) -> Model:
     return FmuModel(mechanism)
 
 
-def _check_sources(inputs: Mapping[str, Source]) -> None:
-    for name, source in inputs.items():
-        if callable(source) and not isinstance(source, Signal):
-            raise ParameterError(
-                f"{name}: a function cannot be called by several workers; give a text or arrays, "
-                "or workers=1"
-            )
-
-
 def computed(
     plan: Plan,
     table: str | Path | None,
@@ -280,8 +271,12 @@ def computed(
         Runner(plan.job, plan.columns, journal, len(rows), **limits) as runner,
         journal.opened(overwrite, retry_failed),
     ):
-        if runner.executor is not None:
-            _check_sources(plan.job.inputs)
+        for name, source in plan.job.inputs.items() if runner.executor is not None else ():
+            if callable(source) and not isinstance(source, Signal):
+                raise ParameterError(
+                    f"{name}: a function cannot be called by several workers; give a text or "
+                    "arrays, or workers=1"
+                )
         found = _run(plan, runner, progress or (lambda fraction: None))
         if out is not None:
             text = csv_text(*found.table()).encode
