@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,7 +23,8 @@ from prbm.sweeps import mechanism as simulations
 from prbm.sweeps import runner
 from prbm.sweeps import study as module
 from prbm.sweeps.journal import Journal
-from prbm.sweeps.optimum import FLAT_RTOL, Constraint, Optimum, Search
+from prbm.sweeps.optimum import FLAT_RTOL, Optimum, Search
+from prbm.sweeps.outputs import Constraint
 from prbm.sweeps.study import Study, study
 from support import ROOT
 
@@ -36,12 +38,11 @@ def searched(function, *samples: np.ndarray, sign: float = 1.0, constraints=()) 
         return np.array([np.atleast_1d(function(*point)) for point in x.tolist()])
 
     values = evaluate(points)
-    outputs = ["f", "g", "h"][: values.shape[1]]
-    bounds = np.array([[x[0], x[-1]] for x in samples])
-    sizes = np.array([np.ptp(x) / (len(x) - 1) for x in samples])
-    return Search(
-        evaluate, names, points, outputs, values, bounds, sizes, "f", sign, constraints
-    ).optimum()
+    plan = SimpleNamespace(
+        varied=dict(zip(names, samples, strict=True)), points=points, whole_grid=True,
+        texts=["f", "g", "h"][: values.shape[1]], output="f", sign=sign, constraints=constraints,
+    )  # fmt: skip
+    return Search(plan, values, evaluate).optimum()
 
 
 def test_the_optimum_of_a_parabola_and_its_flat_range_are_exact():

@@ -15,7 +15,8 @@ from scipy import optimize
 
 from ..base.errors import ParameterError
 from ..mechanics.arrays import Real
-from .outputs import RELATIONS
+from .outputs import Constraint
+from .plan import Plan
 
 NEIGHBOURS = 5  # Samples of a range whose worst output is compared with that of other ranges.
 WINDOWS_MIN = 3  # With fewer samples than this many groups of neighbours, one says little.
@@ -34,45 +35,6 @@ STARTS = 3  # Best samples from which a search under constraints begins.
 
 minimize: Any = optimize.minimize  # Their type hints exclude such functions and options.
 minimize_scalar: Any = optimize.minimize_scalar
-Values = Callable[[Real], Real]
-"""Values (m, k) of all outputs at points (m, p); NaN for failed simulations."""
-
-
-@dataclass(frozen=True)
-class Constraint:
-    """A condition on an output.
-
-    Parameters
-    ----------
-    text : str
-        The condition as it was given.
-    output : str
-        The output.
-    relation : str
-        ``>``, ``>=``, ``<`` or ``<=``.
-    bound : float
-        The bound in SI.
-    """
-
-    text: str
-    output: str
-    relation: str
-    bound: float
-
-    def holds(self, values: Real) -> Any:
-        """Return whether values satisfy the condition; NaN does not."""
-        return RELATIONS[self.relation](values, self.bound)
-
-    def excess(self, value: float) -> float:
-        """Return by how much a value satisfies the condition, relative to the bound; >= 0: it does.
-
-        Examples
-        --------
-        >>> Constraint("f > 40 Hz", "f", ">", 40.0).excess(50.0)
-        0.25
-        """
-        sign = 1.0 if self.relation[0] == ">" else -1.0
-        return sign * (value - self.bound) / (abs(self.bound) or 1.0)
 
 
 @dataclass(frozen=True, repr=False)
@@ -177,18 +139,12 @@ class Search:
 
     Parameters
     ----------
+    plan : Plan
+        The study.
+    table : (n, k)
+        Outputs at its points; NaN for failed simulations.
     evaluate : callable
         Simulates at points (m, p) and returns all outputs (m, k).
-    names, outputs : sequence of str
-        The p parameters and k outputs.
-    points, values : (n, p), (n, k)
-        The samples and their outputs; NaN for failed simulations.
-    bounds, sizes : (p, 2), (p,)
-        Least and largest value, and distance of samples, of each parameter.
-    output, sign : str, float
-        The output that is searched, and 1 to minimise or -1 to maximise it.
-    constraints : sequence of Constraint
-        Conditions on outputs.
 
     Raises
     ------
@@ -196,24 +152,21 @@ class Search:
         If no sample has a value of the output and satisfies the constraints.
     """
 
-    def __init__(
-        self,
-        evaluate: Values,
-        names: Sequence[str],
-        points: Real,
-        outputs: Sequence[str],
-        values: Real,
-        bounds: Real,
-        sizes: Real,
-        output: str,
-        sign: float,
-        constraints: Sequence[Constraint] = (),
-    ) -> None:
-        self.evaluate, self.names, self.bounds, self.sizes = evaluate, names, bounds, sizes
-        self.output, self.sign, self.constraints = output, sign, constraints
-        self.index = {name: k for k, name in enumerate(outputs)}
-        self.points, self.found = [*points], [*values]
-        self.costs = [self._cost(row) for row in values]
+    def __init__(self, plan: Plan, table: Real, evaluate: Callable[[Real], Real]) -> None:
+        assert plan.output is not None
+        self.evaluate, self.output, self.sign = evaluate, plan.output, plan.sign
+        self.names, self.constraints, points = [*plan.varied], plan.constraints, plan.points
+        self.index = {name: k for k, name in enumerate(plan.texts)}
+        self.bounds = np.column_stack([points.min(axis=0), points.max(axis=0)])
+        for k, given in enumerate(plan.varied.values()):
+            if isinstance(given, tuple):  # A range from which the points were drawn.
+                self.bounds[k] = given
+        spaces = [len(points) ** (1 / len(self.names))] * len(self.names)
+        if plan.whole_grid:
+            spaces = [len(np.unique(x)) - 1 for x in points.T]
+        self.sizes = np.ptp(points, axis=0) / np.maximum(spaces, 1)  # Distances of samples.
+        self.points, self.found = [*points], [*table]
+        self.costs = [self._cost(row) for row in table]
         self.count = len(self.costs)
 
     def _cost(self, values: Real) -> float:
@@ -226,6 +179,14 @@ class Search:
     def best(self) -> int:
         """Index of the best point."""
         return int(np.argmin(self.costs))
+
+    @property
+    def remedy(self) -> str:
+        """What helps if no sample has a value that satisfies the constraints."""
+        values = np.array(self.found)[: self.count, self.index[self.output]]
+        if self.constraints and np.isfinite(values).any():
+            return "loosen them, or vary the parameters further"
+        return "simulate longer, or choose another output"
 
     def _excess(self, values: Real) -> list[float]:
         """Return by how much outputs satisfy the constraints."""

@@ -178,6 +178,45 @@ class Output:
 RELATIONS: dict[str, Callable[[Real, float], NDArray[np.bool_]]] = {
     ">": np.greater, ">=": np.greater_equal, "<": np.less, "<=": np.less_equal,
 }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """A condition on an output.
+
+    Parameters
+    ----------
+    text : str
+        The condition as it was given.
+    output : str
+        The output.
+    relation : str
+        ``>``, ``>=``, ``<`` or ``<=``.
+    bound : float
+        The bound in SI.
+    """
+
+    text: str
+    output: str
+    relation: str
+    bound: float
+
+    def holds(self, values: Real) -> Any:
+        """Return whether values satisfy the condition; NaN does not."""
+        return RELATIONS[self.relation](values, self.bound)
+
+    def excess(self, value: float) -> float:
+        """Return by how much a value satisfies the condition, relative to the bound; >= 0: it does.
+
+        Examples
+        --------
+        >>> Constraint("f > 40 Hz", "f", ">", 40.0).excess(50.0)
+        0.25
+        """
+        sign = 1.0 if self.relation[0] == ">" else -1.0
+        return sign * (value - self.bound) / (abs(self.bound) or 1.0)
+
+
 _REDUCTION = re.compile(r"(final|max|min|mean|first|since)\((.*)\)", re.DOTALL)
 _STATIC = re.compile(r"(mode)\(\s*([1-9]\d{0,3})\s*\)|(rest)\((.*)\)")
 _ABSOLUTE = re.compile(r"abs\((.*)\)", re.DOTALL)

@@ -19,8 +19,7 @@ from ..runs.inputs import Source, placeholders
 from .design import SENSITIVITY, distribution, drawn
 from .journal import Point
 from .mechanism import MechanismModel
-from .optimum import Constraint
-from .outputs import parse_output
+from .outputs import Constraint, parse_output
 from .table import BITS, check_type, numbers, read_table
 
 if TYPE_CHECKING:

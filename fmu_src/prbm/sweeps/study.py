@@ -27,7 +27,7 @@ from ..runs.signals import Signal
 from .design import SENSITIVITY, Sensitivity, Yield, distribution, drawn, sensitivity, yield_of
 from .journal import Journal, Point
 from .mechanism import MechanismModel
-from .optimum import REFINEMENTS_EXPECTED, Optimum, Search, Values
+from .optimum import REFINEMENTS_EXPECTED, Optimum, Search
 from .outputs import GOOD
 from .plan import Model, Outputs, Plan, Vary
 from .runner import Runner
@@ -279,8 +279,8 @@ def computed(
                 )
         found = _run(plan, runner, progress or (lambda fraction: None))
         if out is not None:
-            text = csv_text(*found.table()).encode
-            write(out, results.parquet(journal, rows) if parquet else text())
+            csv = b"" if parquet else csv_text(*found.table()).encode()
+            write(out, csv or results.parquet(journal, rows))
         journal.remove()
     return found
 
@@ -308,7 +308,8 @@ def _run(plan: Plan, runner: Runner, progress: Progress) -> Study:
         found = {text: sensitivity(names, y, plan.seed) for text, y in outputs.items()}
         indices = {text: one for text, one in found.items() if one is not None}
     if plan.output is not None:
-        best = _optimum(plan, lambda x: values(plan.rows(x))[0], table, messages, runner.journal)
+        search = Search(plan, table, lambda x: values(plan.rows(x))[0])
+        best = _optimum(search, messages, runner.journal)
         if plan.spread:
             share = yield_of(plan.satisfied(values(_around(plan, best))[0]))
     elif plan.constraints and not whole:
@@ -321,36 +322,15 @@ def _run(plan: Plan, runner: Runner, progress: Progress) -> Study:
     )  # fmt: skip
 
 
-def _optimum(
-    plan: Plan, evaluate: Values, table: Real, messages: Sequence[str], journal: Journal
-) -> Optimum:
-    """Search the optimum from the outputs (n, k) of the points and their messages."""
-    assert plan.output is not None
-    points = plan.points
-    bounds = np.column_stack([points.min(axis=0), points.max(axis=0)])
-    for k, given in enumerate(plan.varied.values()):
-        if isinstance(given, tuple):  # A range from which the points were drawn.
-            bounds[k] = given
-    if plan.whole_grid:
-        spaces = [len(np.unique(x)) - 1 for x in points.T]
-    else:
-        spaces = [len(points) ** (1 / len(bounds))] * len(bounds)
-    sizes = np.ptp(points, axis=0) / np.maximum(spaces, 1)
-    search = Search(
-        evaluate, [*plan.varied], points, plan.texts, table, bounds, sizes, plan.output, plan.sign,
-        plan.constraints,
-    )  # fmt: skip
+def _optimum(search: Search, messages: Sequence[str], journal: Journal) -> Optimum:
+    """Search the optimum; an error has a reason or a remedy, and what is in the journal."""
     try:
         return search.optimum()
     except ParameterError as error:
         reasons = sorted({message for message in messages if message})
-        remedy = "simulate longer, or choose another output"
-        if plan.constraints and np.isfinite(table[:, plan.texts.index(plan.output)]).any():
-            remedy = "loosen them, or vary the parameters further"
-        raise ParameterError(
-            f"{error}; {reasons[0] if reasons else remedy}"
-            + f"; {journal.kept}" * bool(journal.kept)
-        ) from None
+        sentence = f"{error}; {reasons[0] if reasons else search.remedy}"
+        kept = journal.kept
+        raise ParameterError(f"{sentence}; {kept}" if kept else sentence) from None
 
 
 def _around(plan: Plan, best: Optimum) -> list[Point]:
