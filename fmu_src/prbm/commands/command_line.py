@@ -445,7 +445,7 @@ def _impact_map(commands: Commands) -> None:
 
 def _sweep(commands: Commands) -> None:
     parser = add_command(
-        commands, "sweep", "sweeps:run_sweep",
+        commands, "sweep", "study:run_sweep",
         "simulate an FMU once for each row of a table: parameter studies, Monte Carlo",
         examples(
             "prbm sweep dist/fmi2/PRBDM2R.fmu table.csv --output stop.impact_count \\\n"

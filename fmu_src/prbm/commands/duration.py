@@ -2,6 +2,7 @@
 
 import argparse
 from collections.abc import Mapping
+from typing import Any
 
 from ..files.settings import optional_quantity, pairs, quantity
 from ..mechanism.description import Mechanism
@@ -60,7 +61,7 @@ def given_inputs(options: argparse.Namespace) -> dict[str, str]:
     return pairs(options.input, "--input", '--input "force.x=step(1 N, 10 ms)"')
 
 
-def times(options: argparse.Namespace) -> dict[str, float | None]:
+def times(options: argparse.Namespace) -> dict[str, Any]:
     """Return stop time and step [s] and tolerance of a command; None for those not given."""
     return {
         "stop_time": optional_quantity(options.stop_time, "s", "--stop-time"),

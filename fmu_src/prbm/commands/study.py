@@ -1,4 +1,4 @@
-"""``prbm study``: simulations over parameters, their optimum, yield and sensitivities."""
+"""``prbm study`` and ``prbm sweep``: simulations of a mechanism or an FMU over parameters."""
 
 import argparse
 import math
@@ -67,10 +67,8 @@ def run_study(options: argparse.Namespace) -> None:
     record = Record(options.out, run, path if mechanism is None else file_of(path))
     arguments = _arguments(options, model)
     found = study(
-        mechanism or path, **arguments, workers=options.workers, executor=options.scheduler,
-        timeout=optional_quantity(options.timeout, "s", "--timeout"),
+        mechanism or path, **arguments, **_limits(options), executor=options.scheduler,
         table=None if options.out is None else options.out / table,
-        overwrite=options.overwrite, progress=reporter(),
     )  # fmt: skip
     _print_simulations(options, found)
     if options.method == SENSITIVITY:
@@ -96,6 +94,28 @@ def run_study(options: argparse.Namespace) -> None:
     output.write()
     for sentence in record.notes():
         print(sentence)
+
+
+def run_sweep(options: argparse.Namespace) -> None:
+    """Run a sweep and print a summary; results are written during the sweep."""
+    from ..sweeps.sweep import summary, sweep  # imported here: an extra
+
+    values = assigned(model_of(options.fmu).units, options.set) if options.set else {}
+    found = sweep(
+        options.fmu, options.table, options.out, outputs=options.output, values=values,
+        inputs=given_inputs(options), **times(options), **_limits(options),
+        scheduler=options.scheduler, retries=options.retries, retry_failed=options.retry_failed,
+    )  # fmt: skip
+    print(summary(found, options.out))
+
+
+def _limits(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the arguments of a study that its results do not depend on."""
+    timeout = optional_quantity(options.timeout, "s", "--timeout")
+    return {
+        "workers": options.workers, "timeout": timeout, "overwrite": options.overwrite,
+        "progress": reporter(),
+    }  # fmt: skip
 
 
 def _arguments(options: argparse.Namespace, model: Model) -> dict[str, Any]:
