@@ -79,7 +79,6 @@ class FmuModel:
             for v in self.variables.values()
             if v.type not in FLOATS or v.shape
         }
-
         others = {name for name, kind in self.types.items() if kind not in BITS}
         numeric = {name: v for name, v in self.variables.items() if name not in others}
         self.outputs = [name for name, v in numeric.items() if v.causality == "output"]

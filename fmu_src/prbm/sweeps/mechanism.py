@@ -24,7 +24,6 @@ from ..mechanism.parameters import Tolerance
 from ..runs.engine import PYTHON, check_engine, kernel_available
 from ..runs.experiment import experiment
 from ..runs.inputs import Source, filled, signals
-from ..runs.result import names as column_names
 from ..runs.run import communication_points, sampled, simulate
 from .children import Job, Row, Task
 from .outputs import FAILED, OK, Outcome, evaluate, parse_output
@@ -35,9 +34,9 @@ STEPS = 4000  # Communication steps of a simulation, which resolve the vibration
 class MechanismModel:
     """A mechanism, a :class:`prbm.sweeps.plan.Model`."""
 
-    owner, static = "the mechanism", True
+    owner, static = "the mechanism", True  # For messages; whether it has positions at rest.
     outputs: tuple[str, ...] = ()
-    types: Mapping[str, str] = {}
+    types: Mapping[str, str] = {}  # Of variables that are no floating-point numbers.
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism, self.name, self.title = mechanism, mechanism.name, mechanism.title
@@ -179,20 +178,15 @@ class MechanismJob(Job):
 
     def _motion(self, given: Mapping[str, float], inputs: Mapping[str, Source]) -> tuple[Any, Any]:
         """Return the columns that the outputs need, and the impacts."""
-        options: Any = {"tolerance": self.tolerance, "engine": self.engine}
+        options: Any = {
+            "stop_time": self.stop, "step": self.step, "tolerance": self.tolerance,
+            "engine": self.engine,
+        }  # fmt: skip
         if inputs:
-            result = simulate(
-                self.mechanism, given, inputs=inputs, stop_time=self.stop, step=self.step,
-                **options,
-            )  # fmt: skip
-            return {
-                name: result.columns[name] for name in column_names(result.columns)
-            }, result.impacts
+            result = simulate(self.mechanism, given, inputs=inputs, **options)
+            return result.columns, result.impacts
         needed = {name for o in self.outputs if not o.static for name in o.variables(self.names)}
-        history = any(output.history for output in self.outputs)
-        step = self.step if history else self.stop
+        if not any(output.history for output in self.outputs):
+            options["step"] = self.stop
         at_impacts = any(output.at_impacts for output in self.outputs)
-        return sampled(
-            self.mechanism, given, sorted(needed), stop_time=self.stop, step=step,
-            at_impacts=at_impacts, **options,
-        )  # fmt: skip
+        return sampled(self.mechanism, given, sorted(needed), at_impacts=at_impacts, **options)
