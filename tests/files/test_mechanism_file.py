@@ -28,8 +28,8 @@ from prbm.files.schema import MechanismTable
 from prbm.files.toml_lines import line_of, lines
 from prbm.interface.units import UNITS
 from prbm.mechanism.description import Mechanism
+from prbm.mechanism.fields import FIELDS
 from prbm.mechanism.parts import (
-    FIELDS,
     Body,
     FlexureType,
     Force,

@@ -21,14 +21,13 @@ from prbm.mechanics.independent import independent
 from prbm.mechanics.inputs import input_names
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.expressions import affine
+from prbm.mechanism.fields import FIELDS, fields_of
 from prbm.mechanism.parts import (
-    FIELDS,
     POSITIONS,
     VELOCITIES,
     FlexureType,
     body_of,
     field_of,
-    fields_of,
     value,
 )
 from support import SHIPPED

@@ -13,6 +13,7 @@ from prbm.interface.units import UNITS
 from prbm.mechanism import parts
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.expressions import Affine, affine
+from prbm.mechanism.fields import FIELDS, fields_of
 from prbm.mechanism.parameters import Parameter
 
 STRENGTHS = ("yield_strength", "tensile_strength", "fatigue_strength")
@@ -31,9 +32,9 @@ def unbounded(monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(Parameter, "__post_init__", freed)
         patch.setattr(parts, "LENGTH_MIN", 0.0)
-        for kind, metas in parts.FIELDS.items():
+        for kind, metas in FIELDS.items():
             free = {n: m._replace(minimum=-math.inf, maximum=math.inf) for n, m in metas.items()}
-            patch.setitem(parts.FIELDS, kind, free)
+            patch.setitem(FIELDS, kind, free)
         yield
 
 
@@ -60,7 +61,7 @@ class Units:
     def _part(self, part, known: dict[str, str]):
         """Return a part of a mechanism in the new units."""
         changed = {}
-        for name, (unit, *_) in parts.fields_of(part).items() if type(part) in parts.FIELDS else ():
+        for name, (unit, *_) in fields_of(part).items() if type(part) in FIELDS else ():
             if getattr(part, name) is not None:
                 changed[name] = self._expression(getattr(part, name), unit, known)
         if isinstance(part, parts.Stop) and part.stiffness is not None:

@@ -14,8 +14,8 @@ import numpy as np
 
 from ..base.errors import MechanismError
 from ..mechanism.expressions import Affine, affine
+from ..mechanism.fields import FIELDS
 from ..mechanism.parts import (
-    FIELDS,
     GROUND,
     POSITIONS,
     VELOCITIES,

@@ -23,6 +23,7 @@ from ..hybrid.rest_speed import with_rest_speeds
 from ..mechanism import parameters, parts
 from ..mechanism.description import RESERVED, Mechanism
 from ..mechanism.expressions import Quantity
+from ..mechanism.fields import FIELDS
 from ..mechanism.flexure import (
     CLAMP,
     HINGE_ORDER_DEFAULT,
@@ -34,7 +35,7 @@ from ..mechanism.flexure import (
     ORDER_MAX,
 )
 from ..mechanism.parameters import Tolerance
-from ..mechanism.parts import FIELDS, LENGTH_MAX, LENGTH_MIN
+from ..mechanism.parts import LENGTH_MAX, LENGTH_MIN
 from .attachments import (
     ForceTable,
     FrictionTable,

@@ -20,9 +20,10 @@ from pydantic_core import CoreSchema, core_schema
 
 from ..base.errors import MechanismError
 from ..mechanism.expressions import Quantity
+from ..mechanism.fields import FIELDS
 from ..mechanism.flexure import ENDS, MODELS, PROFILES
 from ..mechanism.parameters import NAME
-from ..mechanism.parts import FIELDS, LAWS
+from ..mechanism.parts import LAWS
 from .images import Line
 from .units import number, quantity
 

@@ -18,9 +18,9 @@ from ..mechanics.inputs import input_names
 from ..mechanics.stress import stressed
 from ..mechanism.description import Mechanism
 from ..mechanism.expressions import Affine, Quantity, affine
+from ..mechanism.fields import FIELDS, fields_of
 from ..mechanism.flexure import ENDS, PROFILES
 from ..mechanism.parts import (
-    FIELDS,
     GROUND,
     POSITIONS,
     VELOCITIES,
@@ -36,7 +36,6 @@ from ..mechanism.parts import (
     Spring,
     body_of,
     field_of,
-    fields_of,
 )
 from .native import counter_of, state_derivatives
 from .variables import (

@@ -14,7 +14,8 @@ import numpy as np
 from ..base.errors import EquilibriumError, ParameterError, SimulationError
 from ..base.tolerances import START_DEPENDENT_RTOL, START_RTOL
 from ..mechanism.description import Mechanism
-from ..mechanism.parts import FIELDS, VELOCITIES, Body, value
+from ..mechanism.fields import FIELDS
+from ..mechanism.parts import VELOCITIES, Body, value
 from . import constraints
 from .arrays import Complex, Real
 from .places import BodyFrame

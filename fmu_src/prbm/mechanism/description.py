@@ -20,6 +20,7 @@ from ..base.errors import MechanismError, ParameterError
 from ..base.names import proposal, unknown
 from ..base.tolerances import TOLERANCE_MAX, TOLERANCE_MIN, TOLERANCE_USED_MAX
 from .expressions import Quantity, affine
+from .fields import fields_of
 from .flexure import (
     BEAM,
     CHAIN,
@@ -65,7 +66,6 @@ from .parts import (
     Stop,
     body_of,
     field_of,
-    fields_of,
 )
 
 DIMENSIONS = {
