@@ -45,7 +45,7 @@ from .arguments import (
     study_arguments,
     sweep_arguments,
 )
-from .build_arguments import DETAILS, SUMMARY, build_arguments
+from .build_arguments import build_commands
 from .drawing_arguments import drawing_commands
 from .measure_arguments import measure_arguments
 from .program import (
@@ -105,9 +105,7 @@ def parser() -> argparse.ArgumentParser:
     _picture(commands)
     _animate(commands)
     _explore(commands)
-    _build(commands)
-    _modelica(commands)
-    _ssp(commands)
+    build_commands(commands)
     _validate(commands)
     _completion(commands)
     return p
@@ -513,63 +511,6 @@ def _explore(commands: Commands) -> None:
     )
     set_argument(parser, "value of a parameter or input")
     parameters_argument(parser)
-
-
-def _build(commands: Commands) -> None:
-    parser = add_command(
-        commands, "build", "building:run_build", SUMMARY,
-        examples(
-            "prbm build PRBDM2R",
-            "prbm build my_mechanism.toml --flavour native --platform all",
-        ),
-        details=DETAILS,
-    )  # fmt: skip
-    build_arguments(parser)
-
-
-def _modelica(commands: Commands) -> None:
-    parser = add_command(
-        commands, "modelica", "modelica:write_wrapper",
-        "write a Modelica package around the FMU of a mechanism: signals, and forces as flanges",
-        examples("prbm modelica PRBDM", "prbm modelica PRBDM --names underscore --out Guide.mo"),
-        details="Import the FMU in the Modelica tool first: the package contains that block.",
-    )  # fmt: skip
-    mechanism_argument(parser)
-    add = parser.add_argument
-    add(
-        "--names", default="structured", choices=("structured", "underscore"),
-        help="names of variables in the imported block: force.x, or force_x as in OpenModelica "
-        "(default: %(default)s)",
-    )  # fmt: skip
-    add(
-        "--fmu", metavar="CLASS",
-        help="name of the imported block (default: MECHANISM_fmu, with --names underscore "
-        "MECHANISM_me_FMU)",
-    )  # fmt: skip
-    add("--out", type=Path, metavar="FILE.mo", help="file to write (default: MECHANISMWrapper.mo)")
-    set_argument(parser, "start value of a parameter or input")
-    parameters_argument(parser)
-
-
-def _ssp(commands: Commands) -> None:
-    parser = add_command(
-        commands, "ssp", "packages:run_package",
-        "simulate the coupled FMUs of a package (SSP 1.0)",
-        examples("prbm ssp system.ssp", "prbm ssp system.ssp --stop-time 1s --out results"),
-        details="The start values are those of the package. What the package contains and is not "
-        "supported ends the command with a message.",
-    )  # fmt: skip
-    add = parser.add_argument
-    add("package", type=Path, metavar="FILE.ssp", help="the package")
-    add(
-        "--stop-time", metavar="T",
-        help="duration of the simulation [s] (default: that of the package)",
-    )  # fmt: skip
-    add(
-        "--step", metavar="T",
-        help="communication step [s] (default: a thousandth of the duration)",
-    )  # fmt: skip
-    out_argument(parser)
 
 
 def _validate(commands: Commands) -> None:
