@@ -13,7 +13,7 @@ from ..base.progress import reporter
 from ..base.unit_text import length_unit
 from ..files.mechanism_file import load, read_mechanism, shipped
 from ..files.settings import UserMistake, optional_quantity, settings
-from ..interface.variables import extent
+from ..interface.scales import extent
 from ..mechanics.assembly import assemble
 from ..mechanics.stress import with_stress
 from ..mechanism.description import Mechanism

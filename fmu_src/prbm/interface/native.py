@@ -6,18 +6,16 @@ from dataclasses import dataclass, replace
 from ..hybrid.configuration import Magnitudes
 from ..mechanics.assembly import assemble
 from ..mechanism.description import Mechanism
+from .scales import Scales, nearest_power_of_ten, scales
 from .variables import (
     CLOCK,
     INDICATORS,
     STORED,
     TIME,
     Number,
-    Scales,
     Variable,
     check_names,
     compliant_states,
-    nearest_power_of_ten,
-    scales,
 )
 
 DERIVATIVES = {
