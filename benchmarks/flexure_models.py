@@ -202,6 +202,28 @@ def table(head: Sequence[str], rows: Sequence[tuple[str, Sequence[Cell]]], form:
     return "\n".join(lines)
 
 
+def coefficient_table() -> str:
+    """Return the table of the published coefficients."""
+    lines = [
+        "| model | gamma | K_theta | rate of a spring | mass | source |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name in PUBLISHED:
+        model = flexure.MODELS[name]
+        gamma, K_theta = (
+            ", ".join(f"{c.value:g}" for c in x) for x in (model.gamma, model.K_theta)
+        )
+        several = "_i" if len(model.gamma) > 1 else ""
+        rate = f"K_theta{several} EI/h"
+        if model.rate_with_gamma:
+            rate = f"gamma{several} {rate}"
+        mass = "slender rods"
+        if model.lumped:
+            mass = "at the pivots, with an equivalent kinetic energy"
+        lines.append(f"| {name} | {gamma} | {K_theta} | {rate} | {mass} | {model.source} |")
+    return "\n".join(lines)
+
+
 def force_table() -> str:
     """Return the table of errors of the tip position under an end force [%]."""
     systems = [cantilever(model) for model in MODELS]
@@ -372,6 +394,7 @@ def stress_table() -> str:
 
 
 TABLES: dict[str, Callable[[], str]] = {
+    "coefficients": coefficient_table,
     "beams": beam_table,
     "end force": force_table,
     "end moment": moment_table,

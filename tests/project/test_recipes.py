@@ -67,6 +67,7 @@ def test_a_flexure_model_is_added_by_its_recipe(tmp_path):
         run(root, command)
     page = (root / "docs" / "flexure-models.md").read_text(encoding="utf-8")
     assert "| P L²/EI | 1R | 2R | 3R | 4R | beam |" in page
+    assert "| 4R | 0.24, 0.24, 0.24, 0.24 | 4, 4, 4, 4 |" in page
     assert "`4R`" in (root / "docs" / "mechanism-files.md").read_text(encoding="utf-8")
     limits = root / "tests" / "mechanism" / "test_flexure_models.py"
     with pytest.raises(AssertionError, match="test_every_model_has_limits_of_its_errors"):
