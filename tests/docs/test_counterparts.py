@@ -9,8 +9,8 @@ counterparts = SimpleNamespace(**runpy.run_path(str(ROOT / "docs" / "write_count
 
 
 def test_the_page_is_up_to_date():
-    """``python docs/write_counterparts.py`` writes it."""
-    assert counterparts.PAGE.read_text(encoding="utf-8") == counterparts.page()
+    written = counterparts.PAGE.read_text(encoding="utf-8")
+    assert written == counterparts.page(), "run python docs/write_counterparts.py"
 
 
 def test_every_module_has_a_c_file_or_a_reason():
