@@ -205,6 +205,7 @@ GUIDES = {  # Rest position [mm], f1, f2, f3 at rest, f1 straight [Hz]; by indep
 
 
 def test_every_model_has_limits_of_its_errors():
+    """The recipe for a flexure model in CONTRIBUTING.md says where the numbers come from."""
     every = set(models.MODELS)
     assert set(FORCE_ERRORS) == set(FREQUENCY_ERRORS) == every
     assert set(GUIDES) >= set(models.PUBLISHED)
