@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from kernel_simulation import KernelMistake, KernelSimulation
+from many_parts import cantilever
 from prbm.base.errors import EquilibriumError, MechanismError, ParameterError, PrbmError
 from prbm.files.mechanism_file import read_mechanism
 from prbm.fmu.slave.resolved import mechanism_from, resolved
@@ -183,6 +184,22 @@ def test_a_body_that_flies_freely_does_not_change_whether_a_point_can_be_displac
     assert simulation(model).outputs()["wheel.angle"] == pytest.approx(0.02, rel=0.05)
     with pytest.raises((PrbmError, KernelMistake), match="turns the body wheel about its"):
         simulation(model, {"eccentricity": 1e-4})
+
+
+@pytest.mark.parametrize("simulation", [Simulation, KernelSimulation])
+def test_a_mode_with_the_frequency_of_another_one_has_no_shape_of_its_own(simulation):
+    """Two equal pendulums have each frequency twice."""
+    release = Release("tip", 90.0, mode=1, amplitude=1e-3)
+    one = replace(cantilever(damping_beta=0.0), release=release)
+    assert simulation(one).outputs()["tip.y"] != 0.0
+    tip, leaf = one.bodies[0], one.flexures[0]
+    two = replace(
+        one,
+        bodies=(tip, replace(tip, name="other")),
+        flexures=(leaf, replace(leaf, name="leaf2", end="other.end")),
+    )
+    with pytest.raises((PrbmError, KernelMistake), match="another mode has the same frequency"):
+        simulation(two)
 
 
 def test_a_shape_on_the_way_to_the_release_need_not_exist(monkeypatch):

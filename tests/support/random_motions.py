@@ -366,6 +366,7 @@ def starts_elsewhere(nominal: Nominals, one: Motion, other: Motion, names: Itera
     slack mechanism has many held shapes.
     """
     begins = (Motion(samples=motion.samples[:1]) for motion in (one, other))
+    names = [*names, "mode.frequency"]
     return not other.samples or bool(output_difference(nominal, *begins, GROWN * 0.1, names))
 
 

@@ -44,6 +44,7 @@ STATICS_CONSTRAINT_RTOL = 1e-13  # Of the size: residual of closed loops at an e
 STIFFNESS_ROUNDING_RTOL = 1e-12  # Of the largest stiffness of a balance: less is round-off.
 STATICS_FORCE_RTOL = 1e-12  # Of the stiffest spring at one radian: residual torque.
 STATICS_ROUNDING_RTOL = 1e-13  # Of the torques that are added: residual torque of round-off.
+REPEATED_MODE_RTOL = 1e-11  # Of the largest square of a frequency: less between two is round-off.
 STATICS_STEP_ATOL = 1e-8  # rad; Newton step that ends the iteration: the error is its square.
 RIGID_RTOL = 1e-12  # Of the largest compliance of a body: a smaller one is round-off.
 START_RTOL = 1e-6  # Of the size, of one radian, of the largest rate: deviation of a start value.

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.errors import EquilibriumError, ParameterError, SimulationError
-from ..base.tolerances import STATICS_CONSTRAINT_RTOL
+from ..base.tolerances import REPEATED_MODE_RTOL, STATICS_CONSTRAINT_RTOL
 from ..mechanism.parts import POSITIONS, value
 from .arrays import Real
 from .constraints import project_positions
@@ -133,7 +133,8 @@ def mode_shape(system: System, mode: int, amplitude: float) -> Real:
     EquilibriumError
         If no rest position, or no shape with the amplitude, is found.
     ParameterError
-        If there is no such mode, or it does not move the released point.
+        If there is no such mode, another one has its frequency, or it does not move the released
+        point.
     """
     rest = equilibrium(system)
     found = modes(system, rest)
@@ -142,6 +143,13 @@ def mode_shape(system: System, mode: int, amplitude: float) -> Real:
         raise ParameterError(
             f"release.mode = {mode}: the mechanism has {count} modes; choose one of them, or a "
             "flexure model with more pivots"
+        )
+    squares = found.frequency * np.abs(found.frequency)
+    apart = np.abs(squares - squares[mode - 1]) > REPEATED_MODE_RTOL * np.abs(squares).max()
+    if count - np.count_nonzero(apart) > 1:
+        raise ParameterError(
+            f"release.mode = {mode}: another mode has the same frequency, so that its shape is "
+            "not unique; choose another mode, or release by a displacement or an angle"
         )
     phi = found.shape[:, mode - 1]
     moved = float(moved_by(system, rest.q, phi[:, None])[0])

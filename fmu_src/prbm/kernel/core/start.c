@@ -29,6 +29,21 @@ static bool displace(const System *system, const double *phi, int k, double move
                           amplitude, k + 1);
 }
 
+/* Whether another mode has the frequency of a mode, from 0: its shape is not unique. */
+static bool repeated(int count, const double *frequency, int mode) {
+    double largest = 0.0;
+    int same = 0;
+    for (int k = 0; k < count; k++) {
+        largest = greater(largest, frequency[k] * frequency[k]);
+    }
+    double square = frequency[mode] * fabs(frequency[mode]);
+    for (int k = 0; k < count; k++) {
+        double difference = frequency[k] * fabs(frequency[k]) - square;
+        same += fabs(difference) <= REPEATED_MODE_RTOL * largest;
+    }
+    return same > 1;
+}
+
 /* Displace the rest shape under gravity along the mode of the release. */
 static bool mode_shape(const System *system, double amplitude, double *q, Scratch scratch,
                        Problem *problem) {
@@ -43,6 +58,12 @@ static bool mode_shape(const System *system, double amplitude, double *q, Scratc
                      "release.mode = %d: the mechanism has %d modes; choose one of them, or a "
                      "flexure model with more pivots",
                      mode, count);
+    }
+    if (found && repeated(count, frequency, mode - 1)) {
+        found = fail(problem,
+                     "release.mode = %d: another mode has the same frequency, so that its shape is "
+                     "not unique; choose another mode, or release by a displacement or an angle",
+                     mode);
     }
     if (found) {
         moved_by(system, q, phi, moved, scratch);
