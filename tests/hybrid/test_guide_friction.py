@@ -162,7 +162,7 @@ RODS = (  # Ends, angles of their lines, coefficients, speed, its direction, pus
 def test_a_sliding_rod_has_the_forces_of_the_only_sides_that_are_possible(
     engine, case, monkeypatch
 ):
-    """Changes of one side at a time do not find them."""
+    """Changes of one side at a time do not find those of the first rod."""
     ends, angles, coefficients, speed, direction, (push, moment) = case
     ways = [cmath.rect(1.0, angle) for angle in angles]
     lines = {f"{name}{k}": z + u * at for k, (z, u) in enumerate(zip(ends, ways, strict=True))
@@ -193,7 +193,7 @@ def test_a_sliding_rod_has_the_forces_of_the_only_sides_that_are_possible(
         found += [N] if np.array_equal(np.sign(N), sides) else []
     assert len(found) == 1
     assert (out["way0.force"], out["way1.force"]) == pytest.approx(found[0], rel=1e-6)
-    if engine == "python":
+    if engine == "python" and case is RODS[0]:
         monkeypatch.setattr(contact_modes, "SIDES_TRIED_MAX", 3)
         with pytest.raises(PrbmError, match="jams"):
             start(model, engine, changes=changes)

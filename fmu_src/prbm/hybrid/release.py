@@ -70,7 +70,7 @@ def released(configuration: Configuration, inputs: Inputs, time: float) -> Front
     equations = configuration.equations(inputs, contacts)
     y = np.concatenate([q, velocity, np.zeros(2 + equations.compliant.size)])
     front = Front(time, y, equations, (Latched(),) * stops, (None,) * stops).projected()
-    front = spring_phases.begun(configuration, front)
+    front = _on_frictionless_sides(spring_phases.begun(configuration, front))
     check_walls(configuration, front)
     gaps, rates = front.gaps_and_rates()
     for i in equations.compliant.stops:
@@ -86,6 +86,20 @@ def released(configuration: Configuration, inputs: Inputs, time: float) -> Front
             break
     rigid = [i for i in range(stops) if i not in equations.compliant.stops]
     return choose_modes(configuration, rephased(front), resting=rigid)
+
+
+def _on_frictionless_sides(front: Front) -> Front:
+    """Return the front with each rough guide on the side to which it would push without friction.
+
+    With a large coefficient of friction several sides may satisfy the laws (Painleve's paradox).
+    A motion begins with the one that the force has while the coefficient grows from zero.
+    """
+    contacts, equations = front.contacts, front.equations
+    guides = [c for c in range(contacts.stops, len(contacts.modes)) if equations.is_guide(c)]
+    lam = front.evaluate().lam if guides else np.zeros(0)
+    for c in guides:
+        contacts = contacts.with_side(c, -1 if lam[equations.normal_row(c)] < 0.0 else 1)
+    return front.with_contacts(contacts)
 
 
 def check_walls(configuration: Configuration, front: Front) -> None:

@@ -111,6 +111,29 @@ static bool check_walls(Simulation *sim, Problem *problem) {
     return preload(sim, problem) && (struck < 0 || impact(sim, struck, problem));
 }
 
+/* Set the side of each rough guide to that to which it pushes without friction.  With a large coefficient
+ * of friction several sides may satisfy the laws (Painleve's paradox); a motion begins with the one that
+ * the force has while the coefficient grows from zero. */
+static bool begin_sides(Simulation *sim, Problem *problem) {
+    const System *system = system_of(sim);
+    const double *y = sim->state.front;
+    if (system->f == sim->configuration.mechanism->friction_count) {
+        return true;
+    }
+    if (!evaluate_equations(&sim->equations, sim->state.front_time, y, y + system->n,
+                            extra_states(sim, y), NULL, &sim->at_front, problem)) {
+        return false;
+    }
+    for (int c = system->s; c < contact_count(sim); c++) {
+        if (is_guide(system, c)) {
+            double force = sim->at_front.lam[normal_row(&sim->equations, c)];
+            sim->state.sides[c - system->s] = force < 0.0 ? -1 : 1;
+        }
+    }
+    set_inputs(sim);
+    return true;
+}
+
 /* Release the mechanism in its start shape, and choose the contact state there. */
 static bool release_mechanism(Simulation *sim, Problem *problem) {
     int rigid[STOPS_MAX], count = 0;
@@ -125,7 +148,7 @@ static bool release_mechanism(Simulation *sim, Problem *problem) {
     set_inputs(sim);
     return start_state(sim, problem) &&
            project(&sim->equations, state->time, state->front, sim->scratch, problem) &&
-           begin_coils(sim) && check_walls(sim, problem) &&
+           begin_coils(sim) && begin_sides(sim, problem) && check_walls(sim, problem) &&
            rephase(sim, problem) && choose_modes(sim, rigid, count, NULL, problem) &&
            find_fastest(sim, problem);
 }
