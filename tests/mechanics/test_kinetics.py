@@ -22,6 +22,17 @@ def rng():
     return np.random.default_rng(3)
 
 
+def test_the_mass_matrix_is_that_of_the_shape_if_other_scales_factor_the_equations(monkeypatch):
+    """The first scales fail: the matrix's own ones factor it."""
+    sim = Simulation(mechanism("PRBDM2R"))
+    y, n, answers = sim.state(), sim.system.n, iter([False, False])
+    monkeypatch.setattr(constraints, "_regular", lambda diagonal: next(answers, True))
+    found = sim.equations.evaluate(0.0, y[:n], y[n : 2 * n])
+    assert not np.array_equal(found.factors.scale, sim.equations.scale)
+    expected = sim.system.mass_matrix(found.e)
+    np.testing.assert_allclose(found.M, expected, rtol=1e-12, atol=1e-12 * expected.max())
+
+
 def test_accelerations_equal_those_of_lagrange_equations(rng):
     """The mechanism is a 2R cantilever with a body on a pin at its tip: three angles, no loop."""
     sim = Simulation(cantilever(damping_beta=0.0))

@@ -37,10 +37,10 @@ class Evaluation(NamedTuple):
     lam : (r,)
         Forces of the loops, then of the stops that hold (> 0 pushes), then of the contacts that
         stick [N].
-    scaled : (n + r, n + r)
-        The matrix of the equations, scaled.
+    scaled, scale : (n, n), (n,)
+        Scaled mass matrix, and its scales.
     factors : Factors
-        Its factors, for :meth:`Equations.project_near`.
+        Factors of the equations, for :meth:`Equations.project_near`.
     e : (d,) complex
         Directions.
     pressure : Pressure or None
@@ -50,6 +50,7 @@ class Evaluation(NamedTuple):
     a: Real
     lam: Real
     scaled: Real
+    scale: Real
     factors: constraints.Factors
     e: Complex
     pressure: Pressure | None = None
@@ -57,8 +58,7 @@ class Evaluation(NamedTuple):
     @property
     def M(self) -> Real:
         """Mass matrix, (n, n) [kg m^2]."""
-        n = len(self.a)
-        return self.scaled[:n, :n] / self.factors.scale[:n] / self.factors.scale[:n, None]
+        return self.scaled / self.scale / self.scale[:, None]
 
 
 class FrictionLaw(NamedTuple):
@@ -250,7 +250,8 @@ class Equations:
             share *= self.contacts.side(c) * self.scale[n + self.normal_row(c)]
             kkt[:n, n + self.normal_row(c)] -= share * self.slip_row(c, e) * self.force_scale
         x, factors = constraints.factor_and_solve(kkt, right, n, system.length, self.scale)
-        return Evaluation(x[:n], -x[n:], kkt, factors, e, pressure)
+        M = kkt[:n, :n]
+        return Evaluation(x[:n], -x[n:], M, self.force_scale, factors, e, pressure)
 
     # -- rates of the state --
 
@@ -265,7 +266,9 @@ class Equations:
         evaluation = self.evaluate(t, q, v, extras)
         loss, power = self.element.loss(evaluation.e, v, self.beta), 0.0
         if self.mass_damping:
-            loss += 2.0 * self.mass_damping * kinetic_energy(evaluation.M, v)
+            loss += (
+                2.0 * self.mass_damping * kinetic_energy(evaluation.scaled, v / evaluation.scale)
+            )
         if self.slipping_points or self.slipping_rows:
             loss += friction_power(self, q, v, evaluation)
         if self.driven or self.moving_walls:
