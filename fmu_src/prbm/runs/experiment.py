@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ..mechanism.description import Mechanism
-from .engine import simulation
+from .engine import Engine, simulation
 
 PERIODS_MAX = 25.0  # Largest number of fundamental periods in one second: 40 steps in each.
 PERIODS = 10.0  # Approximate number of periods if one second has fewer than one or too many.
@@ -54,8 +54,12 @@ def experiment(
     ParameterError, EquilibriumError
         If the mechanism cannot start with these values.
     """
-    scales = simulation(mechanism, values, engine=engine).configuration.scales
-    return Experiment(_duration(1 / scales.time))
+    return experiment_of(simulation(mechanism, values, engine=engine))
+
+
+def experiment_of(motion: Engine) -> Experiment:
+    """Return the default experiment for the parameters of a simulation at its start."""
+    return Experiment(_duration(1 / motion.configuration.scales.time))
 
 
 def _duration(frequency: float) -> float:

@@ -16,7 +16,7 @@ from ..mechanism.description import Mechanism
 from ..mechanism.parameters import by_name
 from .driving import Driver
 from .engine import Engine, simulation
-from .experiment import experiment
+from .experiment import experiment, experiment_of
 from .inputs import Source as InputSource
 from .inputs import check_wall, signals
 from .result import Columns, Result, row_type
@@ -121,14 +121,14 @@ def simulate(
         None if x is None else in_unit(name, x, "s")
         for name, x in (("stop_time", stop_time), ("step", step))
     )
-    if duration is None or spacing is None:
-        default = experiment(mechanism, values, engine)
-        duration = default.stop_time if duration is None else duration
-        spacing = default.step if spacing is None else spacing
-    times = communication_points(duration, spacing)
     if tolerance is not None:
         tolerance = in_unit("tolerance", tolerance, "")
-    motion = _begun(mechanism, values, driver, source, times[-1], spacing, tolerance, engine)
+    motion = simulation(mechanism, values, tolerance=tolerance, engine=engine)
+    default = experiment_of(motion)
+    duration = default.stop_time if duration is None else duration
+    spacing = default.step if spacing is None else spacing
+    times = communication_points(duration, spacing)
+    _check(motion, driver, source, times[-1], spacing, tolerance)
     impacts: list[Impact] = []
     motion.record = impacts
     start = {**motion.values, **motion.given}
@@ -193,7 +193,8 @@ def sampled(
         As :func:`simulate`.
     """
     times = communication_points(stop_time, step)
-    motion = _begun(mechanism, values, Driver({}), None, times[-1], step, tolerance, engine)
+    motion = simulation(mechanism, values, tolerance=tolerance, engine=engine)
+    _check(motion, Driver({}), None, times[-1], step, tolerance)
     constant = {name: x for name, x in {**motion.values, **motion.given}.items() if name in names}
     wanted = [name for name in names if name not in constant and name != "time"]
     impacts: list[Impact] = []
@@ -210,23 +211,19 @@ def sampled(
     return {"time": np.array(times), **columns}, tuple(impacts)
 
 
-def _begun(
-    mechanism: Mechanism,
-    values: Mapping[str, float],
+def _check(
+    motion: Engine,
     driver: Driver,
     source: Source | None,
     end: float,
     spacing: float,
     tolerance: float | None,
-    engine: str | None,
-) -> Engine:
-    """Return a motion at its start, after warnings and checks of its effort and of its walls."""
-    motion = simulation(mechanism, values, tolerance=tolerance, engine=engine)
+) -> None:
+    """Check the effort and the walls of a motion at its start, and warn of what is unstable."""
     _warn(motion, motion.values["solver.tolerance"] if tolerance is None else tolerance)
     _check_effort(motion, spacing)
     _check_walls(motion, driver, source)
     driver.sample(motion.frequency, motion.tolerance, end)
-    return motion
 
 
 def _check_walls(motion: Engine, driver: Driver, source: Source | None) -> None:
