@@ -108,7 +108,8 @@ def _stops(
     places, speeds = system.gap_rows.values(e), system.gap_rows.rates(e, v)
     G, loops = system.gap_rows.jacobian(e), equations.rows.jacobian(e)[: len(system.loops)]
     pressed = equations.stop_forces(evaluation.lam, evaluation.pressure)
-    mobilities = np.diag(G @ contact.response(M, loops, G, system.length))
+    scale = equations.scale[: n + len(loops)]
+    mobilities = np.diag(G @ contact.response(M, loops, G, system.length, scale))
     for i, stop in enumerate(system.mechanism.stops):
         out[f"{stop.name}.gap"] = float(gaps[i])
         out[f"{stop.name}.gap_rate"] = float(rates[i])

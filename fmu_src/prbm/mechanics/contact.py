@@ -50,7 +50,7 @@ WEDGED_SEVERAL = (
 )
 
 
-def response(M: Real, held: Real, rows: Real, length: float) -> Real:
+def response(M: Real, held: Real, rows: Real, length: float, scale: Real | None = None) -> Real:
     """Return the changes of velocity by unit impulses along the rows, (n, k) [rad/s per N s].
 
     Parameters
@@ -63,6 +63,8 @@ def response(M: Real, held: Real, rows: Real, length: float) -> Real:
         Directions of the impulses [m/rad].
     length : float
         Size of the mechanism [m].
+    scale : (n + r,) or None
+        As for :func:`prbm.mechanics.constraints.factor_saddle`; None: the scales of the matrix.
 
     Raises
     ------
@@ -78,7 +80,8 @@ def response(M: Real, held: Real, rows: Real, length: float) -> Real:
     right = np.zeros((n + len(held), k), order="F")
     right[:n] = rows.T
     kkt = constraints.saddle(M, held, held)
-    factors = constraints.factor_saddle(kkt, n, length, constraints.scales(kkt, n, length))
+    known = constraints.scales(kkt, n, length) if scale is None else scale
+    factors = constraints.factor_saddle(kkt, n, length, known)
     return constraints.solve_saddle(factors, right)[:n]
 
 
