@@ -85,7 +85,8 @@ def positioned(system: System, given: Sequence[Given], fraction: float = 1.0) ->
     EquilibriumError
         If no equilibrium has the positions.
     ParameterError
-        If the release gives another shape, or the positions contradict the constraints.
+        If the release gives another shape, the positions contradict the constraints, or the drawn
+        shape is a dead centre of one of them.
     """
     release = system.mechanism.release
     _check_alone(system, release.start, given)
@@ -110,6 +111,8 @@ def positioned(system: System, given: Sequence[Given], fraction: float = 1.0) ->
             f"{done * fraction * first.value + 0.0:.4g} {first.unit}, in proportion; start closer "
             "to the drawn shape, or give the positions of further bodies"
         )
+    if fraction == 1.0:
+        _check_determined(placed, held, [x for x in moved if x not in held], q)
     e = system.directions(q)
     kept = [given[k] for k in _independent(system, e, [_gradient(system, x, e) for x in given])]
     try:  # Bodies were placed beside the lines of their guides.
@@ -201,6 +204,29 @@ def _check_reached(
             f"{one.unit}, which the constraints and the other values at the start allow; change "
             "it to that, or leave it out"
         )
+
+
+def _check_determined(
+    system: System, held: Sequence[Given], others: Sequence[Given], q: Real
+) -> None:
+    """Reject a position that the held ones determine as drawn, but not in their shape q (n,).
+
+    The drawn shape is a dead centre of it.  In the shape, no force holds the position, so that only
+    that of the equilibrium is a start.  A force could push the mechanism to it on several ways.
+    """
+    e = system.directions(q)
+    rows = [system.loop_rows.jacobian(e), *(_gradient(system, x, e)[None] for x in held)]
+    M, kept = system.mass_matrix(e), np.vstack(rows)
+    for one in others:
+        row, size = _gradient(system, one, e), 1.0 if one.turns else system.length
+        found = _reached(system, one, q)
+        freely, left = (_mobility(system, M, rows, row) for rows in (kept[:0], kept))
+        if left > START_DEPENDENT_RTOL * freely and abs(found - one.value) > START_RTOL * size:
+            raise ParameterError(
+                f"{one.text}: in the drawn shape, a dead centre, the other positions determine "
+                f"this position, and the equilibrium with these has {found:.9g} {one.unit}; change "
+                "it to that, or leave it out"
+            )
 
 
 def _frame(system: System, one: Given) -> BodyFrame:

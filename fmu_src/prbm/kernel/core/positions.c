@@ -24,7 +24,7 @@ static Starts given_at_start(const System *system, const double *values, int fir
         for (int field = first; field < first + FIELDS_EACH; field++) {
             if (m->bodies[i].given >> field & 1u) {
                 double value = evaluate(m->bodies[i].at_start[field], values);
-                StartValue x = {&m->bodies[i], &system->bodies[i], field, value, false};
+                StartValue x = {&m->bodies[i], &system->bodies[i], field, value, false, false};
                 result.values[result.count++] = x;
             }
         }
@@ -161,20 +161,61 @@ static bool project_held(const System *system, const Starts *given, int r, doubl
                           x->body->name, start_name(x), x->value, start_unit(x), x->body->name);
 }
 
+/* Return the rotation [rad] or the displacement [m] of a body in a shape. */
+static double position_reached(const System *system, const StartValue *x, const double *q,
+                               const Complex *e, Scratch scratch) {
+    Complex *B = take_complex(&scratch, 1, system->d);
+    double c = start_row(system, x, 0.0, B);
+    Rows one = plain_rows(system, 1, B, NULL);
+    return rotates(x) ? q[x->frame->j] - system->q0[x->frame->j] : row_value(&one, 0, e) + c;
+}
+
 /* Reject positions that a shape does not have. */
 static bool positions_reached(const System *system, const Starts *given, const double *q,
                               Scratch scratch, Problem *problem) {
-    Complex *e = take_complex(&scratch, 1, system->d), *B = take_complex(&scratch, 1, system->d);
+    Complex *e = take_complex(&scratch, 1, system->d);
     double *reached = take(&scratch, (size_t)given->count);
     directions(system, q, e);
     for (int k = 0; k < given->count; k++) {
-        const StartValue *x = &given->values[k];
-        double c = start_row(system, x, 0.0, B);
-        Rows one = plain_rows(system, 1, B, NULL);
-        reached[k] = rotates(x) ? q[x->frame->j] - system->q0[x->frame->j]
-                                : row_value(&one, 0, e) + c;
+        reached[k] = position_reached(system, &given->values[k], q, e, scratch);
     }
     return reached_all(system, given, reached, 1.0, problem);
+}
+
+/* Reject a position that the held ones determine as drawn, but not in their shape q (n,). */
+static bool determined(const System *system, const Starts *given, const double *q, Scratch scratch,
+                      Problem *problem) {
+    int n = system->n, r = system->r;
+    Complex *e = take_complex(&scratch, 1, system->d);
+    double *M = take_matrix(&scratch, n, n), *rows = take_matrix(&scratch, r + given->count, n);
+    double *row = take(&scratch, (size_t)n);
+    Rows loops = loop_rows(system);
+    directions(system, q, e);
+    mass_matrix(system, e, M, scratch);
+    jacobian(&loops, e, rows);
+    for (int k = 0; k < given->count; k++) {
+        if (given->values[k].held) {
+            start_gradient(system, &given->values[k], e, rows + n * r++, scratch);
+        }
+    }
+    for (int k = 0; k < given->count; k++) {
+        const StartValue *x = &given->values[k];
+        double found = position_reached(system, x, q, e, scratch);
+        double missing = fabs(found - x->value) / (rotates(x) ? 1.0 : system->length);
+        if (x->placed || x->held || missing <= START_RTOL) {
+            continue;
+        }
+        start_gradient(system, x, e, row, scratch);
+        double freely = mobility_along(system, 0, M, rows, row, scratch);
+        if (mobility_along(system, r, M, rows, row, scratch) > START_DEPENDENT_RTOL * freely) {
+            return fail(problem,
+                        "%s.%s = %g %s: in the drawn shape, a dead centre, the other positions "
+                        "determine this position, and the equilibrium with these has %.9g %s; change "
+                        "it to that, or leave it out",
+                        x->body->name, start_name(x), x->value, start_unit(x), found, start_unit(x));
+        }
+    }
+    return true;
 }
 
 PRBM bool positioned(const System *system, const double *values, double *q, Scratch scratch,
@@ -186,17 +227,18 @@ PRBM bool positioned(const System *system, const double *values, double *q, Scra
     double *rows = take_matrix(&scratch, system->r + given.count, system->n);
     Complex *e = take_complex(&scratch, 1, system->d);
     for (int k = 0; k < given.count; k++) {
-        bool free = false;
+        StartValue *x = &given.values[k];
         for (int i = 0; i < placed.placed_count; i++) {
-            free = free || placed.placed[i] == given.values[k].frame->j;
+            x->placed = x->placed || placed.placed[i] == x->frame->j;
         }
-        given.values[k].held = !free;
+        x->held = !x->placed;
     }
     choose_independent(&placed, system->e0, &given, rows, scratch);
     const char *unit_name = release->start == START_ANGLE ? "rad" : "m";
     bool found = alone(names[release->start], unit_name, evaluate(release->amount, values),
                        given.values, problem) &&
-                 held_at_start(&placed, given.values, given.count, q, scratch, problem);
+                 held_at_start(&placed, given.values, given.count, q, scratch, problem) &&
+                 determined(&placed, &given, q, scratch, problem);
     if (found) {
         for (int k = 0; k < given.count; k++) {
             given.values[k].held = true;

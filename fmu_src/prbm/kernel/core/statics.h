@@ -15,6 +15,7 @@ typedef struct {
     const BodyFrame *frame;
     int field; /* GIVEN_... */
     double value;
+    bool placed; /* Whether the body is placed, not held. */
     bool held; /* Whether a row holds it; otherwise the body is placed, or it follows from others. */
 } StartValue;
 
