@@ -366,21 +366,22 @@ def reversal_time(view: StepView, guard: Guard, contact: int) -> float | None:
     """Return when the sliding velocity of a contact falls through zero.
 
     When slip begins, and while contacts that stick hold this one, the velocity is round-off of
-    either sign.  Then it counts only if it exceeds what an acceleration of round-off adds within
-    the step: as soon as it is no round-off, or else after the first interval.
+    either sign.  Then it counts only if it exceeds that at the start and what an acceleration of
+    round-off adds within the step: as soon as it is no round-off, or else after the first interval.
     """
     equations, (times, e, v, _) = view.equations, view.samples
     rows, i = equations.slip_rows(contact)
     speeds = equations.contacts.modes[contact].slip * rows.rates(e, v)[:, i]
-    begins = bool(speeds[0] <= view.scales.zero_speed)
-    noise = view.scales.zero_acceleration * view.arc.h if begins else 0.0
+    zero = view.scales.zero_speed
+    begins = bool(speeds[0] <= zero)
+    residual = min(abs(float(speeds[0])), zero)  # Until the end of the step is projected.
+    noise = residual + view.scales.zero_acceleration * view.arc.h if begins else 0.0
     z = view.along(guard, contact)
     for j in range(int(begins), GUARD_INTERVALS):
         if speeds[j] > noise and speeds[j + 1] <= 0.0:
             return fall_time(z, times[j], times[j + 1], view.event_time)
     if not begins or speeds[-1] >= -noise:
         return None
-    zero = view.scales.zero_speed
     if speeds[0] < -zero:
         return float(times[1])
     return fall_time(lambda t: z(t) + 2.0 * zero, times[0], times[1], view.event_time)

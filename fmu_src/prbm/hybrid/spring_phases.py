@@ -25,14 +25,25 @@ from .guards import Guard, StepView, closing_time, fall_time, slackness, strain,
 def force(equations: Equations, spring: int, t: float, y: Real) -> tuple[float, float]:
     """Return the force s (T + c l') with which a spring would act, and its round-off [N].
 
-    The second value is a fraction of the sum of both parts.
+    The second value is a fraction of the sum of both parts, and the force by the round-off of the
+    length and of its rate.  The length of a spring on parts that cannot move against each other is
+    only round-off.
     """
     springs, k = equations.elements.springs, spring - len(equations.contacts.modes)
     assert springs is not None
     law = springs.laws[k]
     elastic = spring_tension(law._replace(side=0), strain(equations, spring, t, y))
     damper = law.damping * strain_rate(equations, spring, t, y)
-    return elastic + damper, PHASE_RTOL * (abs(elastic) + abs(damper))
+    near, slow = resolution(equations, y)
+    least = law.stiffness * near + law.damping * slow
+    return elastic + damper, PHASE_RTOL * (abs(elastic) + abs(damper)) + least
+
+
+def resolution(equations: Equations, y: Real) -> tuple[float, float]:
+    """Return the round-off of the length of a spring [m], and that of its rate [m/s]."""
+    n, size = equations.n, equations.system.length
+    fastest = float(np.abs(y[n : 2 * n]).max(initial=0.0))
+    return CONSTRAINT_RTOL * size, ZERO_SPEED_RTOL * size * fastest
 
 
 def pull(equations: Equations, spring: int, t: float, y: Real) -> float:
@@ -129,9 +140,7 @@ def begun(configuration: Configuration, front: Front) -> Front:
         return front
     acting = replace(front.contacts, springs=(SpringPhase.ACTING,) * len(springs.laws))
     front = front.with_contacts(acting)
-    size, n = configuration.scales.length, front.equations.n
-    near = CONSTRAINT_RTOL * size
-    slow = ZERO_SPEED_RTOL * size * float(np.abs(front.y[n : 2 * n]).max(initial=0.0))
+    near, slow = resolution(front.equations, front.y)
     for k, law in enumerate(springs.laws):
         at = (front.equations, len(acting.modes) + k, front.time, front.y)
         x = strain(*at)

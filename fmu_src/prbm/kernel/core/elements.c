@@ -157,12 +157,26 @@ PRBM double strain_rate_of(const System *system, int k, const Complex *e, const 
     return system->laws[k].side * length_rate(system, k, &now, e, v);
 }
 
+PRBM double coil_near(const System *system) {
+    return CONSTRAINT_RTOL * system->length;
+}
+
+PRBM double coil_slow(const System *system, const double *v) {
+    double fastest = 0.0;
+    for (int i = 0; i < system->n; i++) {
+        fastest = greater(fastest, fabs(v[i]));
+    }
+    return ZERO_SPEED_RTOL * system->length * fastest;
+}
+
 PRBM CoilPull coil_pull(const System *system, int k, const Complex *e, const double *v) {
     const SpringLaw *law = &system->laws[k];
     SpringState now = spring_state(system, k, e, 1.0);
     double elastic = coil_elastic(law, &now, COIL_ACTING);
     double damper = law->damping * length_rate(system, k, &now, e, v);
-    CoilPull result = {law->side * (elastic + damper), PHASE_RTOL * (fabs(elastic) + fabs(damper))};
+    double least = law->stiffness * coil_near(system) + law->damping * coil_slow(system, v);
+    CoilPull result = {law->side * (elastic + damper),
+                       PHASE_RTOL * (fabs(elastic) + fabs(damper)) + least};
     return result;
 }
 

@@ -40,6 +40,9 @@ PRBM double length_rate(const System *system, int k, const SpringState *now, con
 /* Return the elongation of spring k to the side on which it acts, its rate, and its force. */
 PRBM double strain_of(const System *system, int k, const Complex *e);
 PRBM double strain_rate_of(const System *system, int k, const Complex *e, const double *v);
+/* Return the round-off of the length of a spring [m], and that of its rate [m/s]. */
+PRBM double coil_near(const System *system);
+PRBM double coil_slow(const System *system, const double *v);
 PRBM CoilPull coil_pull(const System *system, int k, const Complex *e, const double *v);
 /* Return the phase of spring k.  phases (coils,): of all springs, if one acts on one side. */
 PRBM SpringPhase coil_phase(const System *system, const SpringPhase *phases, int k);

@@ -519,8 +519,8 @@ PRBM bool closing_time(Simulation *sim, const Guard *guard, int stop, Fall *fall
 }
 
 /* Find the first time within the step at which a guard falls to zero, from its values at the
- * samples.  If it begins at most at zero_level, only a fall from above the noise that an acceleration
- * of round-off adds within the step counts, or a value below it at the end. */
+ * samples.  If it begins at most at zero_level, only a fall from above the noise counts, or a value
+ * below it at the end: that of the start, and what an acceleration of round-off adds in the step. */
 static bool fall_in_samples(Simulation *sim, const Guard *guard, int contact, double zero_level,
                             double acceleration, Fall *fall, Problem *problem) {
     Search search = {sim, guard, contact, false, problem};
@@ -531,7 +531,8 @@ static bool fall_in_samples(Simulation *sim, const Guard *guard, int contact, do
         z[k] = guard->value(&sim->equations, &at, contact);
     }
     bool begins = z[0] <= zero_level;
-    double noise = begins ? acceleration * sim->state.arc.h : 0.0;
+    double residual = lesser(fabs(z[0]), zero_level); /* Until the end of the step is projected. */
+    double noise = begins ? residual + acceleration * sim->state.arc.h : 0.0;
     for (int k = begins; !fall->found && k < GUARD_INTERVALS; k++) {
         if (z[k] > noise && z[k + 1] <= 0.0) {
             fall->found = true;
@@ -558,8 +559,8 @@ PRBM bool sampled_time(Simulation *sim, const Guard *guard, int contact, Fall *f
 
 /* Find the time at which a sliding velocity changes its sign.  When sliding begins, and while
  * contacts that stick hold this one, the velocity is round-off of either sign.  Then it counts only
- * if it exceeds what an acceleration of round-off adds within the step: as soon as it is no round-off,
- * or else after the first interval. */
+ * if it exceeds that at the start and what an acceleration of round-off adds within the step: as soon
+ * as it is no round-off, or else after the first interval. */
 PRBM bool reversal_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
                         Problem *problem) {
     double zero = zero_speed(&sim->configuration);

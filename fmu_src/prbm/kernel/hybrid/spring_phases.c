@@ -60,13 +60,8 @@ PRBM void rephase_coils(Simulation *sim, int switched) {
 }
 
 PRBM bool begin_coils(Simulation *sim) {
-    double size = sim->configuration.scales.length, near = CONSTRAINT_RTOL * size;
-    int n = system_of(sim)->n;
-    double fastest = 0.0;
-    for (int i = 0; i < n; i++) {
-        fastest = greater(fastest, fabs(sim->state.front[n + i]));
-    }
-    double slow = ZERO_SPEED_RTOL * size * fastest;
+    const System *system = system_of(sim);
+    double near = coil_near(system), slow = coil_slow(system, sim->state.front + system->n);
     for (int k = 0; k < phased_coils(sim->configuration.mechanism); k++) {
         Strained now = strained_at(sim, k);
         bool slack = now.strain < -near || (now.strain <= near && now.rate < -slow);
