@@ -13,6 +13,7 @@ import numpy as np
 from kernel_library import FLAGS, KERNEL
 from prbm.fmu.start import interface
 from prbm.interface.tables import slots, tables
+from prbm.mechanics.assembly import assemble
 from prbm.mechanics.independent import independent
 from prbm.mechanism.description import Mechanism
 from shared import once
@@ -94,6 +95,12 @@ def _sizes() -> list[int]:
     return [int(re.search(rf"\b{name} = (\d+)", text)[1]) for name in names]
 
 
+def _some_states(mechanism: Mechanism) -> tuple[int, ...]:
+    """Return as many coordinates as are independent, for a co-simulation."""
+    system = assemble(mechanism, mechanism.values())
+    return tuple(range(system.n - len(system.loops)))
+
+
 class KernelSimulation:
     """A simulation of a mechanism in the kernel.
 
@@ -106,7 +113,8 @@ class KernelSimulation:
     exchange : bool
         Whether the simulation is for model exchange.
     described : bool
-        Whether the tables describe the variables of FMI, which needs the start in Python.
+        Whether the tables describe the variables of FMI, and have states that suit model exchange,
+        which needs the start in Python.
     changes : tuple
         Changes of the sources of the kernel.
     """
@@ -128,7 +136,7 @@ class KernelSimulation:
         self.stops, self.points = mechanism.stops, len(mechanism.rubbing)
         phased = any(spring.side for spring in mechanism.springs)
         self.springs = len(mechanism.springs) if phased else 0
-        chosen = independent(mechanism)
+        chosen = independent(mechanism) if described or exchange else _some_states(mechanism)
         self.slots = slots(mechanism, chosen)
         data = tables(mechanism, interface(mechanism, {}) if described else (), "token", chosen)
         self.tables = self.library.mechanism_open(data, len(data), self.sentence)

@@ -24,6 +24,7 @@ from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.contact import response
 from prbm.mechanics.kinetics import inertia
+from prbm.mechanics.positions import given_at_start
 from prbm.mechanics.system import jacobian
 from prbm.mechanism import flexure
 from prbm.mechanism.description import Mechanism
@@ -32,6 +33,7 @@ from prbm.mechanism.parts import (
     COMPLIANT,
     GROUND,
     SIDES,
+    VELOCITIES,
     Body,
     Flexure,
     FlexureType,
@@ -43,6 +45,7 @@ from prbm.mechanism.parts import (
     Release,
     Spring,
     Stop,
+    value,
 )
 
 Choose = Callable[[Sequence], object]
@@ -391,7 +394,11 @@ def starts(mechanism: Mechanism) -> bool:
 
 
 def moves(sim: Simulation) -> bool:
-    """Return whether the released body can move along its release at the start."""
+    """Return whether the bodies can move along the release, and as they do at the start.
+
+    A start across a direction that the constraints almost lock has rates and energies that no
+    mechanism would survive.
+    """
     system = sim.system
     e = system.directions(sim.front.q)
     M, _ = inertia(system.H, np.diag(system.J), e)
@@ -403,7 +410,16 @@ def moves(sim: Simulation) -> bool:
         (rows[-1] @ response(M, held, rows[-1:], system.length)).item()
         for held in (rows[:-1], rows[:0])
     )
-    return left > MOBILITY_RATIO_MIN * free
+    return left > MOBILITY_RATIO_MIN * free and _starts_freely(sim)
+
+
+def _starts_freely(sim: Simulation) -> bool:
+    """Return whether given velocities have not far more energy than those of the bodies alone."""
+    values, alone = sim.configuration.values, 0.0
+    given = given_at_start(sim.mechanism, values, VELOCITIES)
+    for x in given:
+        alone += 0.5 * value(x.body, "inertia" if x.turns else "mass", values) * x.value**2
+    return not given or alone > MOBILITY_RATIO_MIN * sim.outputs()["energy.kinetic"]
 
 
 @st.composite

@@ -7,7 +7,8 @@
   have the same times.
 
 A motion that differs is chaotic, not wrong, if a change of the velocity of the release by
-``NUDGE`` grows to a difference of ``GROWN``, too.
+``NUDGE`` grows to a difference of ``GROWN``, too.  Forces of contacts with friction that can stick
+only together are not compared: the laws of friction permit several.
 
 ``python tests/support/random_motions.py --count 2000`` prints the number of each result and all
 failures.
@@ -47,6 +48,7 @@ from support import energy_balance
 
 END, SAMPLES = 3e-3, 3  # Duration [s] and number of compared samples.
 TOLERANCE = 1e-10
+EXACT = 1e-12  # An imbalance of the integration falls with the tolerance, a wrong law's does not.
 DEVIATION_MAX = 1e-4  # Of the nominal value; impacts amplify rounding errors.
 TIME_MAX = 1e-4  # Of the duration: difference of the times of an event.
 BALANCE_MAX = 1e-6  # Of the largest energy or momentum; contacts have 100 times the tolerance.
@@ -58,9 +60,13 @@ PEAKS = ("peak_stress", "peak_stress_time", "peak_stress_position")
 START_SHARE = 1e-2  # Of the duration.
 COUNTED = ("impact_count", "contact")
 LOCKED = "the release is almost locked"
+PRESSED = "a compliant stop is pressed deeply at the release"
+PRESSED_MAX = 1e-3  # m; deeper than hits.  The damping of a contact rises with its elastic force.
 UNSEEN = EventKind.SWITCH  # A change of the phase of a compliant stop is no event of a step.
 SECONDS_MAX = 12  # Computing time of a draw; searches for equilibria may take longer.
 PROGRESS = 20  # Draws between printed lines.
+MOTIONS = ("x", "y", "angle", "vx", "vy", "omega", "gap", "gap_rate", "strain", "strain_rate")
+"""Outputs that the motion determines, however contacts share a load; energies, too."""
 COMPARED = ("gap", "gap_rate", "force", "impact_count", "approach_speed")
 """Outputs of stops that do not depend on the place of a drawing."""
 
@@ -69,12 +75,14 @@ COMPARED = ("gap", "gap_rate", "force", "impact_count", "approach_speed")
 class Motion:
     """A motion: its events by kind, part and time, samples of its outputs, and its end.
 
-    ``error`` is the message that ended it, empty if it reached the end.
+    ``error`` is the message that ended it, empty if it reached the end.  In the samples ``shared``,
+    contacts with friction share their load.
     """
 
     events: list[tuple[str, str, float]] = field(default_factory=list)
     samples: list[dict[str, float]] = field(default_factory=list)
     momenta: list[tuple[complex, float]] = field(default_factory=list)
+    shared: set[int] = field(default_factory=set)
     error: str = ""
 
     @property
@@ -100,16 +108,23 @@ def part_names(model: Mechanism) -> list[str]:
     return [part.name for part in (*model.stops, *model.rubbing, *model.springs)]
 
 
-def engine_motion(model: Mechanism, values: dict[str, float], end: float = END) -> Motion:
+def engine_motion(
+    model: Mechanism, values: dict[str, float], end: float = END, tolerance: float = TOLERANCE
+) -> Motion:
     """Return the motion in the Python engine."""
     found, names = Motion(), part_names(model)
     sim = None
     try:
-        sim = _Recorded(model, values, tolerance=TOLERANCE)
+        sim = _Recorded(model, values, tolerance=tolerance)
         if not moves(sim):
             return Motion(error=LOCKED)
-        for t in np.linspace(0.0, end, SAMPLES + 1):
+        gaps, _ = sim.front.gaps_and_rates()
+        if min(gaps, default=0.0) < -PRESSED_MAX:
+            return Motion(error=PRESSED)
+        for k, t in enumerate(np.linspace(0.0, end, SAMPLES + 1)):
             sim.advance(float(t))
+            if shares(sim):
+                found.shared.add(k)
             found.samples.append(sim.outputs())
             found.momenta.append(momentum(sim))
     except PrbmError as error:
@@ -140,6 +155,28 @@ def kernel_motion(model: Mechanism, values: dict[str, float], end: float = END) 
     except (KernelMistake, PrbmError) as error:
         found.error = str(error)
     return found
+
+
+def shares(sim: Simulation) -> bool:
+    """Return whether contacts with friction, of which some stick, can stick only together."""
+    front, scales = sim.front, sim.configuration.scales
+    equations, contacts = front.equations, front.contacts
+    rubbing = [
+        c
+        for c, mode in enumerate(contacts.modes)
+        if (mode.closed or c in contacts.pressed) and equations.friction_coefficient(c) > 0.0
+    ]
+    if not equations.sticking:
+        return False
+    held = equations.with_contacts(contacts.without_friction()).rows.jacobian(front.e)
+    for c in rubbing:
+        row = equations.slip_row(c, front.e)[None]
+        if abs(float((row @ front.v).item())) > scales.zero_speed or not front.at.moves(row):
+            continue
+        if not front.at.independent(held, row):
+            return True
+        held = np.vstack([held, row])
+    return False
 
 
 def momentum(sim: Simulation) -> tuple[complex, float]:
@@ -233,14 +270,28 @@ def output_difference(
             x, y = expected[name], found[name]
             if name.endswith("modal_restitution") and expected["mode.frequency"] == 0.0:
                 continue  # A body that swings without a spring has no unique fundamental mode.
+            if k in one.shared and not (name.startswith("energy") or name.endswith(MOTIONS)):
+                continue
             if name.endswith(PEAKS):
                 if name.endswith(PEAKS[0]) and abs(y - x) > PEAK_RTOL * abs(x) + 1e-3:
                     return f"{name} = {x:.9g}, {y:.9g} in sample {k}"
                 continue
-            allowed = 0.0 if name.endswith(COUNTED) else limit * max(nominal[name], abs(x))
-            if abs(y - x) > allowed:
+            if abs(y - x) > limit * scale_of(name, nominal[name], x):
                 return f"{name} = {x:.9g}, {y:.9g} in sample {k}"
     return ""
+
+
+def scale_of(name: str, nominal: float, x: float) -> float:
+    """Return the size of an output x, of which a limit is a share.
+
+    A share of the speed changes the velocity of a mode, a with the share p in the kinetic energy,
+    by the same share of a/sqrt(p).  The modal restitution R changes by (1 + |R|)/sqrt(p) times it,
+    and |R| <= 1/sqrt(p).
+    """
+    if name.endswith(COUNTED):
+        return 0.0
+    size = max(nominal, abs(x))
+    return size * max(1.0, abs(x)) if name.endswith("modal_restitution") else size
 
 
 def difference(nominal: Nominals, one: Motion, other: Motion, names: Iterable[str] | None = None,
@@ -319,7 +370,11 @@ def judge(seed: int, findings: Findings) -> None:
             break
         refused(seed, model, values, expected, findings)
     findings.events.update(kind for kind, *_ in expected.events)
-    if words := imbalance(model, expected, adrift=adrift):
+    words = imbalance(model, expected, adrift=adrift)
+    if words:  # The scales of the tolerance may be larger than the energy of a slow motion.
+        exact = engine_motion(model, values, tolerance=EXACT)
+        words = imbalance(model, exact, adrift=adrift)
+    if words:
         findings.failed(seed, "balance", words)
         return
     result = compared(seed, model, values, expected)
@@ -337,6 +392,7 @@ def compared(seed: int, model: Mechanism, values: dict[str, float], expected: Mo
     Return "failed", the law and the difference, another result, or nothing.
     """
     found = kernel_motion(model, values)
+    found.shared = expected.shared
     described = variables(model, expected.samples[0])
     nominal = {v.name: v.nominal or 1.0 for v in described}
     curved = {f"{stop.name}.stiffness" for stop in model.stops if stop.exponent != 1.0}
@@ -387,7 +443,7 @@ def refused(
     seed: int, model: Mechanism, values: dict[str, float], motion: Motion, findings: Findings
 ) -> None:
     """Count a refusal at the start; the kernel refuses, too, but checks in another order."""
-    if motion.error != LOCKED:
+    if motion.error not in (LOCKED, PRESSED):
         try:
             KernelSimulation(model, values, described=False)
             findings.failed(seed, "refusal", motion.error)
