@@ -23,9 +23,9 @@ from guides import (
     start,
     trammel,
 )
-from kernel_simulation import KernelSimulation
+from kernel_simulation import KernelMistake, KernelSimulation
 from prbm.analysis.linear_model import linearize
-from prbm.base.errors import PrbmError
+from prbm.base.errors import PrbmError, SimulationError
 from prbm.hybrid import contact_modes
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.contact_state import ContactMode
@@ -157,12 +157,8 @@ RODS = (  # Ends, angles of their lines, coefficients, speed, its direction, pus
 )
 
 
-@engines
-@pytest.mark.parametrize("case", RODS)
-def test_a_sliding_rod_has_the_forces_of_the_only_sides_that_are_possible(
-    engine, case, monkeypatch
-):
-    """Changes of one side at a time do not find those of the first rod."""
+def rod(case):
+    """Return a rod on two rough guides, and the loads on it."""
     ends, angles, coefficients, speed, direction, (push, moment) = case
     ways = [cmath.rect(1.0, angle) for angle in angles]
     lines = {f"{name}{k}": z + u * at for k, (z, u) in enumerate(zip(ends, ways, strict=True))
@@ -175,7 +171,16 @@ def test_a_sliding_rod_has_the_forces_of_the_only_sides_that_are_possible(
         Release("rod", direction, velocity=speed), forces=(Force("push", "rod"),),
         ground={name: (z.real, z.imag) for name, z in lines.items()},
     )  # fmt: skip
-    changes = {"push.x": push.real, "push.y": push.imag, "push.moment": moment}
+    return model, {"push.x": push.real, "push.y": push.imag, "push.moment": moment}
+
+
+@engines
+@pytest.mark.parametrize("case", RODS)
+def test_a_sliding_rod_has_the_forces_of_the_only_sides_that_are_possible(engine, case):
+    """Changes of one side at a time do not find those of the first rod."""
+    ends, angles, coefficients, _, _, (push, moment) = case
+    ways = [cmath.rect(1.0, angle) for angle in angles]
+    model, changes = rod(case)
     out = start(model, engine, changes=changes).outputs()
     v, w = complex(out["rod.vx"], out["rod.vy"]), out["rod.omega"]
     found = []
@@ -193,10 +198,45 @@ def test_a_sliding_rod_has_the_forces_of_the_only_sides_that_are_possible(
         found += [N] if np.array_equal(np.sign(N), sides) else []
     assert len(found) == 1
     assert (out["way0.force"], out["way1.force"]) == pytest.approx(found[0], rel=1e-6)
-    if engine == "python" and case is RODS[0]:
-        monkeypatch.setattr(contact_modes, "SIDES_TRIED_MAX", 3)
-        with pytest.raises(PrbmError, match="jams"):
-            start(model, engine, changes=changes)
+
+
+def changed_start(case, engine, monkeypatch, limit=None, *, fails=False):
+    """Start a rod with another limit of the sides that are tried, or with an error at first."""
+    model, given = rod(case)
+    if engine == "kernel":
+        few = ("generated.h", "SIDES_TRIED_MAX = 64", f"SIDES_TRIED_MAX = {limit}")
+        wrong = "    try_contacts(sim, modes);\n    if (eq->slipping_guides == 0) {"
+        early = "    static int calls;\n    if (calls++ == 0) {\n"
+        early += '        return fail(problem, "another error");\n    }\n'
+        failing = ("hybrid/contact_modes.c", wrong, early + wrong)
+        return KernelSimulation(model, given, changes=(failing if fails else few,))
+    found = [SimulationError("another error")] if fails else []
+    sides = contact_modes._guide_on_wrong_side
+
+    def guide_on_wrong_side(*arguments):
+        if found:
+            raise found.pop()
+        return sides(*arguments)
+
+    if limit:
+        monkeypatch.setattr(contact_modes, "SIDES_TRIED_MAX", limit)
+    monkeypatch.setattr(contact_modes, "_guide_on_wrong_side", guide_on_wrong_side)
+    return start(model, engine, changes=given)
+
+
+@engines
+def test_a_search_of_sides_that_is_given_up_names_its_limit(engine, monkeypatch):
+    """The forces of the first rod are found by trying all sides."""
+    words = r"jams the mechanism; .*; 2 guides have more than the 3 combinations of sides that are"
+    with pytest.raises((PrbmError, KernelMistake), match=words):
+        changed_start(RODS[0], engine, monkeypatch, limit=3)
+
+
+@engines
+def test_another_error_while_sides_are_tried_is_reported(engine, monkeypatch):
+    """On other sides the search would find forces, and the error would be hidden."""
+    with pytest.raises((PrbmError, KernelMistake), match="another error"):
+        changed_start(RODS[1], engine, monkeypatch, fails=True)
 
 
 @engines

@@ -13,6 +13,7 @@ from ..base.errors import SimulationError
 from ..base.tolerances import (
     FRICTION_EXCESS_RTOL,
     MODE_ITERATIONS_MAX,
+    MODES_TRIED_MAX,
     SIDES_TRIED_MAX,
 )
 from ..mechanics.constraints import solve_saddle
@@ -37,6 +38,10 @@ UNDECIDED = (
 """Cause and remedy of modes that change with each projection."""
 
 
+class JammedError(SimulationError):
+    """No forces satisfy the laws of contact and friction on the sides of the guides, or on any."""
+
+
 # --- resets -----------------------------------------------------------------------------------
 
 
@@ -57,7 +62,7 @@ def change_side(configuration: Configuration, front: Front, contact: int) -> Fro
     changed = front.contacts.with_side(contact, -front.contacts.side(contact))
     other = front.with_contacts(changed)
     if not all(_resists(one, contact) for one in (front, other)):
-        raise SimulationError(_failure(configuration, front, [contact], JAMMED))
+        raise _jammed(configuration, front, [contact])
     return choose_modes(configuration, other, turned=contact)
 
 
@@ -176,27 +181,29 @@ def _chosen(
             contacts = chosen.contacts.with_side(wrong, -chosen.contacts.side(wrong))
             chosen = chosen.with_contacts(contacts)
         failed = list(candidates) if wrong is None else [*candidates, wrong]
-        raise SimulationError(_failure(configuration, front, failed, JAMMED))
-    except SimulationError:
-        for contacts in _all_sides(front, turned):
+        raise _jammed(configuration, front, failed)
+    except JammedError as jam:
+        stops, every = front.contacts.stops, len(front.contacts.sides)
+        guides = [c for c in range(stops, stops + every) if front.equations.is_guide(c)]
+        guides = [c for c in guides if c != turned]
+        if 2 ** len(guides) > SIDES_TRIED_MAX:
+            raise JammedError(
+                f"{jam}; {len(guides)} guides have more than the {SIDES_TRIED_MAX} combinations of "
+                "sides that are tried"
+            ) from None
+        for contacts in _all_sides(front.contacts, guides):
             try:
                 chosen, wrong = on_sides(front.with_contacts(contacts))
-            except SimulationError:
+            except JammedError:
                 continue
             if wrong is None:
                 return chosen
         raise
 
 
-def _all_sides(front: Front, turned: int | None) -> Iterator[ContactState]:
-    """Yield the contacts with all sides of the guides but ``turned``; none if there are too many.
-
-    The side of the first guide changes fastest.
-    """
-    contacts, stops = front.contacts, front.contacts.stops
-    every = range(stops, stops + len(contacts.sides))
-    guides = [c for c in every if front.equations.is_guide(c) and c != turned]
-    if not guides or 2 ** len(guides) > SIDES_TRIED_MAX:
+def _all_sides(contacts: ContactState, guides: Sequence[int]) -> Iterator[ContactState]:
+    """Yield the contacts with all sides of some guides; that of the first one changes fastest."""
+    if not guides:
         return
     for number in range(2 ** len(guides)):
         for k, c in enumerate(guides):
@@ -250,12 +257,12 @@ def holding_stops(
 
     Raises
     ------
-    SimulationError
+    JammedError
         If the friction of sliding contacts excludes all choices.
     """
     holding = find_holding_stops(configuration, front, candidates)
     if holding is None:
-        raise SimulationError(_failure(configuration, front, candidates, JAMMED))
+        raise _jammed(configuration, front, candidates)
     return holding
 
 
@@ -301,6 +308,29 @@ def _failure(
     """Return the message of a failure at some contacts, from its cause and its remedy."""
     names, (cause, remedy) = contact_names(configuration.mechanism, contacts), failure
     return f"{cause} at t = {front.time:.9g} s ({names}): {remedy}"
+
+
+def _jammed(configuration: Configuration, front: Front, contacts: Iterable[int]) -> JammedError:
+    """Return the error of contacts without a solution, with the limit of a search that it ended.
+
+    If guides are at rest, all modes of the contacts at rest are tried, unless there are too many.
+    """
+    every, equations, remark = sorted(set(contacts)), front.equations, ""
+    resting = [
+        c
+        for c in every
+        if equations.friction_coefficient(c) > 0.0
+        and _sliding_mode(configuration.scales, front, c, 0.0) is FRICTIONLESS
+    ]
+    stops = sum(c < front.contacts.stops and c not in front.contacts.pressed for c in every)
+    if any(map(equations.is_guide, resting)) and (
+        2.0**stops * 3.0 ** len(resting) > MODES_TRIED_MAX
+    ):
+        remark = (
+            f"; {len(every)} contacts have more than the {MODES_TRIED_MAX} combinations of modes "
+            "that are tried"
+        )
+    return JammedError(_failure(configuration, front, every, JAMMED) + remark)
 
 
 def equations_holding(scales: Scales, front: Front, stops: Sequence[int]) -> Equations:
@@ -356,7 +386,7 @@ def _with_friction(
 
     Raises
     ------
-    SimulationError
+    JammedError
         If no forces satisfy the laws of all contacts.
     """
     held, every = list(front.contacts.held), sorted(set(candidates))
@@ -369,7 +399,7 @@ def _with_friction(
         found = _modes_of(configuration.scales, front, stops, every, slipping, turning)
         if found is not None:
             return front.with_contacts(found)
-    raise SimulationError(_failure(configuration, front, {*every, *rubbing}, JAMMED))
+    raise _jammed(configuration, front, {*every, *rubbing})
 
 
 def _modes_of(

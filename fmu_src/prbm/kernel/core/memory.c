@@ -1,6 +1,7 @@
 /* Memory: blocks that are laid out once, and scratch that is taken and released. */
 #include <stdarg.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "core/memory.h"
 
@@ -9,6 +10,17 @@ PRBM bool fail(Problem *problem, const char *format, ...) {
     va_list arguments;
     va_start(arguments, format);
     (void)vsnprintf(problem->text, sizeof problem->text, format, arguments);
+    va_end(arguments);
+    return false;
+}
+
+PRBM bool fail_further(Problem *problem, const char *format, ...) {
+    size_t length = strlen(problem->text);
+    va_list arguments;
+    (void)snprintf(problem->text + length, sizeof problem->text - length, "; ");
+    length = strlen(problem->text);
+    va_start(arguments, format);
+    (void)vsnprintf(problem->text + length, sizeof problem->text - length, format, arguments);
     va_end(arguments);
     return false;
 }

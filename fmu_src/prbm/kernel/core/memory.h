@@ -13,8 +13,12 @@ typedef struct {
 /* Write an error message and return false. */
 #if defined(__GNUC__)
 PRBM bool fail(Problem *problem, const char *format, ...) __attribute__((format(printf, 2, 3)));
+/* Add a sentence to an error message, after a semicolon, and return false. */
+PRBM bool fail_further(Problem *problem, const char *format, ...)
+    __attribute__((format(printf, 2, 3)));
 #else
 PRBM bool fail(Problem *problem, const char *format, ...);
+PRBM bool fail_further(Problem *problem, const char *format, ...);
 #endif
 
 /* A block of memory.  A first layout with base NULL counts its bytes, a second places its parts. */

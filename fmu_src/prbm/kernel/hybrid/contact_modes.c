@@ -12,10 +12,6 @@
 #include "hybrid/rest.h"
 #include "hybrid/spring_phases.h"
 
-static const ContactFailure JAMMED = {
-    "no forces satisfy the laws of contact and friction",
-    "friction jams the mechanism; reduce the coefficients of friction",
-};
 /* The modes change with each projection. */
 static const ContactFailure UNDECIDED = {
     "the choice of closed contacts does not converge",
@@ -183,12 +179,6 @@ PRBM bool find_holding_stops(Simulation *sim, int count, const int *candidates, 
     return modes_agree(sim, q, v, &every, &rest, &found, &holding->found, problem);
 }
 
-static bool holding_stops(Simulation *sim, int count, const int *candidates, const double *q,
-                          const double *v, HoldingSet *holding, Problem *problem) {
-    return find_holding_stops(sim, count, candidates, q, v, holding, problem) &&
-           (holding->found || contacts_fail(sim, &JAMMED, count, candidates, problem));
-}
-
 /* --- friction --------------------------------------------------------------------------------- */
 
 /* A slip (slips is true) or reversal at a contact; contact is -1 without such an event.  After a
@@ -345,7 +335,7 @@ static bool friction_jams(const Simulation *sim, const HoldingSet *touching, Pro
                             (rough && rubs_pressed(sim, contact))
                       : rough;
     }
-    return contacts_fail(sim, &JAMMED, count, all, problem);
+    return contacts_jam(sim, count, all, problem);
 }
 
 /* Set the modes of the contacts with friction that are closed, and those that slide. */
@@ -422,7 +412,8 @@ static bool modes_by_forces(Simulation *sim, const HoldingSet *stops, const Hold
  * it can; the forces of contacts that can hardly move against each other may then exceed their
  * limits, which they do not if it slips. */
 static bool choose_slips(Simulation *sim, const HoldingSet *holding, const HoldingSet *touching,
-                            const FrictionEvent *event, ContactMode *modes, Problem *problem) {
+                         const FrictionEvent *event, ContactMode *modes, bool *jams,
+                         Problem *problem) {
     ContactMode first[CONTACTS_MAX];
     size_t bytes = (size_t)contact_count(sim) * sizeof *modes;
     bool agree = false;
@@ -435,6 +426,7 @@ static bool choose_slips(Simulation *sim, const HoldingSet *holding, const Holdi
             return false;
         }
     }
+    *jams = !agree;
     return agree || friction_jams(sim, touching, problem);
 }
 
@@ -463,7 +455,7 @@ PRBM bool change_side(Simulation *sim, int contact, Problem *problem) {
     sim->state.sides[contact - system_of(sim)->s] *= -1;
     set_contacts(sim, sim->state.modes);
     ok = ok && resists(sim, contact, &after, problem);
-    return ok && ((before && after) || contacts_fail(sim, &JAMMED, 1, &contact, problem));
+    return ok && ((before && after) || contacts_jam(sim, 1, &contact, problem));
 }
 
 /* --- all contacts ----------------------------------------------------------------------------- */
@@ -560,31 +552,34 @@ static bool find_wrong_side(Simulation *sim, const ContactMode *modes, int turne
     return ok;
 }
 
-/* Choose the modes of all contacts by their forces at the front, for the sides of the guides. */
+/* Choose the modes of all contacts by their forces at the front, for the sides of the guides.  *jams:
+ * whether no forces satisfy the laws on these sides. */
 static bool choose_by_forces(Simulation *sim, const HoldingSet *touching, const FrictionEvent *event,
-                             ContactMode *modes, Problem *problem) {
+                             ContactMode *modes, bool *jams, Problem *problem) {
     const System *system = system_of(sim);
     const double *q = sim->state.front, *v = q + system->n;
     HoldingSet holding;
-    if (!holding_stops(sim, touching->count, touching->stops, q, v, &holding, problem)) {
-        return false;
+    bool ok = find_holding_stops(sim, touching->count, touching->stops, q, v, &holding, problem);
+    *jams = ok && !holding.found;
+    if (!ok || *jams) {
+        return ok && contacts_jam(sim, touching->count, touching->stops, problem);
     }
     for (int contact = 0; contact < contact_count(sim); contact++) {
         bool open = is_stop(system, contact) && !presses(sim, contact) &&
                     !has_contact(holding.count, holding.stops, contact);
         modes[contact] = open ? CONTACT_OPEN : CONTACT_FRICTIONLESS;
     }
-    return choose_slips(sim, &holding, touching, event, modes, problem);
+    return choose_slips(sim, &holding, touching, event, modes, jams, problem);
 }
 
 /* Choose the modes of all contacts by their forces at the front.  The friction of a guide that slips
  * depends on the side to which it pushes: the side of the first wrong one at a time is changed. */
 static bool change_sides(Simulation *sim, const HoldingSet *touching, const FrictionEvent *event,
-                         ContactMode *modes, Problem *problem) {
+                         ContactMode *modes, bool *jams, Problem *problem) {
     HoldingSet failed = *touching;
     for (int k = 0; k < MODE_ITERATIONS_MAX; k++) {
         int wrong;
-        if (!choose_by_forces(sim, touching, event, modes, problem) ||
+        if (!choose_by_forces(sim, touching, event, modes, jams, problem) ||
             !find_wrong_side(sim, modes, event->turned, &wrong, problem)) {
             return false;
         }
@@ -594,40 +589,50 @@ static bool change_sides(Simulation *sim, const HoldingSet *touching, const Fric
         sim->state.sides[wrong - system_of(sim)->s] *= -1;
         failed.stops[touching->count] = wrong;
     }
-    return contacts_fail(sim, &JAMMED, touching->count + 1, failed.stops, problem);
+    *jams = true;
+    return contacts_jam(sim, touching->count + 1, failed.stops, problem);
 }
 
 /* Choose the modes for any combination of the sides of the guides, except for the guide that has just
- * turned; false if there are too many. */
+ * turned.  *jams: whether none has a solution; then the problem stays as it is, except that it has the
+ * limit if there are too many combinations. */
 static bool choose_on_any_sides(Simulation *sim, const HoldingSet *touching,
-                                const FrictionEvent *event, ContactMode *modes) {
+                                const FrictionEvent *event, ContactMode *modes, bool *jams,
+                                Problem *problem) {
     const System *system = system_of(sim);
     int count = 0, combinations = 1, guides[PLACES_MAX];
+    Problem other;
     for (int i = 0; i < system->f; i++) {
         if (is_guide(system, system->s + i) && system->s + i != event->turned) {
             guides[count++] = i;
             combinations *= combinations <= SIDES_TRIED_MAX ? 2 : 1;
         }
     }
-    bool found = false, few = count > 0 && combinations <= SIDES_TRIED_MAX;
-    for (int sides = 0; few && !found && sides < combinations; sides++) {
-        Problem ignored;
+    if (combinations > SIDES_TRIED_MAX) {
+        return fail_further(problem, "%d guides have more than the %d combinations of sides that are "
+                                     "tried", count, SIDES_TRIED_MAX);
+    }
+    for (int sides = 0; count > 0 && *jams && sides < combinations; sides++) {
         int wrong = -1;
         for (int k = 0; k < count; k++) {
             sim->state.sides[guides[k]] = sides >> k & 1 ? -1 : 1;
         }
-        found = choose_by_forces(sim, touching, event, modes, &ignored) &&
-                find_wrong_side(sim, modes, event->turned, &wrong, &ignored) && wrong < 0;
+        bool ok = choose_by_forces(sim, touching, event, modes, jams, &other);
+        if (!*jams && !(ok && find_wrong_side(sim, modes, event->turned, &wrong, &other))) {
+            return fail(problem, "%s", other.text);
+        }
+        *jams = *jams || wrong >= 0;
     }
-    return found;
+    return !*jams;
 }
 
 /* Choose the modes of all contacts by their forces at the front: by changes of one side at a time or,
- * if they fail, for any combination of sides. */
+ * if no forces satisfy the laws, for any combination of sides. */
 static bool choose_all_modes(Simulation *sim, const HoldingSet *touching, const FrictionEvent *event,
                              ContactMode *modes, Problem *problem) {
-    return change_sides(sim, touching, event, modes, problem) ||
-           choose_on_any_sides(sim, touching, event, modes);
+    bool jams = false;
+    return change_sides(sim, touching, event, modes, &jams, problem) ||
+           (jams && choose_on_any_sides(sim, touching, event, modes, &jams, problem));
 }
 
 /* Remove the compliant stops that are pressed: they are no constraints. */

@@ -1,7 +1,11 @@
 /* Names of contacts and springs in messages. */
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
+#include "core/friction.h"
+#include "hybrid/access.h"
+#include "hybrid/configuration.h"
 #include "hybrid/contact_names.h"
 
 PRBM const char *contact_name(const Mechanism *m, int contact) {
@@ -49,4 +53,32 @@ PRBM bool contacts_fail(const Simulation *sim, const ContactFailure *failure, in
     list_contacts(sim->configuration.mechanism, count, contacts, &names);
     return fail(problem, "%s at t = %.9g s (%s): %s", failure->cause, sim->state.front_time,
                 names.text, failure->remedy);
+}
+
+PRBM bool contacts_jam(Simulation *sim, int count, const int *contacts, Problem *problem) {
+    static const ContactFailure JAMMED = {
+        "no forces satisfy the laws of contact and friction",
+        "friction jams the mechanism; reduce the coefficients of friction",
+    };
+    Scratch scratch = sim->scratch;
+    const System *system = system_of(sim);
+    const double *v = sim->state.front + system->n;
+    Complex *e = directions_at(sim, sim->state.front, &scratch);
+    double combinations = 1.0;
+    bool guided = false;
+    for (int k = 0; k < count; k++) {
+        int c = contacts[k];
+        bool rigid = is_stop(system, c) && !is_pressed(&sim->state.touching[c]);
+        bool rough = friction_coefficient(&sim->equations, c) > 0.0;
+        bool rests = rough && fabs(sliding_velocity(system, c, e, v)) <= zero_speed(&sim->configuration);
+        combinations *= (rigid ? 2.0 : 1.0) * (rests ? 3.0 : 1.0);
+        guided = guided || (rests && is_guide(system, c));
+    }
+    contacts_fail(sim, &JAMMED, count, contacts, problem);
+    if (guided && combinations > MODES_TRIED_MAX) {
+        return fail_further(problem,
+                            "%d contacts have more than the %d combinations of modes that are tried",
+                            count, MODES_TRIED_MAX);
+    }
+    return false;
 }

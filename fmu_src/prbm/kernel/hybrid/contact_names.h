@@ -22,5 +22,8 @@ PRBM void list_contacts(const Mechanism *m, int count, const int *contacts, Cont
 /* Set the problem of contacts; return false. */
 PRBM bool contacts_fail(const Simulation *sim, const ContactFailure *failure, int count,
                         const int *contacts, Problem *problem);
+/* Set the problem of contacts without a solution, with the limit of a search that it ended: if guides
+ * are at rest, all modes of the contacts at rest are tried, unless there are too many. */
+PRBM bool contacts_jam(Simulation *sim, int count, const int *contacts, Problem *problem);
 
 #endif
