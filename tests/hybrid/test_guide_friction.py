@@ -30,7 +30,7 @@ from prbm.hybrid import contact_modes
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.contact_state import ContactMode
 from prbm.mechanics.inputs import input_names
-from prbm.mechanism.parts import Body, Force, Guide, Release, Spring
+from prbm.mechanism.parts import Body, Force, Friction, Guide, Release, Spring
 
 G = 9.81
 engines = pytest.mark.parametrize(
@@ -248,6 +248,30 @@ def test_a_block_without_a_load_across_its_line_slides_freely(engine):
     out = sim.outputs()
     assert math.hypot(out["block.x"], out["block.y"]) == pytest.approx(0.5, abs=1e-9)
     assert out["energy.dissipated"] == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("residual", [3e-10, -3e-10])
+def test_a_residual_speed_of_a_contact_that_others_hold_is_no_reversal(residual):
+    """The speeds of contacts that begin to stick vanish with the first projection."""
+    model = rough(incline(30.0, velocity=0.0), 0.9)
+    model = replace(model, frictions=(Friction("rub", "block", 30.0, 0.2, 1.0),))
+    sim = Simulation(model, tolerance=1e-11)
+    front, n = sim.front, sim.system.n
+    zero = sim.configuration.scales.zero_speed
+    rub, way = front.contacts.modes
+    assert ContactMode.STICK in (rub, way)
+    (held,) = (c for c, mode in enumerate((rub, way)) if mode is not ContactMode.STICK)
+    slips = ContactMode.slipping(-1.0)
+    front = front.with_contacts(front.contacts.with_mode(held, slips))
+    v = front.equations.slip_row(held, front.e) * residual
+    assert 0.0 < abs(float(front.equations.slip_row(held, front.e) @ v)) < zero
+    y = front.y.copy()
+    y[n : 2 * n] = v
+    sim._set_front(replace(front, y=y), [])
+    applied = []
+    sim._apply = applied.append
+    sim.advance(0.01)
+    assert applied == []
 
 
 # --- independent integrations ---------------------------------------------------------------------

@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 
 import prbm
 from exchange import assert_directional, integrate
+from free_bodies import pendulum
 from kernel_simulation import KernelSimulation
 from moved_drawings import moved
 from prbm.base.errors import EquilibriumError, MechanismError, ParameterError
@@ -200,6 +201,21 @@ def test_a_block_at_the_free_length_stays_there_without_events(engine, c):
     found, sim = events(engine, model, 2.0)
     assert found == []
     assert sim.outputs()["block.x"] == pytest.approx(0.0, abs=1e-12)
+
+
+@engines
+@pytest.mark.parametrize("acts", ["tension", "compression"])
+def test_a_damped_spring_from_the_pin_of_a_pendulum_to_its_body_never_changes_its_phase(
+    engine, acts
+):
+    """Its length is constant: its strain and the rate of it are round-off."""
+    bob = pendulum(0.7)
+    points = {**bob.bodies[0].points, "end": (0.113, -0.257)}
+    coil = Spring("coil", "ground.pin", "bob.end", 17.0, damping=0.13, acts=acts)
+    model = replace(bob, bodies=(replace(bob.bodies[0], points=points),), springs=(coil,))
+    found, sim = events(engine, model, 0.5)
+    assert found == []
+    assert sim.outputs()["coil.force"] == pytest.approx(0.0, abs=1e-12)
 
 
 SIDES = {

@@ -12,7 +12,8 @@ from guides import CRANK, ROD, incline, slider_crank, trammel
 from moved_drawings import moved
 from prbm.base.errors import EquilibriumError, ParameterError
 from prbm.hybrid.simulation import Simulation
-from prbm.mechanism.parts import Release, Stop
+from prbm.mechanism.description import Mechanism
+from prbm.mechanism.parts import Body, Flexure, FlexureType, Release, Stop
 from prbm.runs.engine import simulation as started
 from springs import four_bar
 from support import GUIDES, energy_balance, mechanism
@@ -125,6 +126,34 @@ def test_a_position_out_of_reach_is_rejected_with_what_is_reached(engine):
     model = with_start(slider_crank(velocity=0.0), "slider", start_x=0.2)
     with pytest.raises(EquilibriumError, match=r"slider\.start_x = 0\.2 m cannot be .* 0\.117. m"):
         started(model, {}, engine=engine)
+
+
+def strut(**start):
+    """Return a body on the pin of an inextensible strut, which is straight as drawn."""
+    leaf = FlexureType("leaf", "2R", 5e-4, 1e-2, 3e9, 1200.0)
+    body = Body("block", 0.05, 2e-5, (0.06, 0.01), {"pin": (0.05, 0.0)}, **start)
+    return Mechanism(
+        name="Strut", title="A body on a strut", ground={"foot": (0.0, 0.0)}, bodies=(body,),
+        flexure_types=(leaf,),
+        flexures=(Flexure("strut", "leaf", "ground.foot", "block.pin", ends=("clamp", "pin")),),
+        release=Release("block", 90.0), gravity=(0.0, 0.0),
+    )  # fmt: skip
+
+
+@engines
+def test_a_strut_that_is_straight_as_drawn_is_not_shortened_to_either_side(engine):
+    """Only the position that it has in equilibrium is unique beside the others."""
+    model = strut(start_angle=0.0, start_y=4e-3)
+    out = started(model, {}, engine=engine).outputs()
+    assert out["block.x"] < -5e-5
+    given = strut(start_angle=0.0, start_y=4e-3, start_x=out["block.x"])
+    again = started(given, {}, engine=engine).outputs()
+    assert again["block.y"] == pytest.approx(4e-3, abs=1e-12)
+    assert again["energy.elastic"] == pytest.approx(out["energy.elastic"], rel=1e-6)
+    for other in (1.5 * out["block.x"], 0.5 * out["block.x"]):
+        words = rf"block\.start_x = {other:g} m: .* dead centre, .* has {out['block.x']:.5g}"
+        with pytest.raises(ParameterError, match=words):
+            started(strut(start_angle=0.0, start_y=4e-3, start_x=other), {}, engine=engine)
 
 
 def double_pendulum_motion(angles, rates, t):

@@ -15,6 +15,7 @@ from ..base.tolerances import (
     NOMINAL_STRAIN_FACTOR,
     RELEASE_PENETRATION_RTOL,
     STEP_MAX_RTOL,
+    STIFFNESS_ROUNDING_RTOL,
     TOLERANCE_MAX,
     TOLERANCE_MIN,
     TOLERANCE_USED_MAX,
@@ -46,7 +47,7 @@ class Scales:
         (:func:`prbm.mechanics.modal.slow_rates`) [rad/s].
     energy : float
         Torque of the stiffest element at one radian, or at a displacement of the size; without
-        elements, the largest inertia times the square of the rate [J].
+        elements, or if that is round-off, the largest inertia times the square of the rate [J].
     time : float
         Period of the motion [s].
 
@@ -73,7 +74,9 @@ class Scales:
         )
         turns = np.setdiff1d(np.arange(system.n), system.strains)
         rate, fast = (omega, omega) if omega else slow_rates(system)
-        energy = float(K[np.ix_(turns, turns)].max()) or inertia * rate**2
+        energy, kinetic = float(K[np.ix_(turns, turns)].max()), inertia * rate**2
+        if energy <= STIFFNESS_ROUNDING_RTOL * kinetic:  # Of a spring whose length is constant.
+            energy = kinetic
         return cls(system.length, rate, energy, 2 * math.pi / fast)
 
     @property

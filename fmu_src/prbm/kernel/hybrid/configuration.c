@@ -56,7 +56,8 @@ PRBM bool set_scales(Configuration *configuration, double frequency, Scratch scr
         return false;
     }
     scales->length = system->length;
-    scales->energy = torsion > 0.0 ? torsion : heaviest * (scales->rate * scales->rate);
+    double kinetic = heaviest * (scales->rate * scales->rate);
+    scales->energy = torsion <= STIFFNESS_ROUNDING_RTOL * kinetic ? kinetic : torsion;
     scales->time = TWO_PI / fast;
     int first = system->mechanism->first_extra, count = system->mechanism->state_count;
     configuration->controlled = (double)first;
