@@ -28,7 +28,7 @@ from ..mechanics.arrays import Real
 from ..mechanism.description import Mechanism
 from ..runs.engine import KERNEL
 from ..runs.inputs import files_of, placeholders
-from ..sweeps.design import SENSITIVITY, Yield
+from ..sweeps.design import SENSITIVITY, Yield, constant
 from ..sweeps.optimum import EDGE_RTOL, FLAT_RTOL, Optimum
 from ..sweeps.plan import Model
 from ..sweeps.study import Study, model_of, study
@@ -337,8 +337,12 @@ def _print_sensitivities(found: Study, shares: Sequence[Sequence[Any]]) -> None:
             print(f"without effect on {output}: {', '.join(without)}")
     for output, values in found.outputs.items():
         if output not in found.sensitivities:
-            known = np.isfinite(values).all()
-            reason = "no parameter changes it" if known else "they need a value of each simulation"
+            if not np.isfinite(values).all():
+                reason = "they need a value of each simulation"
+            elif constant(values):
+                reason = "no parameter changes it"
+            else:
+                reason = "too few simulations change it; increase --runs"
             print(f"no shares of the variance of {output}: {reason}")
 
 

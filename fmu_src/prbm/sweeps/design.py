@@ -6,13 +6,12 @@ Saltelli's design give first-order and total sensitivity indices.
 """
 
 import math
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import binomtest, norm, qmc, sobol_indices
+from scipy.stats import binomtest, norm, qmc
 
 from ..base.errors import ParameterError
 from ..mechanics.arrays import Real
@@ -178,8 +177,6 @@ class Sensitivity:
 def sensitivity(names: Sequence[str], values: Real, seed: int = 0) -> Sensitivity | None:
     """Return the indices of an output at the points of Saltelli's design.
 
-    Estimators are those of ``scipy.stats.sobol_indices`` (Saltelli 2010).
-
     Parameters
     ----------
     names : sequence of str
@@ -187,31 +184,38 @@ def sensitivity(names: Sequence[str], values: Real, seed: int = 0) -> Sensitivit
     values : (n (p + 2),)
         The output at the points of :func:`drawn` with the method ``sensitivity``.
     seed : int
-        Seed of the bootstrap.
+        Seed of the bootstrap, which draws n rows of the design with replacement.
 
     Returns
     -------
     Sensitivity or None
         None if a simulation has failed or the output is constant but for round-off.
     """
-    p = len(names)
-    n = len(values) // (p + 2)
-    if not np.isfinite(values).all() or np.ptp(values) <= CONSTANT_RTOL * np.abs(values).max():
+    runs = np.reshape(values, (len(names) + 2, -1))  # A, B, and A with each column of B.
+    if not np.isfinite(runs).all() or constant(runs[:2]):
         return None
-    a, b, mixed = values[:n], values[n : 2 * n], values[2 * n :].reshape(p, n)
-    found: Any = sobol_indices(
-        func={"f_A": a[None, :], "f_B": b[None, :], "f_AB": mixed[:, None, :]},
-        n=n, rng=np.random.default_rng(seed),
-    )  # fmt: skip
-    with warnings.catch_warnings():  # The indices of a parameter without effect have no spread.
-        warnings.simplefilter("ignore", RuntimeWarning)
-        spread: Any = found.bootstrap(confidence_level=CONFIDENCE, n_resamples=RESAMPLES)
-    indices, intervals = [], []
-    for index, x in (
-        (found.first_order, spread.first_order),
-        (found.total_order, spread.total_order),
-    ):
-        ends = np.stack([x.confidence_interval.low, x.confidence_interval.high], axis=-1)
-        indices.append(np.ravel(index))
-        intervals.append(np.where(np.isfinite(ends), ends, index[..., None]).reshape(p, 2))
-    return Sensitivity(tuple(names), *indices, *intervals)
+    rng, n = np.random.default_rng(seed), runs.shape[1]
+    resampled = [_indices(runs[:, rng.integers(n, size=n)]) for _ in range(RESAMPLES)]
+    tail = 0.5 * (1.0 - CONFIDENCE)
+    ends = np.nanquantile(resampled, (tail, 1.0 - tail), axis=0)
+    first, total = _indices(runs)
+    return Sensitivity(tuple(names), first, total, ends[:, 0].T, ends[:, 1].T)
+
+
+def _indices(runs: Real) -> Real:
+    """Return first-order and total indices, (2, p), from runs (p + 2, n) of Saltelli's design.
+
+    Estimators are those of Saltelli (2010), as in ``scipy.stats.sobol_indices``; NaN if A and B
+    have a single value.
+    """
+    a, b, mixed = runs[0], runs[1], runs[2:]
+    if constant(runs[:2]):
+        return np.full((2, len(mixed)), math.nan)
+    alone = np.mean((b - runs[:2].mean()) * (mixed - a), axis=1)
+    total = 0.5 * np.mean((mixed - a) ** 2, axis=1)
+    return np.stack([alone, total]) / runs[:2].var()
+
+
+def constant(x: Real) -> bool:
+    """Return whether values are equal but for round-off."""
+    return bool(np.ptp(x) <= CONSTANT_RTOL * np.abs(x).max())
