@@ -2,6 +2,7 @@
 
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -14,7 +15,7 @@ from prbm.sweeps.study import study
 class Endless:
     """A simulation that ends for the parameter 0 only."""
 
-    parallel = True
+    threads = 2
 
     def run(self, row):
         while row["a"]:
@@ -32,7 +33,7 @@ def test_an_error_ends_simulations_in_threads():
 
     def compute():
         with Runner(Endless(), ["a"], journal, 2, workers=2) as runner:
-            assert runner.run is not None
+            assert runner.here
             runner.outcomes([(0.0,), (1.0,)], stop)
 
     with pytest.raises(InterruptedError):
@@ -51,3 +52,25 @@ def test_threads_give_the_same_bits(mechanisms):
     ]  # fmt: skip
     assert found[0] == found[1]
     assert found[0][1][0][1] > 0
+
+
+@pytest.mark.slow
+def test_an_executor_has_as_many_simulations_at_a_time_as_workers(mechanisms):
+    """Its own number of threads is larger."""
+    pending, most = set(), []
+
+    class Counting(ThreadPoolExecutor):
+        def submit(self, *arguments):
+            future = super().submit(*arguments)
+            pending.add(future)
+            future.add_done_callback(pending.discard)
+            most.append(len(pending))
+            return future
+
+    with Counting(4) as executor:
+        found = study(
+            mechanisms["PRBDM"], {"stop.position": [0.0, 1e-3, 2e-3, 3e-3]}, ["impacts"],
+            stop_time=0.01, step=1e-3, workers=2, executor=executor,
+        )  # fmt: skip
+    assert not any(found.messages)
+    assert max(most) == 2

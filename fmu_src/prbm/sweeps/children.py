@@ -2,11 +2,10 @@
 
 A simulation may crash or hang, so it runs in a process of its own.  A crash costs only its run, its
 signal can be reported, and the executor survives.  The threads of ``concurrent.futures`` and the
-workers of Dask call the same function, :func:`run_batch`.
+workers of Dask call the same function, :func:`run_row`.
 """
 
 import contextlib
-import math
 import os
 import pickle
 import queue
@@ -16,7 +15,7 @@ import sys
 import tempfile
 import threading
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, field
 from typing import Any, BinaryIO
@@ -65,6 +64,15 @@ class Job:
     inputs: Mapping[str, Any] = field(default_factory=dict)
 
     @property
+    def threads(self) -> float:
+        """The number of threads of one process that may call ``run`` at a time: none."""
+        return 0
+
+    def run(self, row: Row) -> Outcome:
+        """Simulate once in this process."""
+        raise NotImplementedError
+
+    @property
     def settings(self) -> dict[str, Any]:
         """Times and tolerance, for the journal."""
         return {
@@ -90,36 +98,32 @@ class Job:
 
 
 def main() -> None:
-    """Run the rows; end this process at once, while its other thread waits for more."""
-    code = 1
-    try:
-        _run_rows()
-        code = 0
-    except BaseException:
-        traceback.print_exc()
-    finally:
-        sys.stderr.flush()
-        os._exit(code)
+    """Run the rows read from standard input and write the outcome of each; then end at once.
 
-
-def _run_rows() -> None:
-    """Run the rows read from standard input until it closes; write the outcome of each."""
+    An FMU may hang when its library is unloaded, and another thread waits for more rows.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     replies = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # Output of an FMU must not mix with the replies.
     received: queue.Queue[Any] = queue.Queue()
     threading.Thread(target=_read, args=(sys.stdin.buffer, received), daemon=True).start()
     try:
-        run = received.get()()
-    except Exception as error:
-        _send(replies, f"{error}" or type(error).__name__)
-        return
-    _send(replies, "")
-    spent = False
-    while not spent:  # An FMU may hang after an error when its library is unloaded.
-        outcome = run(received.get())
-        _send(replies, outcome)
-        spent = outcome.spent
+        try:
+            run = received.get()()
+        except Exception as error:
+            _send(replies, f"{error}" or type(error).__name__)
+            raise
+        _send(replies, "")
+        spent = False
+        while not spent:
+            outcome = run(received.get())
+            _send(replies, outcome)
+            spent = outcome.spent
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        sys.stderr.flush()
+        os._exit(1)
 
 
 def _read(stream: BinaryIO, received: "queue.Queue[Any]") -> None:
@@ -215,7 +219,7 @@ class Processes:
 
     def __init__(self, job: Job, retries: int, timeout: float | None) -> None:
         self.retries, self.timeout = retries, timeout
-        self.idle, self.all = list[Child](), set[Child]()
+        self.idle, self.busy = list[Child](), set[Child]()
         self.lock, self.stack, self.closed = threading.Lock(), ExitStack(), False
         self.task = self.stack.enter_context(job.placed())
 
@@ -231,58 +235,45 @@ class Processes:
             child = self._child()
             child.send(row)
             outcome: Outcome | None = child.receive(self.timeout)
-            if outcome is not None and not outcome.spent and self._keep(child):
-                return outcome
-            late, end = child.late, self._drop(child)
+            with self.lock:
+                self.busy.discard(child)
+                if outcome is not None and not outcome.spent and not self.closed:
+                    self.idle.append(child)
+                    return outcome
+            end = child.close()
             if self.closed:
                 raise Unusable(STOPPED)
             if outcome is not None:
                 return outcome
-            if late:
-                limit = self.timeout or math.inf
-                return Outcome(TIMEOUT, f"not finished after {limit:g} s", limit)
+            if child.late:
+                return Outcome(TIMEOUT, f"not finished after {self.timeout:g} s")
         times = f", in each of {self.retries + 1} attempts" if self.retries else ""
         return Outcome(CRASHED, f"the process of the simulation crashed: {end}{times}")
 
     def _child(self) -> Child:
-        """Return an idle process, or a new one."""
+        """Return an idle process, or a new one, which is busy from now on."""
         with self.lock:
             child = self.idle.pop() if self.idle else None
-        if child is not None and child.process.poll() is None:
-            child.stderr.truncate(0)
-            return child
-        if child is not None:  # It was killed while it had no work.
-            self._drop(child)
-        if not self.closed:
-            child = Child(self.task)
-            with self.lock:
-                self.all.add(child)
+        if child is not None and child.process.poll() is not None:
+            child.close()  # It was killed while it had no work.
+            child = None
+        child = child or Child(self.task)
+        child.stderr.truncate(0)
+        with self.lock:
+            self.busy.add(child)
             if not self.closed:
                 return child
-            self._drop(child)
+        child.close()
         raise Unusable(STOPPED)
-
-    def _keep(self, child: Child) -> bool:
-        """Keep a process for further runs, unless the study was stopped; return whether it was."""
-        with self.lock:
-            if not self.closed:
-                self.idle.append(child)
-            return not self.closed
-
-    def _drop(self, child: Child) -> str:
-        """End a process; return the text of :meth:`Child.close`."""
-        with self.lock:
-            self.all.discard(child)
-        return child.close()
 
     def close(self) -> None:
         """Kill all processes, even during a run, and remove the job from this machine."""
         with self.lock:
-            self.closed, children = True, list(self.all)
-            idle, self.idle = self.idle, []
-        for child in children:
+            self.closed, busy, idle = True, [*self.busy], [*self.idle]
+            self.idle.clear()
+        for child in busy + idle:
             child.process.kill()
-        for child in idle:  # The other processes are closed by the threads that wait for them.
+        for child in idle:  # The threads that wait for the other ones close them.
             child.close()
         self.stack.close()
 
@@ -291,21 +282,21 @@ _processes: dict[str, Processes] = {}  # By the name of the study.
 _lock = threading.Lock()
 
 
-def run_batch(study: str, rows: Sequence[Row], given: tuple[Any, ...] | None) -> Any:
-    """Simulate once for each row, in a thread of an executor.
+def run_row(study: str, row: Row, given: tuple[Any, ...] | None) -> Outcome | None:
+    """Simulate once, in a thread of an executor.
 
     Parameters
     ----------
     study : str
         Name of the study, unique among all machines.
-    rows : sequence of mapping
-        Parameters of each run.
+    row : mapping
+        Parameters of the run.
     given : tuple or None
         Arguments of :class:`Processes`, which a machine needs only once.
 
     Returns
     -------
-    list of Outcome or None
+    Outcome or None
         None if this machine needs the arguments.
 
     Raises
@@ -321,8 +312,8 @@ def run_batch(study: str, rows: Sequence[Row], given: tuple[Any, ...] | None) ->
                 _processes[study] = Processes(*given)
             except Exception as error:  # FMPy raises plain exceptions.
                 raise Unusable(f"a worker cannot unpack the FMU ({error})") from None
-    run = _processes[study].run
-    return [run(row) for row in rows]
+        processes = _processes[study]
+    return processes.run(row)
 
 
 def release(study: str) -> None:

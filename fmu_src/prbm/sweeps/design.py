@@ -213,7 +213,8 @@ def _indices(runs: Real) -> Real:
         return np.full((2, len(mixed)), math.nan)
     alone = np.mean((b - runs[:2].mean()) * (mixed - a), axis=1)
     total = 0.5 * np.mean((mixed - a) ** 2, axis=1)
-    return np.stack([alone, total]) / runs[:2].var()
+    indices: Real = np.stack([alone, total]) / runs[:2].var()
+    return indices
 
 
 def constant(x: Real) -> bool:

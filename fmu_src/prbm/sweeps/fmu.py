@@ -1,12 +1,10 @@
 """Runs of an FMU for a study, in a process of their own, which may crash (:mod:`.children`).
 
-The module imports only FMPy and NumPy, and so starts quickly.  The FMU is instantiated once and
-reset between runs if its reset works.  To check this, the second run is computed twice: after a
-reset and with a new instance.  Unless both agree to the last bit, every run gets a new instance.
+The module imports only FMPy and NumPy, and so starts quickly.  The library is loaded once.  Every
+run has a new instance, so that its result does not depend on the runs before.
 """
 
 import io
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from ctypes import c_uint
@@ -40,7 +38,6 @@ LAST_TIME, TERMINATED = 2, 3  # Values of fmi2StatusKind.
 TYPES_2 = {"Real": np.double, "Integer": np.intc, "Boolean": np.intc}
 """Types of the numbers of FMI 2.0; those of FMI 3.0 have the names of NumPy, or are Boolean."""
 MESSAGES_MAX = 5  # Most messages of the FMU in the message of a failed run.
-LOGGED_MAX = 100  # More messages in a run switch logging off for the next runs.
 
 
 # --- one run ------------------------------------------------------------------------------------
@@ -52,13 +49,10 @@ class FmuJob(Job):
 
     Parameters
     ----------
-    reuse : bool
-        Reset the instance between runs if its reset works (default: True).
     content : bytes
         The FMU.
     """
 
-    reuse: bool = True
     content: bytes = field(default=b"", repr=False)
 
     @property
@@ -124,11 +118,6 @@ class Runner:
     job : FmuJob
         Settings of the runs.
 
-    Attributes
-    ----------
-    resets : bool or None
-        The FMU's reset works; None until the second run has shown it.
-
     Raises
     ------
     Exception
@@ -142,15 +131,13 @@ class Runner:
         self.two = self.description.fmiVersion.startswith("2")
         variables = self.description.modelVariables
         self.events = not self.two and any(v.type == "Clock" for v in variables)
-        self.resets: bool | None = None if job.reuse else False
-        self.used, self.logging, self.logged = False, True, 0
         self.points = communication_points(job.start, job.stop, job.step)
         self.fmu = instantiate_fmu(
             str(folder),
             self.description,
             "CoSimulation",
             event_mode_used=self.events,
-            debug_logging=self.logging,
+            debug_logging=True,
             logger=self._log,
             require_functions=False,
         )
@@ -171,37 +158,30 @@ class Runner:
             for at_end in (False, True)
         )
 
-    def run(self, values: Mapping[str, float]) -> Outcome:
+    def run(self, row: Row) -> Outcome:
         """Run once with start values; errors are returned as outcomes, not raised."""
-        if not (self.used and self.resets is None):
-            return self._once(values)
-        after_reset = self._once(values)
-        if after_reset.spent:
-            return after_reset
-        fresh = self._once(values, renew=True)
-        if fresh.status == OK:
-            self.resets = _bits(after_reset) == _bits(fresh)
-        return fresh
-
-    def _once(self, values: Mapping[str, float], renew: bool = False) -> Outcome:
-        begin = time.perf_counter()
+        self.messages.clear()
+        fatal = False
         try:
-            self._prepare(renew)
-            status, message, found = self._simulate(*self._driven(values))
-            return Outcome(status, message, time.perf_counter() - begin, found)
+            status, message, values = self._simulate(*self._driven(row))
         except Exception as error:
-            seconds, message = time.perf_counter() - begin, self._reason(error)
-            return Outcome(FAILED, message, seconds, spent=not self._recovers(error))
+            status, message, values = FAILED, self._reason(error), ()
+            fatal = isinstance(error, FMICallException) and error.status == FATAL
+        return Outcome(status, message, values, spent=fatal or not self._renewed())
 
-    def _recovers(self, error: Exception) -> bool:
-        """Replace the instance after an error, since a reset may not clear it; return success."""
-        if isinstance(error, FMICallException) and error.status == FATAL:
-            return False
+    def _renewed(self) -> bool:
+        """Replace the instance, while the library stays loaded; return success."""
         try:
-            self._instantiate()
-        except Exception:
+            if self.two:
+                self.fmu.fmi2FreeInstance(self.fmu.component)
+                self.fmu.instantiate(callbacks=self.fmu.callbacks, loggingOn=True)
+            else:
+                self.fmu.fmi3FreeInstance(self.fmu.component)
+                self.fmu.instantiate(
+                    eventModeUsed=self.events, logMessage=self._log, loggingOn=True
+                )
+        except Exception:  # FMPy raises plain exceptions.
             return False
-        self.used = False
         return True
 
     def _reason(self, error: Exception) -> str:
@@ -213,34 +193,9 @@ class Runner:
     def _log(self, *arguments: Any) -> None:
         """Keep a message; in FMI 2.0, the name of the instance is before its status."""
         status, _, text = arguments[-3:]
-        self.logged += 1
         if status > 0:
             self.messages.append((status, (text or b"").decode(errors="replace").strip()))
             del self.messages[: -10 * MESSAGES_MAX]
-
-    def _prepare(self, renew: bool) -> None:
-        """Reset or replace the instance if it was used before."""
-        verbose = self.logging and self.logged > LOGGED_MAX
-        self.logging, self.logged = self.logging and not verbose, 0
-        self.messages.clear()
-        if self.used or renew:
-            if self.resets is False or renew or verbose:
-                self._instantiate()
-            else:
-                self.fmu.reset()
-        self.used = True
-
-    def _instantiate(self) -> None:
-        """Replace the instance; the library stays loaded."""
-        prefix = "fmi2" if self.two else "fmi3"
-        getattr(self.fmu, f"{prefix}FreeInstance")(self.fmu.component)
-        self.fmu.component = None
-        if self.two:
-            self.fmu.instantiate(callbacks=self.fmu.callbacks, loggingOn=self.logging)
-        else:
-            self.fmu.instantiate(
-                eventModeUsed=self.events, logMessage=self._log, loggingOn=self.logging
-            )
 
     def _driven(self, row: Row) -> tuple[dict[str, float], "Driver | None"]:
         """Return the start values of a run, and the driver of its inputs over time."""
@@ -370,8 +325,3 @@ class _Recorder:
     def columns(self, rows: Sequence[Sequence[float]]) -> dict[str, NDArray[np.float64]]:
         """Return the columns of rows of :meth:`read` by the names of the variables."""
         return dict(zip(self.names, np.array(rows, np.float64).T, strict=True))
-
-
-def _bits(outcome: Outcome) -> tuple[str, bytes]:
-    """Return status and bytes of the values, to compare two outcomes to the last bit."""
-    return outcome.status, np.array(outcome.values).tobytes()

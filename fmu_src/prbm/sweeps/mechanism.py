@@ -1,11 +1,11 @@
 """A mechanism as the model of a study: simulations without an FMU."""
 
 import hashlib
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, partial
-from time import perf_counter
 from typing import Any
 
 from ..analysis.static_shape import equilibrium
@@ -144,9 +144,9 @@ class MechanismJob(Job):
         return {**super().settings, "engine": self.engine}
 
     @property
-    def parallel(self) -> bool:
-        """Whether the engine lets other threads work meanwhile, as the kernel does."""
-        return self.engine != PYTHON
+    def threads(self) -> float:
+        """One thread if the engine is Python, any number if it lets them work in parallel."""
+        return 1 if self.engine == PYTHON else math.inf
 
     @contextmanager
     def placed(self) -> Iterator[Task]:
@@ -155,12 +155,10 @@ class MechanismJob(Job):
 
     def run(self, row: Row) -> Outcome:
         """Simulate once; errors of the simulation are returned as outcomes."""
-        begin = perf_counter()
         try:
-            found = self._values(row)
+            return Outcome(OK, values=self._values(row))
         except PrbmError as error:
-            return Outcome(FAILED, str(error), perf_counter() - begin)
-        return Outcome(OK, "", perf_counter() - begin, found)
+            return Outcome(FAILED, str(error))
 
     def _values(self, row: Row) -> tuple[float, ...]:
         """Return the outputs."""

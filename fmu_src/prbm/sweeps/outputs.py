@@ -5,7 +5,7 @@ The module imports NumPy only, and so starts quickly.
 
 import re
 from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import nan
 from typing import Any
 
@@ -381,13 +381,11 @@ def reduce(output: Output, t: Real, x: Real) -> float:
 class Outcome:
     """The result of a run.
 
-    ``values`` are the outputs in the order of the job, empty for a failed run.  ``seconds`` is the
-    duration of the computation, which does not count when outcomes are compared.  ``spent``: the
+    ``values`` are the outputs in the order of the job, empty for a failed run.  ``spent``: the
     process must not be used for further runs.
     """
 
     status: str
     message: str = ""
-    seconds: float = field(default=nan, compare=False)
     values: tuple[float, ...] = ()
     spent: bool = False

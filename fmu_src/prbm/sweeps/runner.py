@@ -9,37 +9,25 @@ the journal, so that an interrupted study continues from there.
 
 import ctypes
 import math
+import queue
 import threading
 import time
 import uuid
-from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    BrokenExecutor,
-    CancelledError,
-    Executor,
-    Future,
-    ThreadPoolExecutor,
-    wait,
-)
+from collections import Counter, deque
+from collections.abc import Iterator, Sequence
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import replace
-from statistics import median
 from typing import Any, Self
 
 from ..base.errors import ParameterError, PrbmError
 from ..base.processes import process_count
 from ..base.progress import Progress
-from .children import Job, Row, Unusable, release, run_batch
+from .children import Job, Row, Unusable, release, run_row
 from .journal import Journal, Point
 from .outputs import CRASHED, Outcome
 
-BATCH_MIN, BATCH_MAX = 1.0, 30.0  # Limits of the duration of a batch [s].
-BATCH_SHARE = 0.02  # Duration of a batch, as a share of the time so far.
-BATCHES_PER_THREAD = 2  # Batches submitted per thread, so that no thread waits for work.
-RESET_RUNS_MIN = 20  # Runs per process from which on a check of an FMU's reset pays off.
-RECENT_RUNS = 50  # Runs whose median duration determines the size of the next batch.
+ROWS_PER_THREAD = 8  # Rows submitted per thread, so that no thread waits for work.
+ASKING_INTERVAL = 1.0  # Time after which a cluster is asked again for its threads [s].
 CONNECTION_TIMEOUT = 10.0  # Longest wait for a scheduler and its workers [s].
 MISSING_MODULE = "No module named"  # Python's message for a package that is not installed.
 
@@ -50,15 +38,6 @@ class StudyError(PrbmError, RuntimeError):
 
 class Stopped(BaseException):
     """Raised in a thread that simulates when the study ends before the simulation."""
-
-
-def _check_limits(workers: int | None, timeout: float | None, retries: int) -> None:
-    if workers is not None and workers < 1:
-        raise ParameterError(f"workers = {workers} must be 1 or more")
-    if timeout is not None and not timeout > 0.0:
-        raise ParameterError(f"timeout = {timeout:g} s must be positive")
-    if retries < 0:
-        raise ParameterError(f"retries = {retries} must be 0 or more")
 
 
 @contextmanager
@@ -94,8 +73,7 @@ class Runner:
     Parameters
     ----------
     job : Job
-        The simulation.  If it has ``run``, rows may be computed in this process, where they cannot
-        be ended: in this thread for one worker, in several ones if it has ``parallel``.
+        The simulation.
     parameters : sequence of str
         Names of the numbers of a point.
     journal : Journal
@@ -125,39 +103,49 @@ class Runner:
         retries: int = 1,
         timeout: float | None = None,
     ) -> None:
-        _check_limits(workers, timeout, retries)
+        if workers is not None and workers < 1:
+            raise ParameterError(f"workers = {workers} must be 1 or more")
+        if timeout is not None and not timeout > 0.0:
+            raise ParameterError(f"timeout = {timeout:g} s must be positive")
+        if retries < 0:
+            raise ParameterError(f"retries = {retries} must be 0 or more")
         self.job, self.parameters, self.journal = job, parameters, journal
         self.retries, self.timeout = retries, timeout
         self.study, self.stack, self.stopped = uuid.uuid4().hex, ExitStack(), False
-        self.run: Callable[[Row], Outcome] | None = None  # If threads simulate themselves.
-        self.busy: set[int] = set()  # These threads.
-        self.closing: Callable[[str], object] = release
-        count = process_count(max(runs, 1), workers)
-        if hasattr(job, "reuse"):  # The check of a reset doubles the duration of a run.
-            many = runs >= RESET_RUNS_MIN * count
-            self.job = replace(job, reuse=many and timeout is None)  # type: ignore[call-arg]
-        self.executor: Executor | None = None
-        if isinstance(executor, str):
-            self.executor = self.stack.enter_context(_client(executor)).get_executor(pure=False)
-        elif executor is not None:
-            self.executor = executor
-            count = workers or getattr(executor, "_max_workers", None) or count
+        self.count = process_count(max(runs, 1), workers)  # Of parallel runs.
+        self.here = executor is None and timeout is None and self.count <= job.threads
+        self.ahead = ROWS_PER_THREAD if executor is None or workers is None else 1
+        self.executor: Executor
+        if executor is None:
+            self.executor = ThreadPoolExecutor(self.count)
+            self.stack.callback(self.executor.shutdown, cancel_futures=True)
+        elif isinstance(executor, str):
+            client = self.stack.enter_context(_client(executor))
+            self.executor = client.get_executor(pure=False)
         else:
-            if timeout is None and (count == 1 or getattr(job, "parallel", False)):
-                self.run = getattr(job, "run", None)
-            if count > 1 or self.run is None:
-                self.executor = threads = ThreadPoolExecutor(count)
-                self.stack.callback(threads.shutdown, cancel_futures=True)
-        self.threads: Callable[[], int] = lambda: count  # The present number of parallel runs.
-        client: Any = getattr(self.executor, "_client", None)  # Of Dask's ClientExecutor.
-        if client is not None:
-            self.closing = lambda study: client.run(release, study)
-            self.threads = lambda: workers or max(1, sum(client.nthreads().values()))
-        self.begin = time.monotonic()
-        self.recent: deque[float] = deque(maxlen=RECENT_RUNS)
-        self.running: dict[Future[Any], list[Point]] = {}
-        self.crashes: dict[Point, int] = {}  # Crashes of workers that ran a point.
+            self.executor = executor
+            self.count = workers or getattr(executor, "_max_workers", None) or self.count
+        self.client: Any = getattr(self.executor, "_client", None)  # Of Dask's ClientExecutor.
+        self.elastic, self.asked = self.client is not None and workers is None, -math.inf
+        self.busy: set[int] = set()  # Threads that simulate.
+        self.running, self.done = dict[Future[Any], Point](), queue.SimpleQueue[Future[Any]]()
+        self.crashes = Counter[Point]()  # Crashes of workers that ran a point.
         self.suspects: deque[Point] = deque()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self.stopped = True
+        for thread in [*self.busy]:  # After an error or Ctrl-C.
+            ctypes.pythonapi.PyThreadState_SetAsyncExc(
+                ctypes.c_ulong(thread), ctypes.py_object(Stopped)
+            )
+        with suppress(OSError, CancelledError):  # The scheduler may have ended.
+            release(self.study) if self.client is None else self.client.run(release, self.study)
+        self.stack.close()
+        if kind is KeyboardInterrupt and self.journal.kept:
+            raise KeyboardInterrupt(f"interrupted; {self.journal.kept}") from None
 
     def outcomes(self, points: Sequence[Point], progress: Progress | None = None) -> list[Outcome]:
         """Return the outcomes of points in their order; only those not in the journal are computed.
@@ -172,87 +160,59 @@ class Runner:
         done, total = len(points) - len(rest), max(len(points), 1)
         report = progress or (lambda fraction: None)
         report(done / total)
-        for k, (point, outcome) in enumerate(self._computed(rest), done + 1):
+        for k, (point, outcome) in enumerate(self._computed(deque(rest)), done + 1):
             self.journal.add(point, outcome)
             report(k / total)
         return [known[point] for point in points]
 
-    def __enter__(self) -> Self:
-        return self
+    def threads(self) -> int:
+        """Return the present number of parallel runs."""
+        if self.elastic and time.monotonic() > self.asked + ASKING_INTERVAL:
+            self.asked = time.monotonic()
+            self.count = max(1, sum(self.client.nthreads().values()))
+        return self.count
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        self.stopped = True
-        for thread in [*self.busy]:  # After an error or Ctrl-C.
-            ctypes.pythonapi.PyThreadState_SetAsyncExc(
-                ctypes.c_ulong(thread), ctypes.py_object(Stopped)
-            )
-        with suppress(OSError, CancelledError):  # The scheduler may have ended.
-            self.closing(self.study)
-        self.stack.close()
-        if kind is KeyboardInterrupt and self.journal.kept:
-            raise KeyboardInterrupt(f"interrupted; {self.journal.kept}") from None
+    def _computed(self, rest: deque[Point]) -> Iterator[tuple[Point, Outcome]]:
+        """Yield points with their outcomes as they come."""
+        while rest or self.suspects or self.running:
+            while rest and len(self.running) < self.ahead * self.threads():
+                self._send(rest.popleft())
+            if not self.running:
+                self._send(self.suspects.popleft())
+            try:
+                future = self.done.get(timeout=ASKING_INTERVAL)
+            except queue.Empty:
+                continue
+            point = self.running.pop(future)
+            outcome = self._outcome(future, point)
+            if outcome is not None:
+                yield point, outcome
 
-    def _run_here(self, batch: Sequence[Point]) -> list[Outcome]:
+    def _send(self, point: Point, given: bool = False) -> None:
+        row: Row = dict(zip(self.parameters, point, strict=True))
+        if self.here:
+            future = self.executor.submit(self._run_here, row)
+        else:
+            job = (self.job, self.retries, self.timeout) if given else None
+            future = self.executor.submit(run_row, self.study, row, job)
+        self.running[future] = point
+        future.add_done_callback(self.done.put)
+
+    def _run_here(self, row: Row) -> Outcome | None:
         """Simulate in this thread, until the study ends."""
-        assert self.run is not None
         thread = threading.get_ident()
         self.busy.add(thread)
         try:
-            return [self.run(self._row(point)) for point in batch if not self.stopped]
+            return None if self.stopped else self.job.run(row)
         except Stopped:
-            return []
+            return None
         finally:
             self.busy.discard(thread)
 
-    def _computed(self, points: Sequence[Point]) -> Iterator[tuple[Point, Outcome]]:
-        """Yield points with their outcomes as they come."""
-        if self.executor is None:
-            for point in points:
-                yield point, self._run_here([point])[0]
-            return
-        rest = deque(points)
-        self._submit(rest)
-        while self.running:
-            for future in wait(self.running, return_when=FIRST_COMPLETED).done:
-                batch = self.running.pop(future)
-                outcomes = self._outcomes(future, batch)
-                self.recent.extend(x.seconds for x in outcomes if x.seconds > 0.0)
-                yield from zip(batch, outcomes, strict=False)
-            self._submit(rest)
-            if self.suspects and not self.running:
-                self._send([self.suspects.popleft()])
-
-    def _submit(self, rest: deque[Point]) -> None:
-        """Submit batches until there are :data:`BATCHES_PER_THREAD` per thread.
-
-        They are small at the start and at the end.
-        """
-        threads = self.threads()
-        while rest and len(self.running) < BATCHES_PER_THREAD * threads:
-            size = 1
-            if self.recent:
-                elapsed = time.monotonic() - self.begin
-                seconds = min(max(BATCH_SHARE * elapsed, BATCH_MIN), BATCH_MAX)
-                fair = math.ceil(len(rest) / (BATCHES_PER_THREAD * threads))
-                size = max(1, min(int(seconds / median(self.recent)), fair))
-            self._send([rest.popleft() for _ in range(size)])
-
-    def _send(self, batch: list[Point], given: bool = False) -> None:
-        assert self.executor is not None
-        if self.run is not None:
-            future = self.executor.submit(self._run_here, batch)
-        else:
-            job = (self.job, self.retries, self.timeout) if given else None
-            future = self.executor.submit(run_batch, self.study, [*map(self._row, batch)], job)
-        self.running[future] = batch
-
-    def _row(self, point: Point) -> Row:
-        return dict(zip(self.parameters, point, strict=True))
-
-    def _outcomes(self, future: "Future[Any]", batch: list[Point]) -> list[Outcome]:
-        """Return the outcomes of a batch; none if it has to be repeated."""
+    def _outcome(self, future: "Future[Any]", point: Point) -> Outcome | None:
+        """Return the outcome of a point; None if it has to be repeated."""
         try:
-            outcomes: list[Outcome] | None = future.result()
+            outcome: Outcome | None = future.result()
         except Unusable as error:
             raise StudyError(f"the simulation cannot run: {error}") from None
         except CancelledError:
@@ -262,27 +222,25 @@ class Runner:
             raise StudyError(f"a process of the executor has ended early; {kept}") from None
         except Exception as error:
             if type(error).__name__ == "KilledWorker":  # Of Dask, which may not be installed.
-                return self._after_crash(batch)
+                return self._after_crash(point)
             if MISSING_MODULE in str(error):
                 raise StudyError(
                     "a worker cannot import prbm; install it there: "
                     'python -m pip install "prbm-impact[sweep]"'
                 ) from None
             raise
-        if outcomes is None:
-            self._send(batch, given=True)
-            return []
-        return outcomes
+        if outcome is None:  # The machine needs the job.
+            self._send(point, given=True)
+        return outcome
 
-    def _after_crash(self, batch: list[Point]) -> list[Outcome]:
-        """Return the outcome of a point whose workers crashed too often; otherwise repeat.
+    def _after_crash(self, point: Point) -> Outcome | None:
+        """Return the outcome of a point whose workers crashed too often; otherwise repeat it.
 
         A crashed worker loses all of its points, not only the one that caused the crash.  At the
-        end these points are repeated one by one, with no other batch submitted, to find the cause.
+        end these points are repeated one by one, with no other one submitted, to find the cause.
         """
-        for point in batch:
-            self.crashes[point] = self.crashes.get(point, -1) + 1
-        if self.crashes[batch[0]] > self.retries:
-            return [Outcome(CRASHED, "every worker that ran this row crashed")]
-        self.suspects.extend(batch)
-        return []
+        self.crashes[point] += 1
+        if self.crashes[point] > self.retries + 1:
+            return Outcome(CRASHED, "every worker that ran this row crashed")
+        self.suspects.append(point)
+        return None

@@ -271,8 +271,9 @@ def computed(
         Runner(plan.job, plan.columns, journal, len(rows), **limits) as runner,
         journal.opened(overwrite, retry_failed),
     ):
-        for name, source in plan.job.inputs.items() if runner.executor is not None else ():
-            if callable(source) and not isinstance(source, Signal):
+        alone = runner.here and runner.count == 1
+        for name, source in plan.job.inputs.items():
+            if callable(source) and not isinstance(source, Signal) and not alone:
                 raise ParameterError(
                     f"{name}: a function cannot be called by several workers; give a text or "
                     "arrays, or workers=1"
