@@ -204,6 +204,12 @@ def test_failed_simulations_are_not_good_ones(mechanisms):
     assert found.share.good == 16 - failed
 
 
+def test_a_count_of_samples_is_refused_for_drawn_values(capsys):
+    words = "study PRBDM --vary stop.position=0:1mm:3 --runs 4 --of impacts"
+    assert main(words.split()) == 2
+    assert "COUNT is that of a grid, and --runs draws values" in capsys.readouterr().err
+
+
 # --- lists ----------------------------------------------------------------------------------------
 
 
@@ -268,6 +274,7 @@ MISTAKES = [
     ({"runs": 4, "vary": {"stop.position": "+- 2 kg"}}, "another dimension"),
     ({"runs": 4, "vary": {"stop.position": "+- 2 %"}}, "the value 0 has no width"),
     ({"runs": 4, "vary": {"stop.position": [0.0, 1.0, 2.0]}}, r"give a range \(low, high\)"),
+    ({"method": "sensitivity"}, r"draws its simulations; give runs \(--runs\)"),
     ({"runs": 3}, "Sobol's sequence needs a power of two"),
     ({"runs": 4, "method": "halton"}, "unknown method 'halton'"),
     ({"subject_to": ["impacts"]}, 'write it as in "fundamental > 40 Hz"'),

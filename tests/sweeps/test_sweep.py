@@ -499,8 +499,8 @@ def test_a_missing_scheduler_or_worker_is_reported(mishap, log, monkeypatch):
 TABLES = {
     "an unknown parameter": ({"stop.restituton": [0.5]}, "no variable 'stop.restituton'; did you "
                              "mean stop.restitution"),
-    "an output": ({"shuttle.x": [0.5]}, "shuttle.x (output variable of type Real) cannot be set by "
-                  "a table"),
+    "an output": ({"shuttle.x": [0.5]}, "shuttle.x (output variable of type Real) cannot be set "
+                  "before a run"),
     "NaN": ({"stop.offset": [0.0, np.nan]}, "row 1 of the table: stop.offset = nan must be a "
             "finite number"),
     "infinity": ({"stop.offset": [np.inf]}, "row 0 of the table: stop.offset = inf must"),
@@ -747,7 +747,7 @@ def test_random_samples_follow_their_distribution_and_seed():
         (({"a": stats.norm(0.0, -1.0)}, 5), "a: the quantiles of the distribution must be"),
         (
             ({"a": (0.0, 1.0)}, 5, 0, "sobol"),
-            "n = 5: Sobol's sequence needs a power of two, such as 4",
+            "5 rows: Sobol's sequence needs a power of two, such as 4",
         ),
         (({"a": (0.0, 1.0)}, 5, 0, "halton"), "unknown method 'halton'; methods are random"),
     ],

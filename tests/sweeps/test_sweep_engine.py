@@ -82,10 +82,22 @@ def test_the_optimum_and_the_yield_of_an_fmu_are_those_of_its_mechanism(native, 
 
 
 def test_outputs_of_a_mechanism_alone_are_no_outputs_of_an_fmu(native):
-    with pytest.raises(PrbmError, match="output fundamental: needs a mechanism"):
-        study(native["PRBDM", 2], {"stop.position": [0.0, 1e-3]}, ["fundamental"])
+    varied = {"stop.position": [0.0, 1e-3]}
+    with pytest.raises(PrbmError, match=r"FILE\.toml, or take the variable mode\.frequency"):
+        study(native["PRBDM", 2], varied, ["fundamental"])
+    with pytest.raises(PrbmError, match=r"rest\(shuttle\.x\): needs a mechanism.*FILE\.toml$"):
+        study(native["PRBDM", 2], varied, ["rest(shuttle.x)"])
     with pytest.raises(PrbmError, match="an FMU has its own"):
-        study(native["PRBDM", 2], {"stop.position": [0.0, 1e-3]}, ["shuttle.x"], engine="python")
+        study(native["PRBDM", 2], varied, ["shuttle.x"], engine="python")
+
+
+@pytest.mark.parametrize("name", ["PRBDM", "guide.toml"])
+def test_a_mechanism_in_place_of_an_fmu_is_referred_to_the_command_for_mechanisms(capsys, name):
+    assert main(["sweep", name, "table.csv"]) == 2
+    assert f"{name} is no FMU" in (printed := capsys.readouterr().err)
+    assert "the command prbm study" in printed
+    with pytest.raises(PrbmError, match=r"prbm\.study\(prbm\.load\(NAME\), \.\.\.\)"):
+        study(name, {"stop.position": [0.0, 1e-3]}, ["impacts"])
 
 
 @pytest.mark.slow

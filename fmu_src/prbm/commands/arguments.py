@@ -204,17 +204,23 @@ def sweep_arguments(parser: ArgumentParser) -> None:
         "--tolerance", metavar="X",
         help="relative tolerance of the integration (default: that of the FMU)",
     )  # fmt: skip
+    _runner_arguments(parser)
+
+
+def _runner_arguments(parser: ArgumentParser) -> None:
+    """Add the arguments of a study on which its results do not depend."""
+    add = parser.add_argument
     add("--workers", type=int, metavar="N", help="number of parallel runs (default: one per core)")
     add(
         "--scheduler", metavar="ADDRESS",
-        help="Dask scheduler that runs the sweep, e.g. tcp://host:8786 (default: this machine)",
+        help="Dask scheduler that runs them, e.g. tcp://host:8786 (default: this machine)",
     )  # fmt: skip
     add(
         "--retries", type=int, default=1, metavar="N",
         help="number of repetitions of a run that crashed (default: %(default)s)",
     )  # fmt: skip
     add("--timeout", metavar="T", help="longest duration of a run [s] (default: no limit)")
-    add("--overwrite", action="store_true", help="delete earlier results")
+    add("--overwrite", action="store_true", help="forget the rows of an earlier study")
     add("--retry-failed", action="store_true", help="repeat runs that failed earlier")
 
 
@@ -260,13 +266,7 @@ def study_arguments(parser: ArgumentParser) -> None:
         "--tolerance", metavar="X",
         help="relative tolerance of the integration (default: solver.tolerance)",
     )  # fmt: skip
-    add("--workers", type=int, metavar="N", help="number of parallel runs (default: one per core)")
-    add(
-        "--scheduler", metavar="ADDRESS",
-        help="Dask scheduler that runs the simulations, e.g. tcp://host:8786",
-    )  # fmt: skip
-    add("--timeout", metavar="T", help="longest duration of a simulation [s] (default: no limit)")
-    add("--overwrite", action="store_true", help="forget the rows of an interrupted study")
+    _runner_arguments(parser)
 
 
 def stop_time_argument(parser: ArgumentParser) -> None:

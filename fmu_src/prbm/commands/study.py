@@ -104,7 +104,7 @@ def run_sweep(options: argparse.Namespace) -> None:
     found = sweep(
         options.fmu, options.table, options.out, outputs=options.output, values=values,
         inputs=given_inputs(options), **times(options), **_limits(options),
-        scheduler=options.scheduler, retries=options.retries, retry_failed=options.retry_failed,
+        scheduler=options.scheduler,
     )  # fmt: skip
     print(summary(found, options.out))
 
@@ -113,7 +113,8 @@ def _limits(options: argparse.Namespace) -> dict[str, Any]:
     """Return the arguments of a study that its results do not depend on."""
     timeout = optional_quantity(options.timeout, "s", "--timeout")
     return {
-        "workers": options.workers, "timeout": timeout, "overwrite": options.overwrite,
+        "workers": options.workers, "retries": options.retries, "timeout": timeout,
+        "overwrite": options.overwrite, "retry_failed": options.retry_failed,
         "progress": reporter(),
     }  # fmt: skip
 
@@ -188,6 +189,11 @@ def _varied(units: Mapping[str, str], texts: Sequence[str], drawn: bool) -> dict
             found[name] = text
             continue
         parts = [part.strip() for part in text.split(":")]
+        if drawn and len(parts) == 3:
+            raise UserMistake(
+                f"{option}{text}: COUNT is that of a grid, and --runs draws values from LOW:HIGH; "
+                "omit one of them"
+            )
         if drawn and len(parts) == 2:
             parts.append("2")
         elif len(parts) != 3 or not re.fullmatch(r"\d{1,6}", parts[2]) or int(parts[2]) < 2:

@@ -51,7 +51,7 @@ def drawn(distributions: Mapping[str, Any], n: int, seed: int, method: str) -> R
     """
     d = len(distributions)
     if not distributions or n < 1:
-        raise ParameterError(f"n = {n} rows of {d} parameters: draw at least one of each")
+        raise ParameterError(f"{n} rows of {d} parameters: draw at least one of each")
     unit = np.clip(_unit(n, d, seed, method), PROBABILITY_MIN, 1.0 - PROBABILITY_MIN)
     columns = [_quantiles(*item, u) for item, u in zip(distributions.items(), unit.T, strict=True)]
     return np.column_stack(columns)
@@ -68,7 +68,10 @@ def _unit(n: int, d: int, seed: int, method: str) -> Real:
         raise ParameterError(f"unknown method {method!r}; methods are {every}")
     if n & (n - 1):
         near = 2 ** round(math.log2(n))
-        raise ParameterError(f"n = {n}: Sobol's sequence needs a power of two, such as {near}")
+        other = ", or the method latin" * (method == "sobol")
+        raise ParameterError(
+            f"{n} rows: Sobol's sequence needs a power of two, such as {near}{other}"
+        )
     if method == "sobol":
         return np.asarray(qmc.Sobol(d, seed=seed).random(n))
     if d < 2:

@@ -21,7 +21,9 @@ from ..files.settings import in_unit
 from ..mechanism.parameters import Tolerance
 from ..runs.inputs import driving, filled
 from ..runs.run import ROWS_MAX, check_duration
+from ..runs.quantities import FREQUENCY
 from .fmu import FmuJob, input_units, unit
+from .outputs import FUNDAMENTAL, Output
 from .runner import StudyError
 from .table import BITS, number
 
@@ -38,6 +40,11 @@ def read_fmu(path: Path) -> tuple[bytes, Any]:
     StudyError
         If it cannot be read, or has no co-simulation of FMI 2.0 or 3.0.
     """
+    if path.suffix.lower() != ".fmu" and (path.suffix == ".toml" or not path.exists()):
+        raise StudyError(
+            f"{path} is no FMU; give the path of one, FILE.fmu; the command prbm study and "
+            "prbm.study(prbm.load(NAME), ...) simulate a mechanism"
+        )
     data = reading.content(path, UNPACKED_SIZE_MAX, StudyError)
     try:
         check_unpacked_size(io.BytesIO(data))
@@ -62,7 +69,6 @@ class FmuModel:
         If it cannot be read, or has no co-simulation of FMI 2.0 or 3.0.
     """
 
-    owner, static = "the FMU", False
     tolerances: Mapping[str, Tolerance] = {}
 
     def __init__(self, path: str | Path) -> None:
@@ -89,6 +95,22 @@ class FmuModel:
         """Return the FMU, which has the same variables for all outputs."""
         return self
 
+    def check(self, output: Output) -> None:
+        """Reject an output that cannot be computed."""
+        if output.static:
+            same = output.variable == FUNDAMENTAL and FREQUENCY in self.units
+            raise ParameterError(
+                f"output {output.column}: needs a mechanism, and not an FMU of it; study the file "
+                "of the mechanism, FILE.toml" + f", or take the variable {FREQUENCY}" * same
+            )
+        output.check(self.units, "the FMU")
+        for name in output.variables(self.units):
+            if (kind := self.types.get(name, "")) and kind not in BITS:
+                raise ParameterError(
+                    f"output {output.column}: {name} is of type {kind}, not one number; leave it "
+                    "out"
+                )
+
     def refusal(self, name: str) -> str:
         """Return why a variable cannot be set before a run."""
         hint = proposal(name, self.values)
@@ -98,7 +120,7 @@ class FmuModel:
             return f"the FMU has no variable {name!r}; {hint}"
         kind, causality = self.variables[name].type, self.variables[name].causality or "local"
         kind = f"{causality} variable of type {self.types.get(name, kind)}"
-        return f"{name} ({kind}) cannot be set by a table; {hint}"
+        return f"{name} ({kind}) cannot be set before a run; {hint}"
 
     def fixed(self, values: Mapping[str, float | str] | None) -> dict[str, float]:
         """Return start values of all runs in the units of the FMU.

@@ -26,7 +26,7 @@ from ..runs.experiment import experiment
 from ..runs.inputs import Source, filled, signals
 from ..runs.run import communication_points, sampled, simulate
 from .children import Job, Row, Task
-from .outputs import FAILED, OK, Outcome, evaluate, parse_output
+from .outputs import FAILED, OK, Outcome, Output, evaluate, parse_output
 
 STEPS = 4000  # Communication steps of a simulation, which resolve the vibration after impacts.
 
@@ -34,7 +34,6 @@ STEPS = 4000  # Communication steps of a simulation, which resolve the vibration
 class MechanismModel:
     """A mechanism, a :class:`prbm.sweeps.plan.Model`."""
 
-    owner, static = "the mechanism", True  # For messages; whether it has positions at rest.
     outputs: tuple[str, ...] = ()
     types: Mapping[str, str] = {}  # Of variables that are no floating-point numbers.
 
@@ -66,6 +65,10 @@ class MechanismModel:
         every = stressed.units
         needed = {name for text in outputs for name in parse_output(text, every).variables(every)}
         return stressed if needed & (every.keys() - self.units.keys()) else self
+
+    def check(self, output: Output) -> None:
+        """Reject an output that cannot be computed."""
+        output.check(self.units, "the mechanism")
 
     def refusal(self, name: str) -> str:
         """Return why a variable cannot be set: it is unknown."""

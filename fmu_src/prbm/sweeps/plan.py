@@ -20,7 +20,7 @@ from .design import SENSITIVITY, distribution, drawn
 from .journal import Point
 from .mechanism import MechanismModel
 from .outputs import Constraint, parse_output
-from .table import BITS, check_type, numbers, read_table
+from .table import check_type, numbers, read_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -62,10 +62,8 @@ class Plan:
         Conditions on outputs.
     units : dict
         Units of the parameters and outputs.
-    spread : dict
-        Tolerances around an optimum.
-    beside : dict
-        Values of the parameters with a tolerance that are not varied.
+    spread, beside : dict
+        Tolerances around an optimum, and the values of those parameters that are not varied.
 
     Raises
     ------
@@ -92,6 +90,8 @@ class Plan:
     ) -> None:
         if minimise is not None and maximise is not None:
             raise ParameterError("minimise and maximise are both given; omit one of them")
+        if runs is None and method == SENSITIVITY:
+            raise ParameterError(f"the method {method} draws its simulations; give runs (--runs)")
         self.output, self.sign = (minimise, 1.0) if maximise is None else (maximise, -1.0)
         self.method, self.seed = method, seed
         listed = not (vary is None or isinstance(vary, Mapping))
@@ -102,15 +102,7 @@ class Plan:
         known = model.units
         kept = tuple(parse_output(text, known, column) for column, text in named.items())
         for output in kept:
-            if output.static and not model.static:
-                raise ParameterError(f"output {output.column}: needs a mechanism; use prbm study")
-            output.check(known, model.owner)
-            for name in output.variables(known):
-                if (kind := model.types.get(name, "")) and kind not in BITS:
-                    raise ParameterError(
-                        f"output {output.column}: {name} is of type {kind}, not one number; leave "
-                        "it out"
-                    )
+            model.check(output)
         sources, given = dict(inputs or {}), model.fixed(values)
         self.values = {**model.values, **given}
         columns = self._columns(vary, runs)
@@ -218,12 +210,10 @@ class Plan:
     ) -> tuple[dict[str, Any], Real]:
         """Return samples or distributions, and the points of a table, of a grid, or drawn ones."""
         if listed:
-            varied = {
-                name: numbers(
-                    name, x, in_unit(name, f"1 {unit}", self._unit(name)) if unit else 1.0
-                )
-                for name, (x, unit) in columns.items()
-            }
+            varied = {}
+            for name, (cells, unit) in columns.items():
+                factor = in_unit(name, f"1 {unit}", self._unit(name)) if unit else 1.0
+                varied[name] = numbers(name, cells, factor)
             return varied, np.column_stack([*varied.values()])
         if runs is None:
             varied = {name: self._samples(name, x) for name, x in columns.items()}
