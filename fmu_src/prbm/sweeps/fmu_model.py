@@ -20,8 +20,8 @@ from ..base.names import proposal
 from ..files.settings import in_unit
 from ..mechanism.parameters import Tolerance
 from ..runs.inputs import driving, filled
-from ..runs.run import ROWS_MAX, check_duration
 from ..runs.quantities import FREQUENCY
+from ..runs.run import ROWS_MAX, check_duration
 from .fmu import FmuJob, input_units, unit
 from .outputs import FUNDAMENTAL, Output
 from .runner import StudyError
