@@ -29,6 +29,7 @@ from coupled import integrator
 from mishap import CRASHES, CRASHES_ONCE, EXHAUSTS, EXITS, FINE, HANGS, KILLS_WORKER, RAISES
 from native_host import clocked
 from prbm.base.errors import ParameterError, PrbmError
+from prbm.commands import study as command
 from prbm.commands.command_line import main
 from prbm.sweeps import runner
 from prbm.sweeps.fmu import FmuJob, Runner
@@ -36,7 +37,7 @@ from prbm.sweeps.outputs import Output, evaluate, parse_output, reduce
 from prbm.sweeps.results import OWN
 from prbm.sweeps.results import SETTINGS as KEY
 from prbm.sweeps.runner import StudyError
-from prbm.sweeps.sweep import samples, summary, sweep
+from prbm.sweeps.sweep import samples, sweep
 from signals import interruptible
 from support import SUPPORT
 
@@ -661,11 +662,12 @@ def test_the_summary_names_outputs_without_values():
         {"row": [0, 1, 2], "settling": [nan] * 3, "gap": [1.0, nan, nan], "x": [1.0, 2.0, nan],
          "status": ["ok", "ok", "failed"], "message": ["", "", "no"]}
     )  # fmt: skip
-    assert summary(found, "out.csv").splitlines() == [
+    assert command._summary(found, "out.csv").splitlines() == [
         "3 runs, 1 failed: out.csv",
         "row 2 failed: no",
-        "settling: no value in 2 of 2 complete runs; simulate longer, or check the condition",
-        "gap: no value in 1 of 2 complete runs; simulate longer, or check the condition",
+        "settling: no value in 2 of 2 complete simulations; simulate longer, or choose another "
+        "output",
+        "gap: no value in 1 of 2 complete simulations; simulate longer, or choose another output",
     ]
 
 

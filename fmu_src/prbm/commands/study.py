@@ -30,6 +30,7 @@ from ..runs.engine import KERNEL
 from ..runs.inputs import files_of, placeholders
 from ..sweeps.design import SENSITIVITY, Yield, constant
 from ..sweeps.optimum import EDGE_RTOL, FLAT_RTOL, Optimum
+from ..sweeps.outputs import GOOD
 from ..sweeps.plan import Model
 from ..sweeps.study import Study, model_of, study
 from .duration import given_inputs, times
@@ -37,6 +38,7 @@ from .output import Output, aligned
 from .record import Record
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
 EXAMPLE = '--vary "stop.position=-4:2 mm:25"'
@@ -98,7 +100,7 @@ def run_study(options: argparse.Namespace) -> None:
 
 def run_sweep(options: argparse.Namespace) -> None:
     """Run a sweep and print a summary; results are written during the sweep."""
-    from ..sweeps.sweep import summary, sweep  # imported here: an extra
+    from ..sweeps.sweep import sweep  # imported here: an extra
 
     values = assigned(model_of(options.fmu).units, options.set) if options.set else {}
     found = sweep(
@@ -106,7 +108,29 @@ def run_sweep(options: argparse.Namespace) -> None:
         inputs=given_inputs(options), **times(options), **_limits(options),
         scheduler=options.scheduler,
     )  # fmt: skip
-    print(summary(found, options.out))
+    print(_summary(found, options.out))
+
+
+def _summary(results: "pd.DataFrame", out: str) -> str:
+    """Return a summary of the runs of a sweep in a few lines."""
+    good = results["status"].isin(GOOD)
+    lines = [f"{len(results)} runs, {int((~good).sum())} failed: {out}"]
+    for row, status, message in results.loc[~good, ["row", "status", "message"]].head(3).values:
+        lines.append(f"row {row} {status}: {message}")
+    if (~good).sum() > 3:
+        lines.append("see the columns status and message for the other failed runs")
+    complete = results[good].select_dtypes("number")
+    return "\n".join(lines + _without_values(dict(complete.isna().sum()), len(complete)))
+
+
+def _without_values(missing: Mapping[str, int], complete: int) -> list[str]:
+    """Return sentences about outputs that complete simulations lack, from their numbers."""
+    return [
+        f"{output}: no value in {count} of {complete} complete simulations; simulate longer, or "
+        "choose another output"
+        for output, count in missing.items()
+        if count
+    ]
 
 
 def _limits(options: argparse.Namespace) -> dict[str, Any]:
@@ -153,13 +177,9 @@ def _print_simulations(options: argparse.Namespace, found: Study) -> None:
     print(f"{len(found.points)} simulations, {len(failed)} failed")
     for message in dict.fromkeys(failed[:3]):
         print(f"failed: {message}")
-    for output, values in found.outputs.items():
-        missing = int(np.isnan(values).sum()) - len(failed)
-        if missing:
-            print(
-                f"{output}: no value in {missing} of {len(values) - len(failed)} complete "
-                "simulations; simulate longer, or choose another output"
-            )
+    missing = {of: int(np.isnan(x).sum()) - len(failed) for of, x in found.outputs.items()}
+    for sentence in _without_values(missing, len(found.points) - len(failed)):
+        print(sentence)
 
 
 def _vary(

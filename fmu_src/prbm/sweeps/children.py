@@ -283,21 +283,10 @@ _lock = threading.Lock()
 
 
 def run_row(study: str, row: Row, given: tuple[Any, ...] | None) -> Outcome | None:
-    """Simulate once, in a thread of an executor.
+    """Simulate once, in a thread of an executor; return None if the machine needs ``given``.
 
-    Parameters
-    ----------
-    study : str
-        Name of the study, unique among all machines.
-    row : mapping
-        Parameters of the run.
-    given : tuple or None
-        Arguments of :class:`Processes`, which a machine needs only once.
-
-    Returns
-    -------
-    Outcome or None
-        None if this machine needs the arguments.
+    ``study`` is a name that is unique among all machines.  ``given`` are the arguments of
+    :class:`Processes`, which are sent to a machine only once.
 
     Raises
     ------

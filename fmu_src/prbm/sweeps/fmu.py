@@ -45,13 +45,7 @@ MESSAGES_MAX = 5  # Most messages of the FMU in the message of a failed run.
 
 @dataclass(frozen=True)
 class FmuJob(Job):
-    """Runs of an FMU.
-
-    Parameters
-    ----------
-    content : bytes
-        The FMU.
-    """
+    """Runs of an FMU, whose bytes are the content."""
 
     content: bytes = field(default=b"", repr=False)
 
@@ -109,14 +103,7 @@ def communication_points(start: float, stop: float, step: float) -> list[float]:
 
 
 class Runner:
-    """Runs a loaded FMU repeatedly.
-
-    Parameters
-    ----------
-    folder : Path
-        The unpacked FMU.
-    job : FmuJob
-        Settings of the runs.
+    """Runs the FMU that is unpacked in a folder repeatedly.
 
     Raises
     ------

@@ -33,16 +33,10 @@ Point = tuple[float, ...]
 
 
 class Journal:
-    """The completed rows of a study by their parameters.
+    """The completed rows of a study by their parameters, beside its table.
 
-    Parameters
-    ----------
-    table : Path or None
-        Path of the table; the journal is beside it.  None: the rows are in memory only.
-    settings : mapping
-        Everything that the results depend on, except for the parameters.  It is stored as JSON.
-    parameters, outputs : sequence of str
-        Names of the columns.
+    Without the path of a table the rows are in memory only.  ``settings`` are everything that the
+    results depend on, except for the parameters.
     """
 
     def __init__(

@@ -125,17 +125,7 @@ class MechanismModel:
 
 @dataclass(frozen=True, kw_only=True)
 class MechanismJob(Job):
-    """Simulations of a mechanism.
-
-    Parameters
-    ----------
-    mechanism : Mechanism
-        The mechanism.
-    engine : str or None
-        As for :func:`prbm.simulate`.
-    names : tuple of str
-        Names of all variables of the mechanism.
-    """
+    """Simulations of a mechanism, whose variables have the names."""
 
     mechanism: Mechanism
     engine: str | None

@@ -135,21 +135,10 @@ class Optimum:
 
 
 class Search:
-    """The search of an optimum around the best samples.
+    """The search of an optimum around the best samples of a study.
 
-    Parameters
-    ----------
-    plan : Plan
-        The study.
-    table : (n, k)
-        Outputs at its points; NaN for failed simulations.
-    evaluate : callable
-        Simulates at points (m, p) and returns all outputs (m, k).
-
-    Raises
-    ------
-    ParameterError
-        If no sample has a value of the output and satisfies the constraints.
+    ``table`` (n, k) has the outputs at its points, NaN for failed simulations.  ``evaluate``
+    simulates at points (m, p) and returns all outputs (m, k).
     """
 
     def __init__(self, plan: Plan, table: Real, evaluate: Callable[[Real], Real]) -> None:
@@ -207,7 +196,13 @@ class Search:
         return self.costs[-1]
 
     def optimum(self) -> Optimum:
-        """Refine the best samples and determine the range around the optimum."""
+        """Refine the best samples and determine the range around the optimum.
+
+        Raises
+        ------
+        ParameterError
+            If no sample has a value of the output and satisfies the constraints.
+        """
         if not np.isfinite(self.costs).any() and self.constraints:
             excess = np.array([self._excess(row) for row in self.found])
             excess = np.nan_to_num(excess, nan=-1e3, posinf=-1e3, neginf=-1e3)

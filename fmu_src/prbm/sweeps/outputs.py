@@ -132,14 +132,7 @@ class Output:
         return [self.variable]
 
     def check(self, names: Collection[str], owner: str) -> None:
-        """Reject an output that cannot be computed from the variables of a mechanism or an FMU.
-
-        Parameters
-        ----------
-        names : collection of str
-            The variables.
-        owner : str
-            What has them, for messages: ``the mechanism``.
+        """Reject an output that cannot be computed from the variables of an owner, ``the FMU``.
 
         Raises
         ------
@@ -182,19 +175,7 @@ RELATIONS: dict[str, Callable[[Real, float], NDArray[np.bool_]]] = {
 
 @dataclass(frozen=True)
 class Constraint:
-    """A condition on an output.
-
-    Parameters
-    ----------
-    text : str
-        The condition as it was given.
-    output : str
-        The output.
-    relation : str
-        ``>``, ``>=``, ``<`` or ``<=``.
-    bound : float
-        The bound in SI.
-    """
+    """A condition on an output: its text as it was given, and its parts with the bound in SI."""
 
     text: str
     output: str
@@ -220,7 +201,7 @@ class Constraint:
 _REDUCTION = re.compile(r"(final|max|min|mean|first|since)\((.*)\)", re.DOTALL)
 _STATIC = re.compile(r"(mode)\(\s*([1-9]\d{0,3})\s*\)|(rest)\((.*)\)")
 _ABSOLUTE = re.compile(r"abs\((.*)\)", re.DOTALL)
-_CONDITION = re.compile(r"(.*)(<=|>=|<|>)([^<>=]+)", re.DOTALL)
+CONDITION = re.compile(r"(.*[^<>=])(<=|>=|<|>)([^<>=()]*)", re.DOTALL)  # "shuttle.x > 0.001".
 
 
 def parse_output(text: str, known: Container[str], column: str | None = None) -> Output:
@@ -254,7 +235,7 @@ def parse_output(text: str, known: Container[str], column: str | None = None) ->
     call = _REDUCTION.fullmatch(text)
     reduction, variable = (call[1], call[2].strip()) if call else ("final", text)
     relation, bound = ">", 0.0
-    condition = _CONDITION.fullmatch(variable)
+    condition = CONDITION.fullmatch(variable)
     if condition and reduction in TIMES and variable not in known:
         variable, relation = condition[1].rstrip(), condition[2]
         try:
@@ -274,18 +255,11 @@ def evaluate(
     columns: Mapping[str, NDArray[Any]],
     impacts: Sequence[Impact] | None = None,
 ) -> float:
-    """Return the value of an output.
+    """Return the value of an output from the columns ``time`` and its variables.
 
-    Parameters
-    ----------
-    output : Output
-        The output.
-    columns : mapping
-        ``time`` and the variables of the output; only the last value is needed for ``final``.
-    impacts : sequence of Impact
-        All impacts, if the engine has recorded them; named quantities and extremes then see each
-        of them, also of several between two communication points, and extremes of positions and
-        velocities are those of parabolas through the points.
+    Only the last value is needed for ``final``.  If the engine has recorded all impacts, named
+    quantities and extremes see each of them, also of several between two communication points, and
+    extremes of positions and velocities are those of parabolas through the points.
 
     Examples
     --------

@@ -2,7 +2,6 @@
 
 import itertools
 import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple
 from pathlib import Path
@@ -19,7 +18,7 @@ from ..runs.inputs import Source, placeholders
 from .design import SENSITIVITY, distribution, drawn
 from .journal import Point
 from .mechanism import MechanismModel
-from .outputs import Constraint, parse_output
+from .outputs import CONDITION, Constraint, parse_output
 from .table import check_type, numbers, read_table
 
 if TYPE_CHECKING:
@@ -28,7 +27,6 @@ if TYPE_CHECKING:
     from .fmu_model import FmuModel
 
 RUNS_MAX = 100_000  # More simulations are a mistake in the number of samples.
-CONDITION = re.compile(r"(.*[^<>=])(<=|>=|<|>)([^<>=()]*)", re.DOTALL)  # "fundamental > 40 Hz".
 Vary: TypeAlias = "Mapping[str, Any] | pd.DataFrame | str | Path | None"
 Outputs = Sequence[str] | Mapping[str, str]
 Model: TypeAlias = "MechanismModel | FmuModel"

@@ -68,20 +68,8 @@ class Runner:
     """Computes rows and keeps their outcomes in a journal.
 
     It is used in a ``with`` block, at whose end the processes of the study end.  A
-    KeyboardInterrupt then has a message about the completed rows.
-
-    Parameters
-    ----------
-    job : Job
-        The simulation.
-    parameters : sequence of str
-        Names of the numbers of a point.
-    journal : Journal
-        The completed rows.
-    runs : int
-        Expected number of rows, which limits that of the workers.
-    workers, executor, retries, timeout
-        As for :func:`prbm.study`.  With a timeout, other processes simulate.
+    KeyboardInterrupt then has a message about the completed rows.  The expected number of ``runs``
+    limits that of the workers.  With a timeout, other processes simulate.
 
     Raises
     ------

@@ -1,10 +1,4 @@
-"""Studies of a mechanism: many simulations without an FMU, and their optimum.
-
-    prbm study PRBDM2R --vary "stop.position=-8:8 mm:17" --of settling --minimise settling
-
-The simulations run on all cores of this machine, or in another executor
-(:mod:`.runner`).  A simulation that fails is a row with its message.
-"""
+"""Studies: many simulations of a mechanism or an FMU, their optimum, yield and sensitivities."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -251,13 +245,8 @@ def computed(
 ) -> Study:
     """Compute the rows of a plan, its optimum and yield, and write its table, CSV or Parquet.
 
-    The other arguments are those of :func:`study`; ``limits`` are those of
+    The other arguments, and the errors, are those of :func:`study`; ``limits`` are those of
     :class:`prbm.sweeps.runner.Runner`.
-
-    Raises
-    ------
-    ParameterError, StudyError
-        As :func:`study` and :func:`prbm.sweeps.sweep.sweep`.
     """
     out = None if table is None else Path(table)
     journal, rows = Journal(out, plan.settings, plan.columns, plan.texts), plan.rows(plan.points)
@@ -328,10 +317,8 @@ def _optimum(search: Search, messages: Sequence[str], journal: Journal) -> Optim
     try:
         return search.optimum()
     except ParameterError as error:
-        reasons = sorted({message for message in messages if message})
-        sentence = f"{error}; {reasons[0] if reasons else search.remedy}"
-        kept = journal.kept
-        raise ParameterError(f"{sentence}; {kept}" if kept else sentence) from None
+        reason = min(filter(None, messages), default=search.remedy)
+        raise ParameterError("; ".join(filter(None, [str(error), reason, journal.kept]))) from None
 
 
 def _around(plan: Plan, best: Optimum) -> list[Point]:

@@ -1,33 +1,21 @@
-"""Studies of an FMU: from a table of parameters to a table of results.
-
-    prbm sweep PRBDM2R.fmu table.csv --output "max(shuttle.x)" --stop-time 1
-
-A row of the table is a run of the FMU, and a column is the start value of a variable.  The runs are
-distributed over the cores of this machine, or over an executor or a Dask cluster (:mod:`.runner`).
-"""
+"""Studies of an FMU: from a table of parameters to a table of results."""
 
 import importlib.util
-import os
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..base.atomic import check_file
 from ..base.errors import ParameterError
 from ..base.progress import Progress
 from .design import drawn
 from .fmu_model import FmuModel
-from .outputs import GOOD
 from .plan import Outputs, Plan
 from .runner import StudyError
 from .study import computed
 
 if TYPE_CHECKING:
     import pandas as pd
-
-EXTRA = ("pandas", "pyarrow")
-REMEDY = 'install the packages for sweeps with: python -m pip install "prbm-impact[sweep]"'
 
 FILES = (".csv", ".feather", ".h5", ".json", ".mat", ".ods", ".tsv", ".txt", ".xls", ".xlsx")
 """Suffixes rejected for the results, which are a Parquet file."""
@@ -52,7 +40,7 @@ def sweep(
     retry_failed: bool = False,
     progress: Progress | None = None,
 ) -> "pd.DataFrame":
-    """Run an FMU once for each row of a table.
+    """Run an FMU once for each row of a table, and return a table of results.
 
     Parameters
     ----------
@@ -63,8 +51,7 @@ def sweep(
         such a table.  The units are those of the FMU: SI for the FMUs of this project.
     out : str or Path
         Parquet file of the results.  If it has runs of the same sweep, only the missing runs are
-        computed; rows may have been added to the table since then.  The rows are in
-        ``OUT.partial`` (CSV) until the table is complete, and remain there after an interruption.
+        computed; rows may have been added to the table since then.
     outputs : sequence of str, or mapping of str to str
         Recorded outputs of a run:
 
@@ -84,8 +71,7 @@ def sweep(
         End of the runs [s], communication step [s], relative tolerance; None: those of the FMU's
         default experiment, or else 1 s, a thousandth of the run, no tolerance.
     scheduler : str, Executor or None
-        As ``executor`` of :func:`prbm.study`: the address of a Dask scheduler, as
-        ``tcp://host:8786``, whose workers need this package, or an executor.
+        As ``executor`` of :func:`prbm.study`.
     inputs, workers, retries, timeout, overwrite, retry_failed, progress
         As for :func:`prbm.study`.
 
@@ -94,8 +80,7 @@ def sweep(
     DataFrame
         In the order of the table: ``row`` (from 0), its parameters, the outputs (float64; NaN
         for a failed run), ``status`` (``ok``; ``ended``: by the FMU, before ``stop_time``;
-        ``failed``, ``crashed``, ``timeout``) and ``message``.  Runs that are repeated or continued
-        give the same bytes.
+        ``failed``, ``crashed``, ``timeout``) and ``message``.
 
     Raises
     ------
@@ -105,10 +90,8 @@ def sweep(
     StudyError
         If the FMU cannot be read or loaded, the scheduler does not respond, or a package is not
         installed.
-    KeyboardInterrupt
-        After Ctrl-C, with the number of completed runs, which are kept.
     """
-    _check_packages("distributed" if isinstance(scheduler, str) else "pandas")
+    _check_packages(*["distributed"] * isinstance(scheduler, str))
     out = Path(out)
     if out.suffix.lower() in FILES:
         raise ParameterError(
@@ -116,7 +99,6 @@ def sweep(
             f"such as {out.with_suffix('.parquet')}; pandas.read_parquet(name).to_csv(...) makes a "
             "CSV file of it"
         )
-    check_file(out)
     model = FmuModel(fmu)
     plan = Plan(
         model, table, model.outputs if outputs is None else outputs, values=values,
@@ -134,7 +116,7 @@ def sweep(
 def samples(
     distributions: Mapping[str, Any], n: int, seed: int = 0, method: str = "random"
 ) -> "pd.DataFrame":
-    """Draw a table of parameters, a column for each, with :func:`prbm.sweeps.design.drawn`.
+    """Draw a table of parameters, a column for each.
 
     Parameters
     ----------
@@ -144,9 +126,9 @@ def samples(
     n : int
         Number of rows; a power of two with ``sobol``, whose sequence is balanced only then.
     seed : int
-        Seed (default: 0).  The same seed gives the same table.
+        The same seed gives the same table.
     method : str
-        ``random`` (default), ``latin`` or ``sobol``.
+        ``random``, ``latin`` or ``sobol``.
 
     Raises
     ------
@@ -159,31 +141,16 @@ def samples(
     >>> sorted((table["stop.restitution"] * 20).astype(int).tolist())
     [8, 9, 10, 11]
     """
-    _check_packages("pandas")
+    _check_packages()
     import pandas as pd
 
     return pd.DataFrame(drawn(distributions, n, seed, method), columns=[*distributions])
 
 
 def _check_packages(*names: str) -> None:
-    for name in {*EXTRA, *names}:
+    for name in ("pandas", "pyarrow", *names):
         if importlib.util.find_spec(name) is None:
-            raise StudyError(f"sweeps need the package {name}; {REMEDY}")
-
-
-def summary(results: "pd.DataFrame", out: str | os.PathLike[str]) -> str:
-    """Return a summary of the runs of a sweep in a few lines."""
-    good = results["status"].isin(GOOD)
-    lines = [f"{len(results)} runs, {int((~good).sum())} failed: {out}"]
-    for row, status, message in results.loc[~good, ["row", "status", "message"]].head(3).values:
-        lines.append(f"row {row} {status}: {message}")
-    if (~good).sum() > 3:
-        lines.append("see the columns status and message for the other failed runs")
-    complete = results[good].select_dtypes("number")
-    for name, missing in complete.isna().sum().items():
-        if missing:
-            lines.append(
-                f"{name}: no value in {missing} of {len(complete)} complete runs; simulate longer, "
-                "or check the condition"
+            raise StudyError(
+                f"sweeps need the package {name}; install the packages for sweeps with: python -m "
+                'pip install "prbm-impact[sweep]"'
             )
-    return "\n".join(lines)

@@ -25,15 +25,10 @@ Cells = Sequence[Any]
 
 
 def read_table(table: Any, known: Container[str] = ()) -> dict[str, tuple[Cells, str]]:
-    """Return for each column of a table its cells, and the unit in its head.
+    """Return for each column of a table or file its cells, and the unit in its head.
 
-    Parameters
-    ----------
-    table : DataFrame, str or Path
-        The table, or the path of a CSV or Parquet file.
-    known : container of str
-        Names of variables, which may have brackets.  Other heads may have a unit, which is empty
-        otherwise: ``stop.position [mm]``.
+    ``known`` are names of variables, which may have brackets.  Other heads may have a unit, which
+    is empty otherwise: ``stop.position [mm]``.
 
     Raises
     ------
