@@ -16,7 +16,7 @@ import tempfile
 import threading
 import traceback
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, field
 from typing import Any, BinaryIO
 
@@ -31,10 +31,6 @@ Row = Mapping[str, float]
 
 class Unusable(Exception):
     """The simulation cannot run here with any parameters; the message gives the reason."""
-
-
-Task = Callable[[], Callable[[Row], Outcome]]
-"""Called once in a process; returns the function that simulates.  It can be pickled."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +68,14 @@ class Job:
         """Simulate once in this process."""
         raise NotImplementedError
 
+    def placed(self) -> AbstractContextManager["Job"]:
+        """Return a context in which the processes of this machine can open the given job."""
+        return nullcontext(self)
+
+    def opened(self) -> Callable[[Row], Outcome]:
+        """Return the function that simulates, in a process of its own."""
+        return self.run
+
     @property
     def settings(self) -> dict[str, Any]:
         """Times and tolerance, for the journal."""
@@ -89,10 +93,6 @@ class Job:
         others = {name: x for name, x in row.items() if name not in within}
         return {**self.values, **others}, filled(self.inputs, row)
 
-    def placed(self) -> AbstractContextManager[Task]:
-        """Return a context in which the simulation is ready on this machine."""
-        raise NotImplementedError
-
 
 # --- the process --------------------------------------------------------------------------------
 
@@ -109,7 +109,7 @@ def main() -> None:
     threading.Thread(target=_read, args=(sys.stdin.buffer, received), daemon=True).start()
     try:
         try:
-            run = received.get()()
+            run = received.get().opened()
         except Exception as error:
             _send(replies, f"{error}" or type(error).__name__)
             raise
@@ -149,7 +149,7 @@ class Child:
         If the simulation cannot be opened.
     """
 
-    def __init__(self, task: Task) -> None:
+    def __init__(self, job: Job) -> None:
         paths = os.pathsep.join(path for path in sys.path if path)
         limits = {name: "1" for name in THREAD_LIMITS if name not in os.environ}
         self.stderr = tempfile.TemporaryFile()  # noqa: SIM115  # Closed by close().
@@ -162,7 +162,7 @@ class Child:
             start_new_session=True,  # Ctrl-C must reach only the process of the study.
         )
         self.late = False
-        self.send(task)
+        self.send(job)
         error = self.receive(None)
         if error != "":
             end = self.close()
@@ -221,7 +221,7 @@ class Processes:
         self.retries, self.timeout = retries, timeout
         self.idle, self.busy = list[Child](), set[Child]()
         self.lock, self.stack, self.closed = threading.Lock(), ExitStack(), False
-        self.task = self.stack.enter_context(job.placed())
+        self.job = self.stack.enter_context(job.placed())
 
     def run(self, row: Row) -> Outcome:
         """Simulate once.
@@ -257,7 +257,7 @@ class Processes:
         if child is not None and child.process.poll() is not None:
             child.close()  # It was killed while it had no work.
             child = None
-        child = child or Child(self.task)
+        child = child or Child(self.job)
         child.stderr.truncate(0)
         with self.lock:
             self.busy.add(child)

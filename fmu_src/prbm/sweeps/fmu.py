@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from ctypes import c_uint
 from dataclasses import dataclass, field, replace
-from functools import partial
 from math import isclose
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,7 +25,7 @@ from fmpy.simulation import (  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from ..runs.quantities import FREQUENCY
-from .children import Job, Row, Task
+from .children import Job, Row
 from .outputs import ENDED, FAILED, OK, Outcome, evaluate
 
 if TYPE_CHECKING:
@@ -45,9 +44,10 @@ MESSAGES_MAX = 5  # Most messages of the FMU in the message of a failed run.
 
 @dataclass(frozen=True)
 class FmuJob(Job):
-    """Runs of an FMU, whose bytes are the content."""
+    """Runs of an FMU: its bytes, or the folder of the unpacked FMU on a machine."""
 
     content: bytes = field(default=b"", repr=False)
+    folder: str = ""
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -55,19 +55,19 @@ class FmuJob(Job):
         return {"start time [s]": self.start, **super().settings}
 
     @contextmanager
-    def placed(self) -> Iterator[Task]:
-        """Unpack the FMU; yield the function that loads it and returns the one that runs it."""
+    def placed(self) -> Iterator[Job]:
+        """Unpack the FMU."""
         from ..fmu.unpack import unpacked  # imported here: the processes do not need it
 
         with unpacked(io.BytesIO(self.content)) as folder:
-            yield partial(_loaded, folder, replace(self, content=b""))
+            yield replace(self, content=b"", folder=str(folder))
 
-
-def _loaded(folder: Path, job: FmuJob) -> Callable[[Row], Outcome]:
-    try:
-        return Runner(folder, job).run
-    except Exception as error:  # FMPy raises plain exceptions.
-        raise RuntimeError(f"the FMU cannot be loaded: {error}") from None
+    def opened(self) -> Callable[[Row], Outcome]:
+        """Load the FMU; return the function that runs it."""
+        try:
+            return Runner(self.folder, self).run
+        except Exception as error:  # FMPy raises plain exceptions.
+            raise RuntimeError(f"the FMU cannot be loaded: {error}") from None
 
 
 def input_units(description: Any) -> dict[str, str]:
@@ -111,7 +111,7 @@ class Runner:
         Any exception of FMPy, if the FMU cannot be loaded or instantiated.
     """
 
-    def __init__(self, folder: Path, job: FmuJob) -> None:
+    def __init__(self, folder: str | Path, job: FmuJob) -> None:
         self.job, self.messages = job, list[tuple[int, str]]()
         self.description = fmpy.read_model_description(str(folder), validate=False)
         # Whether the FMU is of FMI 2.0, not 3.0.

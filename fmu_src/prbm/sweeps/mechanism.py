@@ -2,10 +2,9 @@
 
 import hashlib
 import math
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 from ..analysis.static_shape import equilibrium
@@ -25,7 +24,7 @@ from ..runs.engine import PYTHON, check_engine, kernel_available
 from ..runs.experiment import experiment
 from ..runs.inputs import Source, filled, signals
 from ..runs.run import communication_points, sampled, simulate
-from .children import Job, Row, Task
+from .children import Job, Row
 from .outputs import FAILED, OK, Outcome, Output, evaluate, parse_output
 
 STEPS = 4000  # Communication steps of a simulation, which resolve the vibration after impacts.
@@ -140,11 +139,6 @@ class MechanismJob(Job):
     def threads(self) -> float:
         """One thread if the engine is Python, any number if it lets them work in parallel."""
         return 1 if self.engine == PYTHON else math.inf
-
-    @contextmanager
-    def placed(self) -> Iterator[Task]:
-        """Yield a function that returns :meth:`run`: the job has all that it needs."""
-        yield partial(getattr, self, "run")
 
     def run(self, row: Row) -> Outcome:
         """Simulate once; errors of the simulation are returned as outcomes."""

@@ -22,12 +22,11 @@ from .design import SENSITIVITY, Sensitivity, Yield, distribution, drawn, sensit
 from .journal import Journal, Point
 from .mechanism import MechanismModel
 from .optimum import REFINEMENTS_EXPECTED, Optimum, Search
-from .outputs import GOOD
+from .outputs import GOOD, Outcome
 from .plan import Model, Outputs, Plan, Vary
 from .runner import Runner
 from .table import PARQUET
 
-LAST_FRACTION = 0.99  # Reported progress while a refinement takes more simulations than usual.
 YIELD_RUNS = 256  # Simulations around an optimum that give its yield.
 YIELD_SEED = 1
 
@@ -277,37 +276,35 @@ def computed(
 
 def _run(plan: Plan, runner: Runner, progress: Progress) -> Study:
     """Simulate, search the optimum and its yield."""
-    count, names, whole = len(plan.points), [*plan.varied], plan.whole_grid
-    extra = REFINEMENTS_EXPECTED * len(names) if plan.output is not None else 0
-    extra += YIELD_RUNS if plan.spread else 0
+    rows, names, whole = plan.rows(plan.points), [*plan.varied], plan.whole_grid
+    further = REFINEMENTS_EXPECTED * len(names) if plan.output is not None else 0
+    part = len(rows) / (len(rows) + further + YIELD_RUNS * bool(plan.spread))
+    nothing = (math.nan,) * len(plan.texts)
 
-    def report(done: float) -> None:
-        progress(min(done / (count + extra), LAST_FRACTION) if extra else done / count)
+    def values(outcomes: Sequence[Outcome]) -> Real:
+        """Return outputs (n, k), NaN for failed simulations."""
+        return np.array([outcome.values or nothing for outcome in outcomes])
 
-    def values(rows: Sequence[Point], progress: Progress | None = None) -> tuple[Real, list[str]]:
-        """Return outputs (n, k), NaN for failed simulations, and messages."""
-        outcomes, nothing = runner.outcomes(rows, progress), (math.nan,) * len(plan.texts)
-        table = np.array([outcome.values or nothing for outcome in outcomes])
-        return table, ["" if x.status in GOOD else x.message for x in outcomes]
-
-    table, messages = values(plan.rows(plan.points), lambda share: report(share * count))
+    outcomes = runner.outcomes(rows, lambda done: progress(part * done))
+    messages = tuple("" if x.status in GOOD else x.message for x in outcomes)
+    table = values(outcomes)
     outputs = dict(zip(plan.texts, table.T, strict=True))
     good = plan.satisfied(table) & np.array([not message for message in messages])
     best, share, indices = None, None, {}
-    if plan.method == SENSITIVITY and not whole:
+    if plan.method == SENSITIVITY:
         found = {text: sensitivity(names, y, plan.seed) for text, y in outputs.items()}
         indices = {text: one for text, one in found.items() if one is not None}
     if plan.output is not None:
-        search = Search(plan, table, lambda x: values(plan.rows(x))[0])
+        search = Search(plan, table, lambda x: values(runner.outcomes(plan.rows(x))))
         best = _optimum(search, messages, runner.journal)
         if plan.spread:
-            share = yield_of(plan.satisfied(values(_around(plan, best))[0]))
+            share = yield_of(plan.satisfied(values(runner.outcomes(_around(plan, best)))))
     elif plan.constraints and not whole:
         share = yield_of(good)
     progress(1.0)
     return Study(
         plan.varied if whole else dict(zip(names, plan.points.T, strict=True)), plan.points,
-        outputs, plan.units, tuple(messages), best, whole, good, share, tuple(plan.spread), indices,
+        outputs, plan.units, messages, best, whole, good, share, tuple(plan.spread), indices,
         plan.settings,
     )  # fmt: skip
 
