@@ -133,13 +133,25 @@ def test_a_run_does_not_depend_on_the_runs_before(native, tmp_path):
     assert [bool(values) for values in fresh] == [True, True, False, True]
 
 
-def test_a_process_whose_fmu_gives_no_further_instance_is_replaced(native, tmp_path):
-    """Its run is complete; the next run needs another process."""
+def test_an_fmu_with_one_instance_per_process_has_a_process_for_each_row():
+    table = pd.DataFrame({"start": [0.0, 1.0, 2.0]})
+    flag, flagged = b'canBeInstantiatedOnlyOncePerProcess="%s"', Path("once.fmu")
+    with zipfile.ZipFile(integrator()) as source, zipfile.ZipFile(flagged, "w") as target:
+        for entry in source.infolist():
+            content = source.read(entry)
+            target.writestr(entry, content.replace(flag % b"false", flag % b"true"))
+    assert Runner(fmpy.extract(flagged), FmuJob(0.0, 1.0, 0.5, None, {}, ())).run({}).spent
+    found = sweep(flagged, table, outputs=["value"], stop_time=1.0, step=0.1, retries=0, workers=1)
+    assert found["status"].tolist() == ["ok"] * 3
+
+
+def test_a_failing_second_instance_is_left_to_another_process(native, tmp_path):
     folder = Path(fmpy.extract(native["PRBDM", 2], tmp_path / "fmu"))
     fmu = Runner(folder, FmuJob(0.0, 0.01, 1e-3, 1e-8, {}, (Output("x", "shuttle.x"),)))
+    assert fmu.run({}).status == "ok"
     fmu.fmu.fmi2Instantiate = lambda *_: None
-    outcome = fmu.run({})
-    assert (outcome.status, outcome.spent) == ("ok", True)
+    with pytest.raises(Exception, match="Failed to instantiate"):
+        fmu.run({})
 
 
 def test_defaults_without_a_default_experiment_are_one_second_and_all_outputs(mishap, log):

@@ -129,7 +129,7 @@ class Runner:
             require_functions=False,
         )
         self.named = {variable.name: variable for variable in variables}
-        self.time = job.start
+        self.time, self.used = job.start, False
         self.ended: float | None = None  # The time at which the FMU ended the simulation [s].
         self.history, self.final = (
             _Recorder(
@@ -146,30 +146,32 @@ class Runner:
         )
 
     def run(self, row: Row) -> Outcome:
-        """Run once with start values; errors are returned as outcomes, not raised."""
-        self.messages.clear()
-        fatal = False
-        try:
-            status, message, values = self._simulate(*self._driven(row))
-        except Exception as error:
-            status, message, values = FAILED, self._reason(error), ()
-            fatal = isinstance(error, FMICallException) and error.status == FATAL
-        return Outcome(status, message, values, spent=fatal or not self._renewed())
+        """Run once with start values; errors are returned as outcomes, not raised.
 
-    def _renewed(self) -> bool:
-        """Replace the instance, while the library stays loaded; return success."""
+        Raises
+        ------
+        Exception
+            Any exception of FMPy, if there is no new instance; another process may give one.
+        """
+        if self.used:
+            self._renew()
+        self.used = True
+        self.messages.clear()
+        spent = self.description.coSimulation.canBeInstantiatedOnlyOncePerProcess
         try:
-            if self.two:
-                self.fmu.fmi2FreeInstance(self.fmu.component)
-                self.fmu.instantiate(callbacks=self.fmu.callbacks, loggingOn=True)
-            else:
-                self.fmu.fmi3FreeInstance(self.fmu.component)
-                self.fmu.instantiate(
-                    eventModeUsed=self.events, logMessage=self._log, loggingOn=True
-                )
-        except Exception:  # FMPy raises plain exceptions.
-            return False
-        return True
+            return Outcome(*self._simulate(*self._driven(row)), spent=spent)
+        except Exception as error:
+            fatal = isinstance(error, FMICallException) and error.status == FATAL
+            return Outcome(FAILED, self._reason(error), spent=spent or fatal)
+
+    def _renew(self) -> None:
+        """Replace the instance; the library stays loaded."""
+        if self.two:
+            self.fmu.fmi2FreeInstance(self.fmu.component)
+            self.fmu.instantiate(callbacks=self.fmu.callbacks, loggingOn=True)
+        else:
+            self.fmu.fmi3FreeInstance(self.fmu.component)
+            self.fmu.instantiate(eventModeUsed=self.events, logMessage=self._log, loggingOn=True)
 
     def _reason(self, error: Exception) -> str:
         """Return the FMU's messages about an error, or else FMPy's message."""
