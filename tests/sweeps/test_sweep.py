@@ -32,7 +32,7 @@ from prbm.base.errors import ParameterError, PrbmError
 from prbm.commands import study as command
 from prbm.commands.command_line import main
 from prbm.sweeps import runner
-from prbm.sweeps.fmu import FmuJob, Runner
+from prbm.sweeps.fmu import FmuJob, LoadedFmu
 from prbm.sweeps.outputs import Output, evaluate, parse_output, reduce
 from prbm.sweeps.results import OWN
 from prbm.sweeps.results import SETTINGS as KEY
@@ -127,8 +127,8 @@ def test_a_run_does_not_depend_on_the_runs_before(native, tmp_path):
     folder = Path(fmpy.extract(native["PRBDM", 2], tmp_path / "fmu"))
     job = FmuJob(0.0, 0.05, 1e-3, 1e-8, {}, (Output("x", "shuttle.x"), Output("v", "shuttle.vx")))
     rows = [{"release.displacement": x} for x in (-0.01, -0.012, math.nan, -0.018)]
-    fresh = [Runner(folder, job).run(row).values for row in rows]
-    fmu = Runner(folder, job)
+    fresh = [LoadedFmu(folder, job).run(row).values for row in rows]
+    fmu = LoadedFmu(folder, job)
     assert [fmu.run(row).values for row in rows] == fresh
     assert [bool(values) for values in fresh] == [True, True, False, True]
 
@@ -140,14 +140,14 @@ def test_an_fmu_with_one_instance_per_process_has_a_process_for_each_row():
         for entry in source.infolist():
             content = source.read(entry)
             target.writestr(entry, content.replace(flag % b"false", flag % b"true"))
-    assert Runner(fmpy.extract(flagged), FmuJob(0.0, 1.0, 0.5, None, {}, ())).run({}).spent
+    assert LoadedFmu(fmpy.extract(flagged), FmuJob(0.0, 1.0, 0.5, None, {}, ())).run({}).spent
     found = sweep(flagged, table, outputs=["value"], stop_time=1.0, step=0.1, retries=0, workers=1)
     assert found["status"].tolist() == ["ok"] * 3
 
 
 def test_a_failing_second_instance_is_left_to_another_process(native, tmp_path):
     folder = Path(fmpy.extract(native["PRBDM", 2], tmp_path / "fmu"))
-    fmu = Runner(folder, FmuJob(0.0, 0.01, 1e-3, 1e-8, {}, (Output("x", "shuttle.x"),)))
+    fmu = LoadedFmu(folder, FmuJob(0.0, 0.01, 1e-3, 1e-8, {}, (Output("x", "shuttle.x"),)))
     assert fmu.run({}).status == "ok"
     fmu.fmu.fmi2Instantiate = lambda *_: None
     with pytest.raises(Exception, match="Failed to instantiate"):

@@ -1,1 +1,1 @@
-"""Parameter sweeps over FMUs."""
+"""Studies: simulations of a mechanism or an FMU over rows of parameters."""

@@ -65,7 +65,7 @@ class FmuJob(Job):
     def opened(self) -> Callable[[Row], Outcome]:
         """Load the FMU; return the function that runs it."""
         try:
-            return Runner(self.folder, self).run
+            return LoadedFmu(self.folder, self).run
         except Exception as error:  # FMPy raises plain exceptions.
             raise RuntimeError(f"the FMU cannot be loaded: {error}") from None
 
@@ -102,7 +102,7 @@ def communication_points(start: float, stop: float, step: float) -> list[float]:
     return points
 
 
-class Runner:
+class LoadedFmu:
     """Runs the FMU that is unpacked in a folder repeatedly.
 
     Raises
