@@ -387,7 +387,7 @@ def test_samples_may_be_texts_with_units(mechanisms):
 
 def test_a_study_has_a_short_text():
     x = np.linspace(0.0, 1.0, 5000)
-    best = Optimum("f", {"a": 0.25}, 2.0, {}, {}, np.zeros((5000, 1)), x)
+    best = Optimum("f", {"a": 0.25}, 2.0, {}, np.zeros((5000, 1)), x)
     found = Study({"a": x}, x[:, None], {"f": x}, {}, ("", "failed") * 2500, best)
     assert repr(found) == (
         "<Study of 5000 simulations over a: 2500 failed, <Optimum of f: 2 at a = 0.25>>"

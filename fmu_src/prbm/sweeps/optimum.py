@@ -52,8 +52,6 @@ class Optimum:
     flat : mapping
         For each varied parameter the range, with the others at the optimum, in which the output is
         within 5 % of the optimum and all constraints hold.
-    bounded : mapping
-        For each varied parameter whether this range ends inside the samples, at both ends.
     points : (m, p)
         Parameters of all simulations of the refinement.
     values : (m,)
@@ -80,7 +78,6 @@ class Optimum:
     point: Mapping[str, float]
     value: float
     flat: Mapping[str, tuple[float, float]]
-    bounded: Mapping[str, tuple[bool, bool]]
     points: Real
     values: Real
     robust: tuple[float, float, float] | None = None
@@ -90,6 +87,14 @@ class Optimum:
     others: Mapping[str, float] = field(default_factory=dict)
     spacing: Mapping[str, float] = field(default_factory=dict)
     ends: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    @property
+    def bounded(self) -> dict[str, tuple[bool, bool]]:
+        """For each parameter whether its flat range ends inside the samples, at both ends."""
+        return {
+            name: (low > self.ends[name][0], high < self.ends[name][1])
+            for name, (low, high) in self.flat.items()
+        }
 
     @property
     def slack(self) -> dict[str, tuple[float, float]]:
@@ -109,7 +114,7 @@ class Optimum:
         return tuple(
             name
             for name, (low, high) in self.flat.items()
-            if all(self.bounded[name]) and high - low < self.spacing.get(name, 0.0)
+            if all(self.bounded[name]) and high - low < self.spacing[name]
         )
 
     @property
@@ -118,8 +123,7 @@ class Optimum:
         return tuple(
             name
             for name, ends in self.ends.items()
-            if min(abs(self.point[name] - end) for end in ends)
-            <= EDGE_RTOL * self.spacing.get(name, 0.0)
+            if min(abs(self.point[name] - end) for end in ends) <= EDGE_RTOL * self.spacing[name]
         )
 
     @property
@@ -219,22 +223,22 @@ class Search:
             else:
                 self._simplex()
             limit = self._limit()
-            ends = {
-                n: [self._end(j, s, limit) for s in (-1.0, 1.0)] for j, n in enumerate(self.names)
+            flat = {
+                name: (self._end(j, -1.0, limit), self._end(j, 1.0, limit))
+                for j, name in enumerate(self.names)
             }
             if not single or self._limit() == limit:
                 break  # Otherwise the output jumps, and the search for the ends met a better point.
-        return self._result(ends)
+        return self._result(flat)
 
-    def _result(self, ends: Mapping[str, Sequence[tuple[float, bool]]]) -> Optimum:
+    def _result(self, flat: Mapping[str, tuple[float, float]]) -> Optimum:
         names, points, k, best = self.names, np.array(self.points), self.best, self._distinct()
         costs = np.array(self.costs[self.count :])
         return Optimum(
             self.output,
             dict(zip(names, points[k].tolist(), strict=True)),
             float(self.sign * self.costs[k]),
-            {name: (low, high) for name, ((low, _), (high, _)) in ends.items()},
-            {name: (low, high) for name, ((_, low), (_, high)) in ends.items()},
+            flat,
             points[self.count :],
             np.where(np.isfinite(costs), self.sign * costs, math.nan),
             self._robust() if len(names) == 1 else None,
@@ -283,11 +287,11 @@ class Search:
             options={"xatol": float(REFINED_RTOL * (high - low)), "maxiter": REFINEMENTS_MAX},
         )  # fmt: skip
 
-    def _end(self, j: int, sign: float, limit: float) -> tuple[float, bool]:
+    def _end(self, j: int, sign: float, limit: float) -> float:
         """Return an end of the range of parameter j in which costs are below a limit.
 
         The range is that around the best point.  The end is bisected between the last point inside
-        and the first one outside; it is false with the end of the samples if no point is outside.
+        and the first one outside; it is the end of the samples if no point is outside.
         """
         points, costs = np.array(self.points), np.array(self.costs)
         point = points[self.best]
@@ -304,12 +308,10 @@ class Search:
         while math.isinf(first) and inside < last:
             ahead = min(inside + self.sizes[j], last)
             inside, first = (ahead, first) if good(ahead) else (inside, ahead)
-        if math.isinf(first):
-            return float(sign * inside), False
-        while first - inside > EDGE_RTOL * self.sizes[j]:
+        while math.isfinite(first) and first - inside > EDGE_RTOL * self.sizes[j]:
             middle = 0.5 * (inside + first)
             inside, first = (middle, first) if good(middle) else (inside, middle)
-        return float(sign * inside), True
+        return float(sign * inside)
 
     def _simplex(self) -> None:
         """Refine the best point by the simplex of Nelder and Mead, in units of the distances."""
