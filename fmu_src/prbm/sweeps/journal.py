@@ -74,7 +74,6 @@ class Journal:
         check_file(self.path)
         try:
             self.file = os.fdopen(open_locked(self.path), "r+b")
-            self.file.seek(0)
         except LockedError:
             raise ParameterError(
                 f"{self.path} is in use by another study ({_owner(self.path)}); wait until it "

@@ -267,9 +267,10 @@ def computed(
                     "arrays, or workers=1"
                 )
         found = _run(plan, runner, progress or (lambda fraction: None))
-        if out is not None:
-            csv = b"" if parquet else csv_text(*found.table()).encode()
-            write(out, csv or results.parquet(journal, rows))
+        if out is not None and parquet:
+            write(out, results.parquet(journal, rows))
+        elif out is not None:
+            write(out, csv_text(*found.table()).encode())
         journal.remove()
     return found
 
@@ -322,9 +323,7 @@ def _around(plan: Plan, best: Optimum) -> list[Point]:
     """Return drawn values of all columns around an optimum."""
     at = {**best.point, **plan.beside}
     laws = {n: distribution(n, at[n], x) for n, x in plan.spread.items() if x.at(at[n]) > 0.0}
-    rows: Real = np.tile([at[name] for name in plan.columns], (YIELD_RUNS, 1))
-    if laws:
-        rows[:, [plan.columns.index(name) for name in laws]] = drawn(
-            laws, YIELD_RUNS, YIELD_SEED, "random"
-        )
-    return [tuple(row) for row in rows.tolist()]
+    x = drawn(laws, YIELD_RUNS, YIELD_SEED, "random").T if laws else ()
+    columns = {name: np.full(YIELD_RUNS, value) for name, value in at.items()}
+    columns |= zip(laws, x, strict=True)
+    return [*zip(*(columns[name].tolist() for name in plan.columns), strict=True)]
