@@ -11,6 +11,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+import scipy
 from scipy import optimize
 
 from ..base.errors import ParameterError
@@ -33,6 +34,7 @@ DISTINCT = 0.1  # Distance of different points in the table of the best ones, li
 MARGIN = 1e-4  # The search aims at this relative distance from bounds, so that constraints hold.
 STARTS = 3  # Best samples from which a search under constraints begins.
 
+SCIPY = tuple(map(int, scipy.__version__.split(".")[:2]))  # Version.
 minimize: Any = optimize.minimize  # Their type hints exclude such functions and options.
 minimize_scalar: Any = optimize.minimize_scalar
 
@@ -336,7 +338,10 @@ class Search:
                 break
 
     def _descend(self, k: int, radius: float = 0.5) -> None:
-        """Search under constraints from point k by COBYQA, in units of the distances."""
+        """Search under constraints from point k by COBYQA, in units of the distances.
+
+        SciPy before 1.14 has its predecessor COBYLA.
+        """
         sizes = self.sizes
         scale = max((abs(x) for x in self.costs if math.isfinite(x)), default=1.0) or 1.0
         row = cache(lambda *z: self._row(z * sizes))  # For the cost and for the constraints.
@@ -349,9 +354,13 @@ class Search:
             found = [x - MARGIN for x in self._excess(row(*z))]
             return [x if math.isfinite(x) else -1e3 for x in found]
 
+        most, last = REFINEMENTS_MAX * len(sizes), 0.1 * REFINED_RTOL
+        method, options = "COBYLA", {"maxiter": most, "rhobeg": radius, "tol": last}
+        if SCIPY >= (1, 14):
+            method, options = "COBYQA", {
+                "maxfev": most, "initial_tr_radius": radius, "final_tr_radius": last,
+            }  # fmt: skip
         minimize(
-            cost, self.points[k] / sizes, method="COBYQA", bounds=self.bounds / sizes[:, None],
-            constraints={"type": "ineq", "fun": excess},
-            options={"maxfev": REFINEMENTS_MAX * len(sizes), "initial_tr_radius": radius,
-                     "final_tr_radius": 0.1 * REFINED_RTOL},
+            cost, self.points[k] / sizes, method=method, bounds=self.bounds / sizes[:, None],
+            constraints={"type": "ineq", "fun": excess}, options=options,
         )  # fmt: skip
