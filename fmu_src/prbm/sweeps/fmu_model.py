@@ -21,7 +21,7 @@ from ..files.settings import in_unit
 from ..mechanism.parameters import Tolerance
 from ..runs.inputs import driving, filled
 from ..runs.quantities import FREQUENCY
-from ..runs.run import ROWS_MAX, check_duration
+from ..runs.run import communication_points
 from .fmu import FmuJob, input_units, unit
 from .outputs import FUNDAMENTAL, Output
 from .runner import StudyError
@@ -190,18 +190,15 @@ class FmuModel:
             size = proposed("stepSize", fixed) or (stop - start) / STEPS
         else:
             size = in_unit("step", step, "s")
-        check_duration("step", size)
+        communication_points(stop - start, size)  # Rejects steps that are too small.
         if tolerance is None:
             tolerance = proposed("tolerance", None)
         if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0.0):
             raise ParameterError(f"tolerance = {tolerance:g} must be positive and finite")
-        steps = (stop - start) / size
-        if steps > ROWS_MAX:
-            raise ParameterError(
-                f"step = {size:g} s makes {steps:.0f} steps in {stop - start:g} s: choose a larger "
-                "one"
-            )
-        varies = self.simulation.canHandleVariableCommunicationStepSize
+        steps, varies = (
+            (stop - start) / size,
+            self.simulation.canHandleVariableCommunicationStepSize,
+        )
         if abs(steps - round(steps)) > 1e-9 * steps and not varies:
             raise ParameterError(
                 f"stop_time = {stop:g} s: must be a multiple of step = {size:g} s, since the FMU "
