@@ -337,6 +337,9 @@ MISTAKES = [
     ({"values": {"stop.position": 0.0}}, "is varied and has a fixed value"),
     ({"minimise": "settling"}, "no simulation has a value of settling; simulate longer"),
     ({"workers": 0}, "workers = 0 must be 1 or more"),
+    ({"workers": "2"}, "workers = '2' must be 1 or more"),
+    ({"timeout": "1 mm"}, "timeout = 1 mm: the unit 'mm' has another dimension"),
+    ({"subject_to": "impacts 1"}, "constraint impacts 1: write it as in"),
     ({"workers": 2, "inputs": {"force.x": math.sin}}, "a function cannot be called by several"),
 ]
 EVERYWHERE = [  # Mistakes at which every simulation would fail.

@@ -61,19 +61,13 @@ def read_fmu(path: Path) -> tuple[bytes, Any]:
 
 
 class FmuModel:
-    """An FMU, a :class:`prbm.sweeps.plan.Model`.
-
-    Raises
-    ------
-    StudyError
-        If it cannot be read, or has no co-simulation of FMI 2.0 or 3.0.
-    """
+    """An FMU, a :class:`prbm.sweeps.plan.Model`; errors are those of :func:`read_fmu`."""
 
     tolerances: Mapping[str, Tolerance] = {}
 
     def __init__(self, path: str | Path) -> None:
         self.content, self.description = read_fmu(Path(path))
-        self.simulation = self.description.coSimulation
+        self.varies = self.description.coSimulation.canHandleVariableCommunicationStepSize
         self.name, self.title = Path(path).stem, self.description.modelName
         self.variables = {v.name: v for v in self.description.modelVariables}
         self.identity = {
@@ -134,7 +128,7 @@ class FmuModel:
         for name, x in (values or {}).items():
             if name not in self.values:
                 raise ParameterError(self.refusal(name))
-            found[name] = in_unit(name, x, self.units[name]) if isinstance(x, str) else float(x)
+            found[name] = in_unit(name, float(x) if isinstance(x, bool) else x, self.units[name])
             if not math.isfinite(found[name]):
                 raise ParameterError(f"{name} = {x} among the values must be finite")
         return found
@@ -157,8 +151,8 @@ class FmuModel:
         """
         if engine is not None:
             raise ParameterError(f"engine = {engine!r}: an FMU has its own; omit it")
-        varies, inputs = self.simulation.canHandleVariableCommunicationStepSize, given["inputs"]
-        if inputs and not varies:
+        inputs = given["inputs"]
+        if inputs and not self.varies:
             raise ParameterError(
                 "inputs over time need an FMU with variable communication steps; this one has "
                 "fixed steps: leave the inputs out"
@@ -186,20 +180,19 @@ class FmuModel:
         if not (math.isfinite(stop) and stop > start):
             raise ParameterError(f"stop_time = {stop:g} s must be finite and after {start:g} s")
         if step is None:
-            fixed = float(self.simulation.fixedInternalStepSize or 0.0)
+            fixed = float(self.description.coSimulation.fixedInternalStepSize or 0.0)
             size = proposed("stepSize", fixed) or (stop - start) / STEPS
         else:
             size = in_unit("step", step, "s")
         communication_points(stop - start, size)  # Rejects steps that are too small.
         if tolerance is None:
             tolerance = proposed("tolerance", None)
+        else:
+            tolerance = in_unit("tolerance", tolerance, "")
         if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0.0):
             raise ParameterError(f"tolerance = {tolerance:g} must be positive and finite")
-        steps, varies = (
-            (stop - start) / size,
-            self.simulation.canHandleVariableCommunicationStepSize,
-        )
-        if abs(steps - round(steps)) > 1e-9 * steps and not varies:
+        steps = (stop - start) / size
+        if abs(steps - round(steps)) > 1e-9 * steps and not self.varies:
             raise ParameterError(
                 f"stop_time = {stop:g} s: must be a multiple of step = {size:g} s, since the FMU "
                 "has a fixed step; choose a step that divides it"

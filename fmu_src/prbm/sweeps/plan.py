@@ -94,7 +94,8 @@ class Plan:
         self.method, self.seed = method, seed
         listed = not (vary is None or isinstance(vary, Mapping))
         self.whole_grid = runs is None and not listed
-        conditions = [_condition(text) for text in subject_to]
+        texts = [subject_to] if isinstance(subject_to, str) else subject_to
+        conditions = [_condition(text) for text in texts]
         named = self._named(outputs, [output for _, output, _, _ in conditions])
         self.model = model = model.needing(named.values())
         known = model.units

@@ -17,11 +17,13 @@ from collections import Counter, deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
+from numbers import Integral
 from typing import Any, Self
 
 from ..base.errors import ParameterError, PrbmError
 from ..base.processes import process_count
 from ..base.progress import Progress
+from ..files.settings import in_unit
 from .children import Job, Row, Unusable, release, run_row
 from .journal import Journal, Point
 from .outputs import CRASHED, Outcome
@@ -89,14 +91,14 @@ class Runner:
         workers: int | None = None,
         executor: Executor | str | None = None,
         retries: int = 1,
-        timeout: float | None = None,
+        timeout: float | str | None = None,
     ) -> None:
-        if workers is not None and workers < 1:
-            raise ParameterError(f"workers = {workers} must be 1 or more")
+        for name, number, least in (("workers", workers, 1), ("retries", retries, 0)):
+            if number is not None and not (isinstance(number, Integral) and number >= least):
+                raise ParameterError(f"{name} = {number!r} must be {least} or more")
+        timeout = None if timeout is None else in_unit("timeout", timeout, "s")
         if timeout is not None and not timeout > 0.0:
             raise ParameterError(f"timeout = {timeout:g} s must be positive")
-        if retries < 0:
-            raise ParameterError(f"retries = {retries} must be 0 or more")
         self.job, self.parameters, self.journal = job, parameters, journal
         self.retries, self.timeout = retries, timeout
         self.study, self.stack, self.stopped = uuid.uuid4().hex, ExitStack(), False

@@ -126,7 +126,7 @@ def study(
     workers: int | None = None,
     executor: Executor | str | None = None,
     retries: int = 1,
-    timeout: float | None = None,
+    timeout: float | str | None = None,
     engine: str | None = None,
     table: str | Path | None = None,
     overwrite: bool = False,
@@ -182,8 +182,8 @@ def study(
         address of a Dask scheduler; None: this machine.
     retries : int
         Number of repetitions of a simulation whose process crashed.
-    timeout : float or None
-        Longest duration of a simulation [s]; None: no limit.
+    timeout : float, str or None
+        Longest duration of a simulation [s], or a text, ``"20 s"``; None: no limit.
     table : str, Path or None
         Path of a table of the simulations, which is written at the end: CSV, or Parquet as of
         :func:`prbm.sweeps.sweep.sweep` if the name ends in ``.parquet``, to which rows can be

@@ -35,7 +35,7 @@ def sweep(
     scheduler: str | Executor | None = None,
     workers: int | None = None,
     retries: int = 1,
-    timeout: float | None = None,
+    timeout: float | str | None = None,
     overwrite: bool = False,
     retry_failed: bool = False,
     progress: Progress | None = None,
