@@ -27,22 +27,12 @@ RESAMPLES = 999  # Of the bootstrap that gives the confidence intervals of indic
 
 
 def drawn(distributions: Mapping[str, Any], n: int, seed: int, method: str) -> Real:
-    """Draw points.
+    """Draw points (m, p) as :func:`prbm.sweeps.sweep.samples`.
 
     A column is x = F^-1(u) with the distribution F and a sequence u in (0, 1): pseudo-random, a
     Latin hypercube or the scrambled sequence of Sobol.  The columns are independent of each other.
-
-    Parameters
-    ----------
-    distributions, n, seed
-        As for :func:`prbm.sweeps.sweep.samples`.
-    method : str
-        ``random``, ``latin``, ``sobol``, or ``sensitivity`` for n (p + 2) points: the rows of A, of
-        B, and for each parameter those of A with the column of B.
-
-    Returns
-    -------
-    (m, p)
+    The method ``sensitivity`` gives n (p + 2) points: the rows of A, of B, and for each parameter
+    those of A with the column of B.
 
     Raises
     ------
