@@ -233,6 +233,21 @@ def test_a_search_of_sides_that_is_given_up_names_its_limit(engine, monkeypatch)
 
 
 @engines
+def test_a_search_of_modes_that_is_given_up_names_its_limit(engine, monkeypatch):
+    model = rough(incline(30.0, velocity=0.0), 0.9)
+    few = ("generated.h", "MODES_TRIED_MAX = 2000", "MODES_TRIED_MAX = 2")
+    solve = "found->solved = "
+    unsolved = ("hybrid/rest.c", f"{solve}coulomb(", f"{solve}false && coulomb(")
+    monkeypatch.setattr(contact_modes, "rest_forces", lambda *_: None)
+    monkeypatch.setattr(contact_modes, "MODES_TRIED_MAX", 2)
+    words = "reduce the coefficients of friction; 1 contacts have more than the 2 combinations of"
+    with pytest.raises((PrbmError, KernelMistake), match=words):
+        Simulation(model) if engine == "python" else KernelSimulation(
+            model, changes=(few, unsolved), described=False
+        )
+
+
+@engines
 def test_another_error_while_sides_are_tried_is_reported(engine, monkeypatch):
     """On other sides the search would find forces, and the error would be hidden."""
     with pytest.raises((PrbmError, KernelMistake), match="another error"):

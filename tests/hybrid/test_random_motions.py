@@ -6,7 +6,7 @@ from random_motions import Findings, judge
 
 SEEDS = (9, 11, 22)
 # The last ones start on a spring's free length, by a repeated mode, and on guides that might push
-# to either side.  Or they have a mode with little energy, a spring of constant length, little energy
+# to either side.  Or they have a mode of little energy, a spring of constant length, little energy
 # beside the scale, contacts that stick together, a dead centre, or attempts that are left out.
 FURTHER_SEEDS = (
     *range(23, 44), 299, 439, 605, 1057, 1336, 1569, 623, 646, 1032, 1119, 1412, 1571, 366, 645,
