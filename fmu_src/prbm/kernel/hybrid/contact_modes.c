@@ -325,7 +325,7 @@ static bool find_rest(Simulation *sim, const HoldingSet *stops, const FrictionEv
     return ok;
 }
 
-static bool friction_jams(const Simulation *sim, const HoldingSet *touching, Problem *problem) {
+static bool friction_jams(Simulation *sim, const HoldingSet *touching, Problem *problem) {
     int all[CONTACTS_MAX], count = 0;
     for (int contact = 0; contact < contact_count(sim); contact++) {
         bool stop = is_stop(system_of(sim), contact);

@@ -75,7 +75,7 @@ PRBM bool contacts_jam(Simulation *sim, int count, const int *contacts, Problem 
         guided = guided || (rests && is_guide(system, c));
     }
     contacts_fail(sim, &JAMMED, count, contacts, problem);
-    if (guided && combinations > MODES_TRIED_MAX) {
+    if (guided && combinations > (double)MODES_TRIED_MAX) {
         return fail_further(problem,
                             "%d contacts have more than the %d combinations of modes that are tried",
                             count, MODES_TRIED_MAX);
