@@ -27,6 +27,10 @@ from .outputs import FUNDAMENTAL, Output
 from .runner import StudyError
 from .table import BITS, number
 
+OTHERS = (
+    "; give an FMU, FILE.fmu; the command prbm study and prbm.study(prbm.load(NAME), ...) simulate "
+    "a mechanism"
+)
 STEPS = 1000  # Communication steps for an FMU without a proposed step.
 NAMES_LISTED_MAX = 10  # Messages with more settable variables refer to "fmpy info" instead.
 FLOATS = ("Real", "Float32", "Float64")  # Types of variables.
@@ -40,18 +44,17 @@ def read_fmu(path: Path) -> tuple[bytes, Any]:
     StudyError
         If it cannot be read, or has no co-simulation of FMI 2.0 or 3.0.
     """
-    if path.suffix.lower() != ".fmu" and (path.suffix == ".toml" or not path.exists()):
-        raise StudyError(
-            f"{path} is no FMU; give the path of one, FILE.fmu; the command prbm study and "
-            "prbm.study(prbm.load(NAME), ...) simulate a mechanism"
-        )
-    data = reading.content(path, UNPACKED_SIZE_MAX, StudyError)
+    other = OTHERS if path.suffix.lower() != ".fmu" else ""
+    try:
+        data = reading.content(path, UNPACKED_SIZE_MAX, StudyError)
+    except StudyError as error:
+        raise StudyError(f"{error}{other}") from None
     try:
         check_unpacked_size(io.BytesIO(data))
         description = fmpy.read_model_description(io.BytesIO(data), validate=False)
     except Exception as error:  # FMPy raises plain exceptions.
         reason = " ".join(str(error).split())
-        raise StudyError(f"{path} is not a readable FMU: {reason}") from None
+        raise StudyError(f"{path} is not a readable FMU: {reason}{other}") from None
     if not description.fmiVersion.startswith(("2", "3")) or description.coSimulation is None:
         raise StudyError(
             f"{path} (FMI {description.fmiVersion}): must have co-simulation of FMI 2.0 or 3.0; "
