@@ -28,7 +28,7 @@ from .children import Job, Row, Unusable, release, run_row
 from .journal import Journal, Point
 from .outputs import CRASHED, Outcome
 
-ROWS_PER_THREAD = 8  # Rows submitted per thread, so that no thread waits for work.
+ROWS_PER_THREAD = 2  # Rows submitted per thread, so that no thread waits for work.
 ASKING_INTERVAL = 1.0  # Time after which a cluster is asked again for its threads [s].
 CONNECTION_TIMEOUT = 10.0  # Longest wait for a scheduler and its workers [s].
 MISSING_MODULE = "No module named"  # Python's message for a package that is not installed.
