@@ -97,11 +97,16 @@ def _force_time(view: StepView, guard: Guard, spring: int) -> float | None:
     """Return when the guard of a force falls in a step.
 
     At the start of the phase it may be round-off of either sign, which counts only if it persists.
+    A fall counts on projected states only, as the interpolation changes constant lengths.
     """
     times, states = view.arc.samples()
-    z = [guard(view.equations, spring, t, y) for t, y in zip(times, states, strict=True)]
+    equations = view.equations
+    z = [guard(equations, spring, t, y) for t, y in zip(times, states, strict=True)]
     begins = z[0] <= 0.0
     for j in range(int(begins), GUARD_INTERVALS):
+        if z[j + 1] <= 0.0 < z[j]:
+            at = times[j + 1]
+            z[j + 1] = guard(equations, spring, at, equations.project(at, states[j + 1]))
         if z[j + 1] <= 0.0 < z[j]:
             return fall_time(view.along(guard, spring), times[j], times[j + 1], view.event_time)
     return float(times[1]) if begins and z[-1] < 0.0 else None

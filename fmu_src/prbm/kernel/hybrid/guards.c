@@ -518,11 +518,31 @@ PRBM bool closing_time(Simulation *sim, const Guard *guard, int stop, Fall *fall
     return !search.failed;
 }
 
+/* Compute a guard at sample k, projected onto the constraints. */
+static bool projected_guard(const Search *search, int k, double *z) {
+    Simulation *sim = search->sim;
+    Scratch scratch = sim->scratch;
+    Instant at = sample(sim, k);
+    int n = system_of(sim)->n;
+    double *y = take(&scratch, (size_t)state_size(sim));
+    Complex *e = take_complex(&scratch, 1, system_of(sim)->d);
+    zeros(state_size(sim), y);
+    copy(sample_size(sim), at.q, y);
+    if (!project(&sim->equations, at.time, y, scratch, search->problem)) {
+        return false;
+    }
+    directions(system_of(sim), y, e);
+    Instant projected = {at.time, y, y + n, extra_states(sim, y), e, NULL};
+    *z = search->guard->value(&sim->equations, &projected, search->contact);
+    return true;
+}
+
 /* Find the first time within the step at which a guard falls to zero, from its values at the
  * samples.  If it begins at most at zero_level, only a fall from above the noise counts, or a value
- * below it at the end: that of the start, and what an acceleration of round-off adds in the step. */
+ * below it at the end: that of the start, and what an acceleration of round-off adds in the step.  If
+ * projects, a fall counts on projected states only, as the interpolation changes constant lengths. */
 static bool fall_in_samples(Simulation *sim, const Guard *guard, int contact, double zero_level,
-                            double acceleration, Fall *fall, Problem *problem) {
+                            double acceleration, bool projects, Fall *fall, Problem *problem) {
     Search search = {sim, guard, contact, false, problem};
     ArcGuard on_arc = arc_guard(&search);
     double z[GUARD_INTERVALS + 1];
@@ -534,7 +554,11 @@ static bool fall_in_samples(Simulation *sim, const Guard *guard, int contact, do
     double residual = lesser(fabs(z[0]), zero_level); /* Until the end of the step is projected. */
     double noise = begins ? residual + acceleration * sim->state.arc.h : 0.0;
     for (int k = begins; !fall->found && k < GUARD_INTERVALS; k++) {
-        if (z[k] > noise && z[k + 1] <= 0.0) {
+        bool falls = z[k] > noise && z[k + 1] <= 0.0;
+        if (falls && projects && !projected_guard(&search, k + 1, &z[k + 1])) {
+            return false;
+        }
+        if (falls && z[k + 1] <= 0.0) {
             fall->found = true;
             fall->time = locate(&on_arc, sample_time(sim, k), sample_time(sim, k + 1));
         }
@@ -552,7 +576,7 @@ static bool fall_in_samples(Simulation *sim, const Guard *guard, int contact, do
 
 PRBM bool sampled_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
                        Problem *problem) {
-    return fall_in_samples(sim, guard, contact, 0.0, 0.0, fall, problem);
+    return fall_in_samples(sim, guard, contact, 0.0, 0.0, true, fall, problem);
 }
 
 /* --- friction and releases -------------------------------------------------------------------- */
@@ -564,8 +588,8 @@ PRBM bool sampled_time(Simulation *sim, const Guard *guard, int contact, Fall *f
 PRBM bool reversal_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
                         Problem *problem) {
     double zero = zero_speed(&sim->configuration);
-    return fall_in_samples(sim, guard, contact, zero, zero_acceleration(&sim->configuration), fall,
-                           problem);
+    return fall_in_samples(sim, guard, contact, zero, zero_acceleration(&sim->configuration), false,
+                           fall, problem);
 }
 
 /* Find the time at which a guard falls below -offset, from its values at the start, the middle and
