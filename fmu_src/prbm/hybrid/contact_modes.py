@@ -322,13 +322,13 @@ def _jammed(configuration: Configuration, front: Front, contacts: Iterable[int])
         if equations.friction_coefficient(c) > 0.0
         and _sliding_mode(configuration.scales, front, c, 0.0) is FRICTIONLESS
     ]
-    stops = sum(c < front.contacts.stops and c not in front.contacts.pressed for c in every)
+    stops = [c for c in every if c < front.contacts.stops and c not in front.contacts.pressed]
     if any(map(equations.is_guide, resting)) and (
-        2.0**stops * 3.0 ** len(resting) > MODES_TRIED_MAX
+        2.0 ** len(stops) * 3.0 ** len(resting) > MODES_TRIED_MAX
     ):
         remark = (
-            f"; {len(every)} contacts have more than the {MODES_TRIED_MAX} combinations of modes "
-            "that are tried"
+            f"; {len({*stops, *resting})} contacts at rest may have more than the "
+            f"{MODES_TRIED_MAX} combinations of modes that are tried"
         )
     return JammedError(_failure(configuration, front, every, JAMMED) + remark)
 

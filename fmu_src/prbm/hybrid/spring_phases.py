@@ -97,7 +97,8 @@ def _force_time(view: StepView, guard: Guard, spring: int) -> float | None:
     """Return when the guard of a force falls in a step.
 
     At the start of the phase it may be round-off of either sign, which counts only if it persists.
-    A fall counts on projected states only, as the interpolation changes constant lengths.
+    A fall between two samples counts on projected states only, as the interpolation changes
+    constant lengths.
     """
     times, states = view.arc.samples()
     equations = view.equations

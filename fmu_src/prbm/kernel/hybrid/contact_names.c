@@ -66,6 +66,7 @@ PRBM bool contacts_jam(Simulation *sim, int count, const int *contacts, Problem 
     Complex *e = directions_at(sim, sim->state.front, &scratch);
     double combinations = 1.0;
     bool guided = false;
+    int several = 0;
     for (int k = 0; k < count; k++) {
         int c = contacts[k];
         bool rigid = is_stop(system, c) && !is_pressed(&sim->state.touching[c]);
@@ -73,12 +74,13 @@ PRBM bool contacts_jam(Simulation *sim, int count, const int *contacts, Problem 
         bool rests = rough && fabs(sliding_velocity(system, c, e, v)) <= zero_speed(&sim->configuration);
         combinations *= (rigid ? 2.0 : 1.0) * (rests ? 3.0 : 1.0);
         guided = guided || (rests && is_guide(system, c));
+        several += rigid || rests;
     }
     contacts_fail(sim, &JAMMED, count, contacts, problem);
     if (guided && combinations > (double)MODES_TRIED_MAX) {
         return fail_further(problem,
-                            "%d contacts have more than the %d combinations of modes that are tried",
-                            count, MODES_TRIED_MAX);
+                            "%d contacts at rest may have more than the %d combinations of modes that "
+                            "are tried", several, MODES_TRIED_MAX);
     }
     return false;
 }
