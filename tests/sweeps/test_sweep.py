@@ -755,8 +755,8 @@ def test_random_samples_follow_their_distribution_and_seed():
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (({}, 5), "5 rows of 0 parameters: draw at least one"),
-        (({"a": (0.0, 1.0)}, 0), "0 rows of 1 parameters: draw at least one"),
+        (({}, 5), "5 rows without parameters: name at least one"),
+        (({"a": (0.0, 1.0)}, 0), "n = 0 must be 1 or more"),
         (({"a": 3.0}, 5), "a: 3.0 must be a distribution"),
         (({"a": stats.norm(0.0, -1.0)}, 5), "a: the quantiles of the distribution must be"),
         (

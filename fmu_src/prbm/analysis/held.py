@@ -1,11 +1,8 @@
 """The displacement or rotation at which the released body is held: units and bounds."""
 
 import math
-import operator
 from dataclasses import dataclass
-from typing import Any, SupportsIndex
 
-from ..base.errors import ParameterError
 from ..files.settings import UserMistake
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
@@ -48,22 +45,6 @@ def held_unit(mechanism: Mechanism) -> HeldUnit:
 def held_scale(system: System) -> float:
     """Return the scale of held amounts: the size [m], or one radian."""
     return 1.0 if system.mechanism.release.turns else system.length
-
-
-def check_count(name: str, value: Any, least: int, largest: int = POINTS_MAX) -> int:
-    """Return a number of points or branches.
-
-    Raises
-    ------
-    ParameterError
-        If it is no integer, or out of its bounds.
-    """
-    if isinstance(value, bool) or not isinstance(value, SupportsIndex):
-        raise ParameterError(f"{name} = {value!r} must be an integer")
-    count = operator.index(value)
-    if not least <= count <= largest:
-        raise ParameterError(f"{name} = {count} must lie between {least} and {largest}")
-    return count
 
 
 def check_held(x: float, system: System, option: str) -> float:

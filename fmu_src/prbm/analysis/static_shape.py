@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base.counts import check_count
 from ..base.errors import ParameterError
 from ..files.settings import in_si, in_unit
 from ..mechanics import modal, statics
@@ -20,7 +21,7 @@ from ..mechanics.stress import Stress, static_stresses
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import Probe
-from .held import check_count, check_held, held_unit
+from .held import POINTS_MAX, check_held, held_unit
 from .holding import Curve, curve
 
 
@@ -271,5 +272,6 @@ def holding_curve(
     )
     if not low < high:
         raise ParameterError(f"start = {low:g} {si} must be below end = {high:g} {si}")
-    count, followed = check_count("points", points, 2), check_count("branches", branches, 0)
+    count = check_count("points", points, 2, POINTS_MAX)
+    followed = check_count("branches", branches, 0, POINTS_MAX)
     return curve(system, np.linspace(low, high, count), branches=followed)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest, norm, qmc
 
+from ..base.counts import check_count
 from ..base.errors import ParameterError
 from ..mechanics.arrays import Real
 from ..mechanism.parameters import Tolerance
@@ -37,11 +38,12 @@ def drawn(distributions: Mapping[str, Any], n: int, seed: int, method: str) -> R
     Raises
     ------
     ParameterError
-        If n or the number of parameters is zero, or a distribution or a method is invalid.
+        If n is zero, the seed negative, there are no parameters, or a distribution or a method is
+        invalid.
     """
-    d = len(distributions)
-    if not distributions or n < 1:
-        raise ParameterError(f"{n} rows of {d} parameters: draw at least one of each")
+    n, seed, d = check_count("n", n, 1), check_count("seed", seed, 0), len(distributions)
+    if not distributions:
+        raise ParameterError(f"{n} rows without parameters: name at least one")
     unit = np.clip(_unit(n, d, seed, method), PROBABILITY_MIN, 1.0 - PROBABILITY_MIN)
     columns = [_quantiles(*item, u) for item, u in zip(distributions.items(), unit.T, strict=True)]
     return np.column_stack(columns)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
+from ..base.counts import check_count
 from ..base.errors import ParameterError
 from ..base.names import proposal
 from ..files.settings import in_unit, is_tolerance, tolerance
@@ -219,6 +220,7 @@ class Plan:
             count = math.prod(map(len, varied.values()))
         else:
             varied = {name: self._distribution(name, x) for name, x in columns.items()}
+            runs = check_count("runs", runs, 1)
             count = runs * (len(varied) + 2 if self.method == SENSITIVITY else 1)
         if count > RUNS_MAX:
             raise ParameterError(f"the study has {count} simulations; reduce them to {RUNS_MAX}")

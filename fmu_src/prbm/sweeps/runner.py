@@ -17,9 +17,9 @@ from collections import Counter, deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
-from numbers import Integral
 from typing import Any, Self
 
+from ..base.counts import check_count
 from ..base.errors import ParameterError, PrbmError
 from ..base.processes import process_count
 from ..base.progress import Progress
@@ -93,12 +93,11 @@ class Runner:
         retries: int = 1,
         timeout: float | str | None = None,
     ) -> None:
-        for name, number, least in (("workers", workers, 1), ("retries", retries, 0)):
-            if number is not None and not (isinstance(number, Integral) and number >= least):
-                raise ParameterError(f"{name} = {number!r} must be {least} or more")
+        workers = None if workers is None else check_count("workers", workers, 1)
+        retries = check_count("retries", retries, 0)
         timeout = None if timeout is None else in_unit("timeout", timeout, "s")
-        if timeout is not None and not timeout > 0.0:
-            raise ParameterError(f"timeout = {timeout:g} s must be positive")
+        if timeout is not None and not 0.0 < timeout < math.inf:
+            raise ParameterError(f"timeout = {timeout:g} s must be positive and finite")
         self.job, self.parameters, self.journal = job, parameters, journal
         self.retries, self.timeout = retries, timeout
         self.study, self.stack, self.stopped = uuid.uuid4().hex, ExitStack(), False
