@@ -6,10 +6,12 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
+from prbm.sweeps.children import Child, Processes
 from prbm.sweeps.journal import Journal
 from prbm.sweeps.outputs import OK, Outcome
 from prbm.sweeps.runner import Runner
 from prbm.sweeps.study import study
+from talking import Talking
 
 
 class Endless:
@@ -40,6 +42,35 @@ def test_an_error_ends_simulations_in_threads():
         compute()
     assert threading.active_count() == threads
     assert [*journal.known] == [(0.0,)]
+
+
+@pytest.fixture
+def processes():
+    found = Processes(Talking(0.0, 1.0, 0.1, None, {}, ()), 0, 1e12)
+    yield found
+    found.close()
+
+
+@pytest.mark.slow
+def test_the_message_of_a_crash_has_the_last_line_of_its_run_alone(processes):
+    assert processes.run({"a": 0.0}).status == OK
+    assert processes.run({"a": 1.0}).message.endswith("exit code 3 (the reason)")
+
+
+@pytest.mark.slow
+def test_a_process_that_is_late_is_not_used_again(processes, monkeypatch):
+    receive = Child.receive
+
+    def late(child, timeout):
+        outcome = receive(child, timeout)
+        child._time_out()
+        return outcome
+
+    assert processes.run({"a": 0.0}).status == OK
+    assert len(processes.idle) == 1
+    monkeypatch.setattr(Child, "receive", late)
+    assert processes.run({"a": 0.0}).status == OK
+    assert not processes.idle
 
 
 def test_threads_give_the_same_bits(mechanisms):

@@ -213,7 +213,7 @@ def _runner_arguments(parser: ArgumentParser) -> None:
     add("--workers", type=int, metavar="N", help="number of parallel runs (default: one per core)")
     add(
         "--scheduler", metavar="ADDRESS",
-        help="Dask scheduler that runs them, e.g. tcp://host:8786 (default: this machine)",
+        help="Dask scheduler for the runs, e.g. tcp://host:8786 (default: this machine)",
     )  # fmt: skip
     add(
         "--retries", type=int, default=1, metavar="N",

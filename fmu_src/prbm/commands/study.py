@@ -190,7 +190,9 @@ def _vary(
         return Path(options.table)
     if options.table is None and options.vary is None and options.runs and model.tolerances:
         return None  # Drawn within the tolerances of the mechanism.
-    if options.table is not None or options.vary is None:
+    if options.table is not None:
+        raise UserMistake("the parameters are in --table and in --vary: omit one of them")
+    if options.vary is None:
         raise UserMistake(
             "give the parameters with --vary, a list of them with --table, or [tolerances] in the "
             "mechanism file and --runs"

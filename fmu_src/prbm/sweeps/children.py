@@ -175,7 +175,7 @@ class Child:
 
     def receive(self, timeout: float | None) -> Any:
         """Return a reply; None if the process ended or was killed after ``timeout`` [s]."""
-        timer = threading.Timer(timeout or 0.0, self._time_out)
+        timer = threading.Timer(min(timeout or 0.0, threading.TIMEOUT_MAX), self._time_out)
         if timeout is not None:
             timer.start()
         try:
@@ -184,6 +184,8 @@ class Child:
             return None
         finally:
             timer.cancel()
+            if timeout is not None:
+                timer.join()  # It may be about to kill the process.
 
     def _time_out(self) -> None:
         self.late = True
@@ -237,7 +239,8 @@ class Processes:
             outcome: Outcome | None = child.receive(self.timeout)
             with self.lock:
                 self.busy.discard(child)
-                if outcome is not None and not outcome.spent and not self.closed:
+                spent = outcome is None or outcome.spent or child.late
+                if outcome is not None and not spent and not self.closed:
                     self.idle.append(child)
                     return outcome
             end = child.close()
@@ -258,7 +261,8 @@ class Processes:
             child.close()  # It was killed while it had no work.
             child = None
         child = child or Child(self.job)
-        child.stderr.truncate(0)
+        child.stderr.seek(0)  # For the process, too.
+        child.stderr.truncate()
         with self.lock:
             self.busy.add(child)
             if not self.closed:
