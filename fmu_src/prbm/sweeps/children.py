@@ -239,8 +239,7 @@ class Processes:
             outcome: Outcome | None = child.receive(self.timeout)
             with self.lock:
                 self.busy.discard(child)
-                spent = outcome is None or outcome.spent or child.late
-                if outcome is not None and not spent and not self.closed:
+                if outcome is not None and not (outcome.spent or child.late or self.closed):
                     self.idle.append(child)
                     return outcome
             end = child.close()
