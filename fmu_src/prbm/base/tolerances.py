@@ -41,9 +41,7 @@ STATICS_SHRINK_MIN = 0.25  # Smallest ratio of a load step to the one before.
 STATICS_SHRINK = 0.5  # Ratio of a load step to one without an equilibrium.
 STATICS_GROWTH_MAX = 2.0  # Largest ratio of a load step to an accepted one before.
 STATICS_CONSTRAINT_RTOL = 1e-13  # Of the size: residual of closed loops at an equilibrium.
-STIFFNESS_ROUNDING_RTOL = (
-    1e-12  # Of the largest stiffness of a balance, or of the scale of energies: less is round-off.
-)
+STIFFNESS_ROUNDING_RTOL = 1e-12  # Of the largest stiffness or scale of energies: less is round-off.
 STATICS_FORCE_RTOL = 1e-12  # Of the stiffest spring at one radian: residual torque.
 STATICS_ROUNDING_RTOL = 1e-13  # Of the torques that are added: residual torque of round-off.
 REPEATED_MODE_RTOL = 1e-11  # Of the largest square of a frequency: less between two is round-off.
