@@ -284,6 +284,70 @@ def test_samples_end_at_the_time_of_an_error(engine):
     assert sim.time == 0.02
 
 
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(
+    ("name", "stop"), [("PRBDM2R", "stop"), ("SliderCrank", "stop"), ("Bistable", "far_stop")]
+)
+def test_values_beside_events_are_those_of_the_impacts(engine, name, stop):
+    """The rates of the gap are the speeds of the impact; the motion does not change."""
+    guide, times = mechanism(name), np.linspace(0.0, 0.12, 31)
+    names = [f"{stop}.gap_rate", f"{stop}.impact_count", "energy.kinetic", "energy.elastic"]
+    observed, plain, rows = engine(guide), engine(guide), []
+    observed.record = []
+    assert (observed.sample(times, names, rows) == plain.sample(times, names)).all()
+    rows, hits = np.array(rows), observed.record
+    assert len(hits) > 0
+    assert (np.diff(rows[:, 0]) >= 0.0).all()
+    assert {hit.stop for hit in hits} == {stop}
+    for hit in hits:
+        before = rows[rows[:, 0] == math.nextafter(hit.time, -math.inf)][0, 1:]
+        after = rows[rows[:, 0] == hit.time][-1, 1:]
+        assert -before[0] == pytest.approx(hit.latched.approach_speed, rel=1e-6)
+        assert after[0] == pytest.approx(hit.latched.rebound_speed, rel=1e-6, abs=1e-12)
+        assert after[1] - before[1] == 1
+        lost = before[2] + before[3] - after[2] - after[3]
+        assert lost == pytest.approx(hit.latched.energy_lost, rel=1e-6)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_events_of_a_failed_advance_are_not_kept(engine, monkeypatch):
+    """The same advance is repeated later; each event is kept once, and no more without a list."""
+    failing, plain = (engine(mechanism("PRBDM2R")) for _ in range(2))
+    kept, expected = [], []
+    with monkeypatch.context() as patch:
+        if engine is Simulation:
+            apply = Simulation._apply
+            patch.setattr(Simulation, "_apply", lambda sim, event: (apply(sim, event), 1 / 0))
+        else:
+            patch.setattr(failing, "_library", Interrupted(failing._library))
+        with pytest.raises(ZeroDivisionError):
+            failing.sample([0.04, 0.4], ["shuttle.vx"], kept)
+    assert failing.time == 0.04
+    assert kept == []
+    failing.sample([0.4], ["shuttle.vx"], kept)
+    plain.sample([0.04, 0.4], ["shuttle.vx"], expected)
+    assert len(kept) > 2
+    assert kept == expected
+    plain.sample([0.5], ["shuttle.vx"])
+    plain.sample([0.5], ["shuttle.vx"], rows := [])
+    assert rows == []
+
+
+class Interrupted:
+    """The library of the kernel, with an error at the second part of the second sample."""
+
+    def __init__(self, library):
+        self.library, self.parts = library, 0
+
+    def __getattr__(self, name):
+        return getattr(self.library, name)
+
+    def prbm_sample(self, address, *arguments):
+        count = self.library.prbm_sample(address, *arguments)
+        self.parts += self.library.prbm_time(address) > 0.0
+        return count if self.parts < 2 else 1 / 0
+
+
 @pytest.mark.slow
 def test_memory_is_freed_with_the_simulation_and_with_the_mechanism(monkeypatch):
     closed = []
@@ -382,6 +446,7 @@ def test_random_calls_raise_no_other_errors_than_those_of_the_package(seed):
             lambda: sim.advance(sim.time + 1e-3 * abs(number())),
             lambda: sim.sample([number(), number()], outputs),
             lambda: sim.check_effort(number()),
+            lambda: sim.sample([sim.time + 1e-3 * abs(number())], outputs, []),
             lambda: sim.restore({**sim.snapshot(), "numbers": damaged(sim, random, number)}),
             sim.outputs,
             sim.state,

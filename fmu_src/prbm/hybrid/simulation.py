@@ -8,7 +8,7 @@ stop that holds is a constraint, not a spring and not a series of small bounces.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -120,6 +120,7 @@ class Simulation:
         self.controller = StepSizeController()
         self.window = EventWindow(self.time)
         self.record: list[Impact] | None = None
+        self._beside: Callable[[float, float], None] | None = None  # Called beside events.
         self.step_count = 0  # Integration steps since the start, for limits of the effort.
         self._output_cache: tuple[float, Outputs] | None = None
         self._middle: tuple[Arc, Node] | None = None  # The middle of a step.
@@ -298,6 +299,9 @@ class Simulation:
 
     def _apply(self, event: Event) -> None:
         """Apply an event at the front."""
+        beside = None if event.kind is EventKind.SWITCH else self._beside
+        if beside is not None:
+            beside(event.time, math.nextafter(event.time, -math.inf))
         self.window = self.window.counting(event, self.configuration)
         front = contact_peaks.latched_until(self.configuration, self.front, self.arc, event.time)
         self._set_front(*events.apply(self.configuration, front, event))
@@ -307,6 +311,8 @@ class Simulation:
             )
         elif event.kind is EventKind.SEPARATION:
             self.controller = compliant.lengthened(self.controller, front.touches[event.contact])
+        if beside is not None:
+            beside(event.time, event.time)
 
     def _set_front(self, front: Front, counted: list[Impact]) -> None:
         """Continue from a front without the step that led there."""
@@ -453,7 +459,12 @@ class Simulation:
         q, v = y[:n], y[n : 2 * n]
         return motions(self.system, q, v, self.system.directions(q))
 
-    def sample(self, times: Sequence[float] | Real, names: Sequence[str]) -> Real:
+    def sample(
+        self,
+        times: Sequence[float] | Real,
+        names: Sequence[str],
+        events: list[list[float]] | None = None,
+    ) -> Real:
         """Advance to each of several times and return outputs there, (m, k).
 
         Parameters
@@ -462,6 +473,10 @@ class Simulation:
             Times in ascending order, not before the present time [s].
         names : (k,)
             Names of outputs, in SI units and rad.
+        events : list or None
+            If a list, the time and the outputs directly before and after each event are appended
+            to it; before an event, the time is the largest number below that of the event.
+            Changes of phase of compliant stops are no such events: nothing has a jump there.
 
         Raises
         ------
@@ -475,11 +490,28 @@ class Simulation:
             if name not in outputs:
                 raise ParameterError(unknown(name, outputs))
         moving = self.motions().keys() >= set(names)
+
+        def values() -> list[float]:
+            self._output_cache = None
+            out: Mapping[str, float] = self.motions() if moving else self.outputs()
+            return [out[name] for name in names]
+
+        def beside(time: float, label: float) -> None:
+            now, self.time = self.time, time
+            kept.append([label, *values()])
+            self.time, self._output_cache = now, None
+
         rows = np.empty((len(times), len(names)))
         for row, t in zip(rows, times, strict=True):
-            self.advance(t)
-            out: Mapping[str, float] = self.motions() if moving else self.outputs()
-            row[:] = [out[name] for name in names]
+            kept: list[list[float]] = []
+            self._beside = None if events is None else beside
+            try:
+                self.advance(t)
+            finally:
+                self._beside = None
+            row[:] = values()
+            if events is not None:
+                events += kept
         return rows
 
     # -- saving and restoring --

@@ -166,6 +166,30 @@ typedef struct {
 
 typedef enum { REACHED, AT_EVENT, AFTER_STEPS } Ending;
 
+/* Show the moment before or after an event to the observer, if there is one. */
+static bool show(Simulation *sim, double time, bool after, Problem *problem) {
+    double now = sim->state.time;
+    if (!sim->observe) {
+        return true;
+    }
+    sim->state.time = time;
+    sim->present.fresh = NOTHING;
+    bool ok = sim->observe(sim->observer, time, after, problem);
+    sim->state.time = now;
+    sim->present.fresh = NOTHING;
+    return ok;
+}
+
+/* Apply the pending event and show it, unless the phase of a contact changes, without a jump. */
+static bool apply_shown(Simulation *sim, Problem *problem) {
+    double time = sim->state.pending.time;
+    if (sim->state.pending.kind == EVENT_SWITCH) {
+        return apply_pending(sim, problem);
+    }
+    return show(sim, time, false, problem) && apply_pending(sim, problem) &&
+           show(sim, time, true, problem);
+}
+
 /* Continue a communication step that has begun. */
 static bool proceed(Simulation *sim, double time, Stops stops, Effort *effort, Ending *ending,
                     Problem *problem) {
@@ -176,7 +200,7 @@ static bool proceed(Simulation *sim, double time, Stops stops, Effort *effort, E
             if (stops.events && state->pending.kind != EVENT_SWITCH) {
                 return true;
             }
-            if (!apply_pending(sim, problem)) {
+            if (!apply_shown(sim, problem)) {
                 return false;
             }
         }

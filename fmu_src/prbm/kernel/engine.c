@@ -1,5 +1,7 @@
-/* The library of the Python package: simulations with a record of their impacts. */
+/* The library of the Python package: simulations with a record of their impacts and events. */
+#include <float.h>
 #include <limits.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -10,17 +12,24 @@
 #include "values.h"
 #include "hybrid/access.h"
 
-enum { FIRST_IMPACTS = 16 }; /* number of impacts for which there is memory at first */
+enum { FIRST_ROWS = 16 }; /* number of rows of a record for which there is memory at first */
 enum { CALL_STEPS = 50, CALL_COORDINATES = 30 }; /* steps of a call, up to so many coordinates */
+
+/* Rows of numbers, which grow. */
+typedef struct {
+    double *numbers; /* (room, size of a row) */
+    int count, room;
+    int before; /* count before an advance that is unfinished */
+} Record;
 
 struct Engine {
     Simulation *simulation;
-    int n;            /* number of coordinates */
-    double *record;   /* (room, prbm_impact_size) */
-    int count, room;  /* numbers of impacts */
-    bool incomplete;  /* an impact could not be recorded */
-    Effort effort;    /* of an advance that is unfinished; no steps: none is */
-    int before;       /* number of impacts before it */
+    int n;           /* number of coordinates */
+    Record impacts;  /* prbm_impact_size numbers each */
+    bool incomplete; /* an impact could not be recorded */
+    Record events;   /* time and values of the slots, before and after each event */
+    int *slots, slot_count;
+    Effort effort;   /* of an advance that is unfinished; no steps: none is */
 };
 
 static bool succeed(bool ok, const Problem *problem, char *message) {
@@ -59,11 +68,13 @@ EXPORTED Engine *prbm_open(const Mechanism *mechanism) {
 
 EXPORTED void prbm_close(Engine *engine) {
     simulation_close(engine->simulation);
-    free(engine->record);
+    free(engine->impacts.numbers);
+    free(engine->events.numbers);
+    free(engine->slots);
     free(engine);
 }
 
-/* --- the record of impacts -------------------------------------------------------------------- */
+/* --- the records of impacts and events -------------------------------------------------------- */
 
 enum { IMPACT_NUMBERS = 12 }; /* before the coordinates and rates */
 
@@ -75,34 +86,42 @@ static size_t impact_size(const Engine *engine) {
     return (size_t)prbm_impact_size(engine);
 }
 
-/* Provide memory for one more impact. */
-static bool make_room(Engine *engine) {
-    if (engine->count < engine->room) {
-        return true;
+/* Return one more row of a record; NULL if there is no memory. */
+static double *new_row(Record *record, size_t size) {
+    if (record->count == record->room) {
+        if (record->room > INT_MAX / 2) {
+            return NULL;
+        }
+        int room = record->room ? 2 * record->room : FIRST_ROWS;
+        size_t bytes = size * sizeof(double);
+        bool fits = (size_t)room < SIZE_MAX / bytes;
+        double *numbers = fits ? realloc(record->numbers, (size_t)room * bytes) : NULL;
+        if (!numbers) {
+            return NULL;
+        }
+        record->numbers = numbers;
+        record->room = room;
     }
-    if (engine->room > INT_MAX / 2) {
-        return false;
+    return record->numbers + (size_t)record->count++ * size;
+}
+
+/* Move the rows of a record out. */
+static void move_rows(Record *record, size_t size, double *numbers) {
+    size_t count = (size_t)record->count * size;
+    if (count > 0) {
+        memcpy(numbers, record->numbers, count * sizeof *numbers);
     }
-    int room = engine->room ? 2 * engine->room : FIRST_IMPACTS;
-    size_t size = impact_size(engine) * sizeof(double);
-    bool fits = (size_t)room < SIZE_MAX / size;
-    double *record = fits ? realloc(engine->record, (size_t)room * size) : NULL;
-    if (!record) {
-        return false;
-    }
-    engine->record = record;
-    engine->room = room;
-    return true;
+    record->count = 0;
 }
 
 static void record_impact(void *listener, const Impact *impact) {
     Engine *engine = listener;
-    if (!make_room(engine)) {
+    double *to = new_row(&engine->impacts, impact_size(engine));
+    if (!to) {
         engine->incomplete = true;
         return;
     }
     int n = engine->n;
-    double *to = engine->record + impact_size(engine) * (size_t)engine->count;
     const double numbers[IMPACT_NUMBERS] = {
         impact->index,         impact->count,   impact->time,
         impact->approach_speed, impact->rebound_speed, impact->impulse,
@@ -113,20 +132,54 @@ static void record_impact(void *listener, const Impact *impact) {
     copy(n, impact->q, to + IMPACT_NUMBERS);
     copy(n, impact->before, to + IMPACT_NUMBERS + n);
     copy(n, impact->after, to + IMPACT_NUMBERS + 2 * n);
-    engine->count++;
 }
 
 EXPORTED void prbm_record(Engine *engine, bool record) {
     simulation_listen(engine->simulation, record ? record_impact : NULL, engine);
-    engine->count = 0;
+    engine->impacts.count = 0;
 }
 
 EXPORTED void prbm_impacts(Engine *engine, double *numbers) {
-    size_t count = (size_t)engine->count * impact_size(engine);
-    if (count > 0) {
-        memcpy(numbers, engine->record, count * sizeof *numbers);
+    move_rows(&engine->impacts, impact_size(engine), numbers);
+}
+
+static bool record_event(void *observer, double time, bool after, Problem *problem) {
+    Engine *engine = observer;
+    double *row = new_row(&engine->events, 1 + (size_t)engine->slot_count);
+    bool ok = row || fail(problem, "there is not enough memory to record the events up to "
+                                   "t = %.9g s: simulate in shorter parts", time);
+    if (ok) {
+        row[0] = after ? time : nextafter(time, -DBL_MAX);
     }
-    engine->count = 0;
+    for (int i = 0; ok && i < engine->slot_count; i++) {
+        ok = simulation_get(engine->simulation, engine->slots[i], &row[1 + i], problem);
+    }
+    return ok;
+}
+
+EXPORTED bool prbm_observe(Engine *engine, int count, const int *slots, char *message) {
+    Problem problem = {""};
+    int *kept = realloc(engine->slots, ((size_t)count + 1) * sizeof *slots);
+    if (!succeed(kept || fail(&problem, "there is not enough memory to record events"), &problem,
+                 message)) {
+        return false;
+    }
+    if (count > 0) {
+        memcpy(kept, slots, (size_t)count * sizeof *slots);
+    }
+    engine->slots = kept;
+    engine->slot_count = count;
+    engine->events.count = 0;
+    simulation_observe(engine->simulation, count > 0 ? record_event : NULL, engine);
+    return true;
+}
+
+EXPORTED int prbm_observed_count(const Engine *engine) {
+    return engine->events.count;
+}
+
+EXPORTED void prbm_observed(Engine *engine, double *rows) {
+    move_rows(&engine->events, 1 + (size_t)engine->slot_count, rows);
 }
 
 /* --- simulation ------------------------------------------------------------------------------- */
@@ -164,12 +217,19 @@ static int steps_of_call(int n) {
     return ratio > 1.0 ? 1 + (int)(CALL_STEPS / (ratio * ratio * ratio)) : CALL_STEPS;
 }
 
+/* Remove the rows of an advance that has failed. */
+static void forget_rows(Engine *engine) {
+    engine->impacts.count = engine->impacts.before;
+    engine->events.count = engine->events.before;
+}
+
 EXPORTED int prbm_advance(Engine *engine, double time, char *message) {
     Problem problem = {""};
     Simulation *sim = engine->simulation;
     bool reached;
     if (engine->effort.steps == 0) {
-        engine->before = engine->count;
+        engine->impacts.before = engine->impacts.count;
+        engine->events.before = engine->events.count;
         engine->incomplete = false;
     }
     bool ok = simulation_advance_part(sim, time, steps_of_call(engine->n), &engine->effort,
@@ -184,16 +244,16 @@ EXPORTED int prbm_advance(Engine *engine, double time, char *message) {
     }
     engine->effort.steps = 0;
     if (!succeed(ok, &problem, message)) {
-        engine->count = engine->before;
+        forget_rows(engine);
         return -1;
     }
-    return engine->count;
+    return engine->impacts.count;
 }
 
 EXPORTED void prbm_abandon(Engine *engine) {
     if (engine->effort.steps > 0) {
         simulation_abandon(engine->simulation);
-        engine->count = engine->before;
+        forget_rows(engine);
         engine->effort.steps = 0;
     }
 }
@@ -226,7 +286,7 @@ EXPORTED int prbm_sample(Engine *engine, int samples, const double *times, int c
         }
         ++*done;
     }
-    return engine->count;
+    return engine->impacts.count;
 }
 
 EXPORTED bool prbm_state(Engine *engine, double *y, char *message) {

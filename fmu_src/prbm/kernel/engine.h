@@ -72,6 +72,13 @@ EXPORTED int prbm_mode_count(const Engine *engine);
 EXPORTED int prbm_modes(Engine *engine, double *q, double *frequencies, double *shapes,
                         char *message);
 
+/* Keep the values of slots (count,) directly before and after each event from now on; 0: no longer. */
+EXPORTED bool prbm_observe(Engine *engine, int count, const int *slots, char *message);
+/* The number of rows that have been kept.  Move them out: time and values, (rows, 1 + count).  Before
+ * an event, the time is the largest number below that of the event. */
+EXPORTED int prbm_observed_count(const Engine *engine);
+EXPORTED void prbm_observed(Engine *engine, double *rows);
+
 /* Record the impacts from now on, or no longer. */
 EXPORTED void prbm_record(Engine *engine, bool record);
 /* The count of numbers of a recorded impact; the last 3 n are its coordinates, the rates before and

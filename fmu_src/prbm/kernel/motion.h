@@ -24,6 +24,13 @@ PRBM Simulation *simulation_open(const Mechanism *mechanism);
 PRBM void simulation_close(Simulation *simulation);
 /* Call on_impact(listener, impact) at each impact. */
 PRBM void simulation_listen(Simulation *simulation, ImpactListener *on_impact, void *listener);
+
+/* An observer of events, called at the time of an event before it and after it.  If it returns false,
+ * the simulation to the given time fails. */
+typedef bool EventObserver(void *observer, double time, bool after, Problem *problem);
+/* Call observe(observer, ...) at each event of co-simulation, changes of phase of compliant stops
+ * apart; NULL: no longer.  simulation_get then returns the values at that moment. */
+PRBM void simulation_observe(Simulation *simulation, EventObserver *observe, void *observer);
 PRBM const Mechanism *simulation_mechanism(const Simulation *simulation);
 PRBM size_t simulation_bytes(const Simulation *simulation); /* size of its block */
 /* Restore the state after simulation_open. */

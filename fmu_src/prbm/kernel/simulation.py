@@ -85,6 +85,13 @@ def tables_of(mechanism: Mechanism) -> Tables:
     return _tables[key][0]
 
 
+def _observed(library: ctypes.CDLL, address: int, count: int) -> list[list[float]]:
+    """Return the times and ``count`` values that the kernel has kept beside events."""
+    rows = np.empty((library.prbm_observed_count(address), 1 + count))
+    library.prbm_observed(address, rows.ctypes.data)
+    return rows.tolist()  # type: ignore[no-any-return]
+
+
 class KernelSimulation:
     """A mechanism in motion in the C kernel.
 
@@ -355,7 +362,12 @@ class KernelSimulation:
                 raise ParameterError(unknown(name, known))
         return np.array([known[name] for name in names], np.intc)
 
-    def sample(self, times: Sequence[float] | Real, names: Sequence[str]) -> Real:
+    def sample(
+        self,
+        times: Sequence[float] | Real,
+        names: Sequence[str],
+        events: list[list[float]] | None = None,
+    ) -> Real:
         """Advance to each of several times and return outputs there, (m, k).
 
         Parameters and errors as for :meth:`prbm.hybrid.simulation.Simulation.sample`.
@@ -367,6 +379,10 @@ class KernelSimulation:
             ctypes.byref(done), self._message,
         )  # fmt: skip
         with self._lock:
+            if events is not None and not self._library.prbm_observe(
+                self._address, len(slots), slots.ctypes.data, self._message
+            ):
+                raise self._error()
             try:
                 self._repeat(lambda: self._library.prbm_sample(*arguments))
             except BaseException:
@@ -374,6 +390,10 @@ class KernelSimulation:
                     self._library.prbm_advance(self._address, self.time, self._message)
                 )
                 raise
+            finally:
+                if events is not None:
+                    events += _observed(self._library, self._address, len(slots))
+                    self._library.prbm_observe(self._address, 0, None, self._message)
         return x
 
     # -- saving and restoring --

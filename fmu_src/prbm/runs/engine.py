@@ -89,8 +89,13 @@ class Engine(Protocol):
     def motions(self) -> dict[str, float]:
         """Return the positions and velocities of bodies and probes."""
 
-    def sample(self, times: Sequence[float] | Real, names: Sequence[str]) -> Real:
-        """Advance to each of several times and return outputs there."""
+    def sample(
+        self,
+        times: Sequence[float] | Real,
+        names: Sequence[str],
+        events: list[list[float]] | None = None,
+    ) -> Real:
+        """Advance to each of several times and return outputs there, and beside events."""
 
     def snapshot(self) -> dict[str, Any]:
         """Return the complete state as plain values."""

@@ -160,7 +160,7 @@ def sampled(
     step: float,
     tolerance: float | None = None,
     engine: str | None = None,
-    at_impacts: bool = False,
+    at_events: bool = False,
 ) -> tuple[dict[str, Real], tuple[Impact, ...]]:
     """Return outputs of a simulation without inputs over time, the same numbers as `simulate`.
 
@@ -176,9 +176,8 @@ def sampled(
         Outputs and inputs.
     stop_time, step, tolerance, engine
         As for :func:`simulate`, in SI.
-    at_impacts : bool
-        Sample directly before and at each impact, too.  The motion is then computed twice if it
-        has impacts; it does not depend on the times of the samples.
+    at_events : bool
+        Sample directly before and after each event, too.
 
     Returns
     -------
@@ -199,16 +198,25 @@ def sampled(
     wanted = [name for name in names if name not in constant and name != "time"]
     impacts: list[Impact] = []
     motion.record = impacts
-    table = motion.sample(times, wanted)
-    if at_impacts and impacts:
-        beside = {t for hit in impacts for t in (math.nextafter(hit.time, 0.0), hit.time)}
-        times = sorted({*times, *(t for t in beside if 0.0 < t < times[-1])})
-        table = simulation(mechanism, values, tolerance=tolerance, engine=engine).sample(
-            times, wanted
-        )
-    columns = dict(zip(wanted, np.array(table, float).T, strict=True))
-    columns |= {name: np.full(len(times), x) for name, x in constant.items()}
-    return {"time": np.array(times), **columns}, tuple(impacts)
+    events: list[list[float]] = []
+    table = np.column_stack((times, motion.sample(times, wanted, events if at_events else None)))
+    if events:
+        table = _in_order(np.array(events), table)
+    columns = dict(zip(("time", *wanted), table.T, strict=True))
+    columns |= {name: np.full(len(table), x) for name, x in constant.items()}
+    return columns, tuple(impacts)
+
+
+def _in_order(events: Real, samples: Real) -> Real:
+    """Return rows at events and samples in the order of their times, in their first column.
+
+    Of events at one time, the row before the first one and that after the last one remain.
+    """
+    events[:, 0] = np.maximum.accumulate(events[:, 0])
+    rows = np.concatenate((events, samples))
+    rows = rows[np.argsort(rows[:, 0], kind="stable")]
+    last: Real = rows[np.append(np.diff(rows[:, 0]) > 0.0, True)]
+    return last
 
 
 def _check(

@@ -173,5 +173,5 @@ class MechanismJob(Job):
         needed = {name for o in self.outputs if not o.static for name in o.variables(self.names)}
         if not any(output.history for output in self.outputs):
             options["step"] = self.stop
-        at_impacts = any(output.at_impacts for output in self.outputs)
-        return sampled(self.mechanism, given, sorted(needed), at_impacts=at_impacts, **options)
+        at_events = any(output.at_events for output in self.outputs)
+        return sampled(self.mechanism, given, sorted(needed), at_events=at_events, **options)

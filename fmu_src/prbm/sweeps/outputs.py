@@ -93,8 +93,8 @@ class Output:
         return extreme or self.reduction in ("mean", *TIMES)
 
     @property
-    def at_impacts(self) -> bool:
-        """Whether values directly before and after each impact are needed."""
+    def at_events(self) -> bool:
+        """Whether values directly before and after each event are needed."""
         return self.history and self.reduction not in TIMES
 
     def unit(self, units: Mapping[str, str]) -> str:

@@ -183,6 +183,11 @@ PRBM void simulation_listen(Simulation *simulation, ImpactListener *on_impact, v
     simulation->listener = listener;
 }
 
+PRBM void simulation_observe(Simulation *simulation, EventObserver *observe, void *observer) {
+    simulation->observe = observe;
+    simulation->observer = observer;
+}
+
 PRBM const Mechanism *simulation_mechanism(const Simulation *simulation) {
     return simulation->configuration.mechanism;
 }

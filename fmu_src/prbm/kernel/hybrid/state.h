@@ -224,6 +224,8 @@ struct Simulation {
     Scratch scratch; /* the whole block; who takes from a copy passes that copy on */
     ImpactListener *on_impact;
     void *listener;
+    EventObserver *observe;
+    void *observer;
     bool untouched; /* whether nothing has been set since the last communication point */
     double steps;   /* integration steps since the simulation was opened */
     size_t bytes;
