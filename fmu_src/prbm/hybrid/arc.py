@@ -1,10 +1,9 @@
 """A step of the integration as a function of time.
 
-There are two interpolations.  The dense output of the pair costs least, and events are detected
-with it.  Outputs and restarts need the accuracy of the method.  The polynomial of degree eight
-through positions, rates and accelerations at three times has it: at both ends of the step, and at
-the start of the previous step.  If the motion is not smooth there, a step to half the time
-computes the third state.
+There are two interpolations.  Events use the cheap dense output of the pair.  Outputs and restarts
+need the accuracy of the method, which the polynomial of degree eight through positions, rates and
+accelerations at three times has: at both ends of the step, and at the start of the previous step.
+If the motion is not smooth there, a step to half the time computes the third state.
 """
 
 from dataclasses import dataclass
