@@ -18,6 +18,10 @@ or a number of impacts differs.
 
 prints the CPU time of the steps of the default run instead.  Both FMUs run in turn, 100 times each.
 The ratios are those of the new time to the old time, for the medians and for the shortest times.
+
+    python benchmarks/versions.py old new --instructions 1000 --only fmi2/PRBDM2R.fmu
+
+prints the instructions of the first 1000 steps of the default run, which valgrind counts.
 """
 
 import argparse
@@ -31,6 +35,11 @@ from typing import Any
 
 import fmpy
 import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
+
+from c_importer import Job, execute, unpack
+from native import inclusive
 
 LENGTH_ATOL = 1e-9  # Largest difference of lengths before the runs diverge [m].
 KINDS = ("ModelExchange", "CoSimulation")
@@ -149,6 +158,21 @@ def timed(old: Path, new: Path, pairs: int) -> None:
     )
 
 
+def instructions(path: Path, steps: int) -> int:
+    """Return the instructions of the first steps of the default run of an FMU of FMI 2.0."""
+    description = fmpy.read_model_description(str(path))
+    points = float(description.defaultExperiment.stepSize) * np.arange(steps + 1)
+    output = next(v.name for v in description.modelVariables if v.causality == "output")
+    with tempfile.TemporaryDirectory() as name:
+        profile = Path(name) / "profile"
+        job = Job(unpack(path, Path(name) / "model"), points=points, records=(output,))
+        counter = ("valgrind", "--tool=callgrind", f"--callgrind-out-file={profile}")
+        done = execute(job, before=counter)
+        if done.status:
+            sys.exit(f"{path} failed: {done.errors}")
+        return inclusive(profile, ("fmi2DoStep",))[1]
+
+
 def main() -> int:
     """Compare all FMUs that two folders have in common; return the exit status."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
@@ -160,6 +184,9 @@ def main() -> int:
     )  # fmt: skip
     parser.add_argument("--only", metavar="FMU", help="path of one FMU below both folders")
     parser.add_argument("--time", type=int, metavar="PAIRS", help="measure the CPU time instead")
+    parser.add_argument(
+        "--instructions", type=int, metavar="STEPS", help="count the instructions of steps instead"
+    )
     options = parser.parse_args()
     common = sorted(
         path.relative_to(options.old)
@@ -175,8 +202,15 @@ def main() -> int:
         if options.time:
             timed(options.old / path, options.new / path, options.time)
             continue
+        if options.instructions:
+            before, after = (
+                instructions(folder / path, options.instructions)
+                for folder in (options.old, options.new)
+            )
+            print(f"  {before:,} and {after:,} instructions (new / old {after / before:.3f})")
+            continue
         good &= report(options.old / path, options.new / path, options.divergence)
-    if not options.time:
+    if not (options.time or options.instructions):
         print("the versions agree" if good else "the versions differ")
     return 0 if good else 1
 
