@@ -1,7 +1,8 @@
-"""A simulation for studies that writes to standard error."""
+"""Simulations for studies that write to standard error or hang."""
 
 import os
 import sys
+import time
 
 from prbm.sweeps.children import Job
 from prbm.sweeps.outputs import OK, Outcome
@@ -15,3 +16,10 @@ class Talking(Job):
         if row["a"]:
             os._exit(3)
         return Outcome(OK, values=(0.0,))
+
+
+class Hanging(Talking):
+    """A simulation that cannot be opened: that never ends."""
+
+    def opened(self):
+        time.sleep(1e6)

@@ -6,12 +6,13 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from prbm.sweeps.children import Child, Processes
+from prbm.sweeps import children
+from prbm.sweeps.children import STOPPED, Child, Processes, Unusable
 from prbm.sweeps.journal import Journal
 from prbm.sweeps.outputs import OK, Outcome
 from prbm.sweeps.runner import Runner
 from prbm.sweeps.study import study
-from talking import Talking
+from talking import Hanging, Talking
 
 
 class Endless:
@@ -71,6 +72,36 @@ def test_a_process_that_is_late_is_not_used_again(processes, monkeypatch):
     monkeypatch.setattr(Child, "receive", late)
     assert processes.run({"a": 0.0}).status == OK
     assert not processes.idle
+
+
+@pytest.mark.slow
+def test_a_simulation_that_hangs_while_it_is_opened_ends_the_study(monkeypatch):
+    """A short timeout of the runs does not limit the start of a process."""
+    monkeypatch.setattr(children, "OPENING_TIMEOUT", 1.0)
+    processes = Processes(Hanging(0.0, 1.0, 0.1, None, {}, ()), 0, 1e-3)
+    with pytest.raises(Unusable, match="it was not ready after 1 s"):
+        processes.run({"a": 0.0})
+    assert not processes.busy
+    processes.close()
+
+
+@pytest.mark.slow
+def test_a_study_can_be_stopped_while_its_simulation_is_opened():
+    processes, found = Processes(Hanging(0.0, 1.0, 0.1, None, {}, ()), 0, None), []
+
+    def run():
+        try:
+            processes.run({"a": 0.0})
+        except Unusable as error:
+            found.append(str(error))
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    while not processes.busy:
+        time.sleep(1e-2)
+    processes.close()
+    thread.join(20.0)
+    assert found == [STOPPED]
 
 
 def test_threads_give_the_same_bits(mechanisms):

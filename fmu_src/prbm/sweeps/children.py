@@ -24,6 +24,7 @@ from ..base.threads import THREAD_LIMITS
 from .outputs import CRASHED, TIMEOUT, Outcome, Output
 
 EXIT_TIMEOUT = 5.0  # Longest wait for the exit of a process before it is killed [s].
+OPENING_TIMEOUT = 120.0  # Longest wait for a process to open its simulation, with a timeout [s].
 STOPPED = "the study was stopped"
 COMMAND = "from prbm.sweeps.children import main; main()"
 Row = Mapping[str, float]
@@ -141,15 +142,9 @@ def _send(stream: BinaryIO, message: object) -> None:
 
 
 class Child:
-    """A process that runs a simulation.
+    """A process that opens a simulation and runs it."""
 
-    Raises
-    ------
-    Unusable
-        If the simulation cannot be opened.
-    """
-
-    def __init__(self, job: Job) -> None:
+    def __init__(self) -> None:
         paths = os.pathsep.join(path for path in sys.path if path)
         limits = {name: "1" for name in THREAD_LIMITS if name not in os.environ}
         self.stderr = tempfile.TemporaryFile()  # noqa: SIM115  # Closed by close().
@@ -162,11 +157,23 @@ class Child:
             start_new_session=True,  # Ctrl-C must reach only the process of the study.
         )
         self.late = False
+
+    def open(self, job: Job, timeout: float | None) -> None:
+        """Open the simulation.
+
+        Raises
+        ------
+        Unusable
+            If the simulation cannot be opened, or not within the timeout [s].
+        """
         self.send(job)
-        error = self.receive(None)
+        error = self.receive(timeout)
         if error != "":
             end = self.close()
-            raise Unusable(error or f"the process of the simulation ended at its start: {end}")
+            reason = f"the process of the simulation ended at its start: {end}"
+            if self.late:
+                reason = f"it was not ready after {timeout:g} s"
+            raise Unusable(error or reason)
 
     def send(self, message: object) -> None:
         """Send a message to the process."""
@@ -259,15 +266,25 @@ class Processes:
         if child is not None and child.process.poll() is not None:
             child.close()  # It was killed while it had no work.
             child = None
-        child = child or Child(self.job)
+        new, child = child is None, child or Child()
+        with self.lock:
+            self.busy.add(child)  # close() ends it from now on.
+        try:
+            if new and not self.closed:
+                limit = None if self.timeout is None else max(self.timeout, OPENING_TIMEOUT)
+                child.open(self.job, limit)
+        except Unusable:
+            with self.lock:
+                self.busy.discard(child)
+                if not self.closed:
+                    raise
+            raise Unusable(STOPPED) from None
+        if self.closed:
+            child.close()
+            raise Unusable(STOPPED)
         child.stderr.seek(0)  # For the process, too.
         child.stderr.truncate()
-        with self.lock:
-            self.busy.add(child)
-            if not self.closed:
-                return child
-        child.close()
-        raise Unusable(STOPPED)
+        return child
 
     def close(self) -> None:
         """Kill all processes, even during a run, and remove the job from this machine."""
