@@ -14,7 +14,7 @@ from ..base.errors import ParameterError
 from ..base.names import proposal
 from ..files.settings import in_unit, is_tolerance, tolerance
 from ..mechanics.arrays import Real
-from ..mechanism.parameters import Tolerance
+from ..mechanism.parameters import Tolerance, by_name
 from ..runs.inputs import Source, placeholders
 from .design import SENSITIVITY, distribution, drawn
 from .journal import Point
@@ -103,7 +103,7 @@ class Plan:
         kept = tuple(parse_output(text, known, column) for column, text in named.items())
         for output in kept:
             model.check(output)
-        sources, given = dict(inputs or {}), model.fixed(values)
+        sources, given = dict(by_name("inputs", inputs)), model.fixed(values)
         self.values = {**model.values, **given}
         columns = self._columns(vary, runs)
         self._check_names(columns, placeholders(sources), given)

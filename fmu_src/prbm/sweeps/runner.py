@@ -76,7 +76,7 @@ class Runner:
     Raises
     ------
     ParameterError
-        If workers or timeout are not positive, or retries negative.
+        If workers or timeout are not positive, retries negative, or the executor is not one.
     StudyError
         If the scheduler does not respond or has no workers.
     """
@@ -111,6 +111,11 @@ class Runner:
         elif isinstance(executor, str):
             client = self.stack.enter_context(_client(executor))
             self.executor = client.get_executor(pure=False)
+        elif not isinstance(executor, Executor):
+            raise ParameterError(
+                f"executor = {executor!r} must be an executor of concurrent.futures, or the "
+                "address of a Dask scheduler"
+            )
         else:
             self.executor = executor
             self.count = workers or getattr(executor, "_max_workers", None) or self.count

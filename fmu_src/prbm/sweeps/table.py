@@ -41,6 +41,11 @@ def read_table(table: Any, known: Container[str] = ()) -> dict[str, tuple[Cells,
         columns = _read_csv(path)
     else:
         frame = table if path is None else _read_parquet(path)
+        if not hasattr(frame, "items"):
+            raise ParameterError(
+                f"{frame!r} is no table: give a path, a DataFrame, or a mapping from names to "
+                "values"
+            )
         columns = [(str(head), column.tolist()) for head, column in frame.items()]
     where, rows = path or "the table", len(columns[0][1]) if columns else 0
     found: dict[str, tuple[Cells, str]] = {}
