@@ -171,7 +171,7 @@ class MechanismJob(Job):
             result = simulate(self.mechanism, given, inputs=inputs, **options)
             return result.columns, result.impacts
         needed = {name for o in self.outputs if not o.static for name in o.variables(self.names)}
-        if not any(output.history for output in self.outputs):
+        history = any(output.history for output in self.outputs)
+        if not history:
             options["step"] = self.stop
-        at_events = any(output.at_events for output in self.outputs)
-        return sampled(self.mechanism, given, sorted(needed), at_events=at_events, **options)
+        return sampled(self.mechanism, given, sorted(needed), at_events=history, **options)

@@ -92,11 +92,6 @@ class Output:
         extreme = self.reduction in EXTREMES and self.last not in OF_IMPACTS
         return extreme or self.reduction in ("mean", *TIMES)
 
-    @property
-    def at_events(self) -> bool:
-        """Whether values directly before and after each event are needed."""
-        return self.history and self.reduction not in TIMES
-
     def unit(self, units: Mapping[str, str]) -> str:
         """Return the unit of the value, from those of the variables."""
         if self.reduction == QUANTITY:
@@ -324,8 +319,8 @@ def reduce(output: Output, t: Real, x: Real) -> float:
     """Return the value of an output for the values x of its variable at times t [s], (m,).
 
     ``final``, ``max``, ``min``: in the unit of the variable.  ``mean``: average over time by the
-    trapezoidal rule.  ``first``: the first communication point at which the condition holds [s];
-    ``since``: the first one from which on it holds to the end [s]; NaN if no point qualifies.
+    trapezoidal rule.  ``first``: the first of the times at which the condition holds [s];
+    ``since``: the first one from which on it holds to the end [s]; NaN if none qualifies.
 
     Examples
     --------
