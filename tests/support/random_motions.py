@@ -58,6 +58,7 @@ GROWN = 1e-5  # Of nominal values, or of the duration: 10,000 times as much as i
 PEAK_RTOL = 1e-2  # Largest of the samples at the ends of steps, whose lengths vary by round-off.
 Nominals = Mapping[str, float]
 PEAKS = ("peak_stress", "peak_stress_time", "peak_stress_position")
+START_SHARE = 1e-3  # Of the duration.
 COUNTED = ("impact_count", "contact")
 LOCKED = "the release is almost locked"
 PRESSED = "a compliant stop is pressed deeply at the release"
@@ -243,7 +244,8 @@ def event_difference(one: Motion, other: Motion, end: float = END, factor: float
     """Return how the events of two motions differ by more than a factor; empty if they do not.
 
     Events at one time may have another order.  Directly after another event of a contact, the
-    direction of its sliding may be round-off, which one of the motions then reverses.
+    direction of its sliding may be round-off, which one of the motions then reverses.  A spring
+    that starts at its free length, at rest, changes its phase within the first steps.
     """
     for first, second in ((one, other), (other, one)):
         left = list(second.events)
@@ -252,6 +254,7 @@ def event_difference(one: Motion, other: Motion, end: float = END, factor: float
             begins = kind == EventKind.REVERSAL.name and any(
                 x[1] == part and 0.0 < t - x[2] <= factor * end for x in first.events
             )
+            begins = begins or (kind == EventKind.ACTION.name and t <= START_SHARE * end)
             if not near and not begins:
                 return f"{kind} of {part} at {t:.9g} s"
             if near:
