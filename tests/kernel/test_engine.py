@@ -333,6 +333,40 @@ def test_events_of_a_failed_advance_are_not_kept(engine, monkeypatch):
     assert rows == []
 
 
+@pytest.mark.parametrize("engine", ENGINES)
+def test_rows_beside_events_have_any_number_of_values(engine):
+    """A later sample may have more of them, or none."""
+    guide = mechanism("PRBDM2R")
+    repeated, once = engine(guide), engine(guide)
+    names = list(once.outputs())
+    repeated.sample([0.1], names[:1], first := [])
+    repeated.sample([1.0], names, second := [])
+    once.sample([0.1, 1.0], names, rows := [])
+    assert first == [row[:2] for row in rows[: len(first)]]
+    assert second == rows[len(first) :]
+    assert len(first) > 0
+    assert len(second) > 0
+    engine(guide).sample([1.0], [], times := [])
+    assert times == [row[:1] for row in rows]
+
+
+def test_changes_of_phase_have_no_rows():
+    """The contact of a compliant stop has rows at its begin and end only, alike in both engines."""
+    guide, found = mechanism("PRBDM2R"), []
+    stop = replace(guide.stops[0], law="compliant", stiffness=1e4, exponent=1.5)
+    for engine in ENGINES:
+        sim = engine(replace(guide, stops=(stop,)))
+        sim.record = []
+        sim.sample([0.046], ["stop.force"], rows := [])
+        assert len(sim.record) > 0
+        assert {hit.time for hit in sim.record} <= {time for time, _ in rows}
+        found.append(rows)
+    assert len(found[0]) == len(found[1])
+    times, forces = np.array(found).transpose(2, 0, 1)
+    np.testing.assert_allclose(times[0], times[1], atol=1e-7)
+    np.testing.assert_allclose(forces[:, [0, -1]], 0.0, atol=1e-3)
+
+
 class Interrupted:
     """The library of the kernel, with an error at the second part of the second sample."""
 
@@ -446,7 +480,9 @@ def test_random_calls_raise_no_other_errors_than_those_of_the_package(seed):
             lambda: sim.advance(sim.time + 1e-3 * abs(number())),
             lambda: sim.sample([number(), number()], outputs),
             lambda: sim.check_effort(number()),
-            lambda: sim.sample([sim.time + 1e-3 * abs(number())], outputs, []),
+            lambda: sim.sample(
+                [sim.time + 1e-2 * abs(number())], outputs[: random.integers(len(outputs))], []
+            ),
             lambda: sim.restore({**sim.snapshot(), "numbers": damaged(sim, random, number)}),
             sim.outputs,
             sim.state,

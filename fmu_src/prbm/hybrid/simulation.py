@@ -474,9 +474,10 @@ class Simulation:
         names : (k,)
             Names of outputs, in SI units and rad.
         events : list or None
-            If a list, the time and the outputs directly before and after each event are appended
-            to it; before an event, the time is the largest number below that of the event.
-            Changes of phase of compliant stops are no such events: nothing has a jump there.
+            If a list, the time and the outputs directly before and after each event of the
+            integration are appended to it; before an event, the time is the largest number below
+            that of the event.  No such events are changes of phase of compliant stops, which cause
+            no jump, the freezing of their contacts, and impacts by changed inputs.
 
         Raises
         ------
@@ -489,7 +490,7 @@ class Simulation:
         for name in names:
             if name not in outputs:
                 raise ParameterError(unknown(name, outputs))
-        moving = self.motions().keys() >= set(names)
+        moving, kept = self.motions().keys() >= set(names), list[list[float]]()
 
         def values() -> list[float]:
             self._output_cache = None
@@ -503,15 +504,15 @@ class Simulation:
 
         rows = np.empty((len(times), len(names)))
         for row, t in zip(rows, times, strict=True):
-            kept: list[list[float]] = []
+            kept.clear()
             self._beside = None if events is None else beside
             try:
                 self.advance(t)
             finally:
                 self._beside = None
-            row[:] = values()
             if events is not None:
                 events += kept
+            row[:] = values()
         return rows
 
     # -- saving and restoring --

@@ -173,7 +173,6 @@ static bool show(Simulation *sim, double time, bool after, Problem *problem) {
         return true;
     }
     sim->state.time = time;
-    sim->present.fresh = NOTHING;
     bool ok = sim->observe(sim->observer, time, after, problem);
     sim->state.time = now;
     sim->present.fresh = NOTHING;

@@ -159,18 +159,21 @@ static bool record_event(void *observer, double time, bool after, Problem *probl
 
 EXPORTED bool prbm_observe(Engine *engine, int count, const int *slots, char *message) {
     Problem problem = {""};
+    if (!slots) {
+        simulation_observe(engine->simulation, NULL, NULL);
+        return true;
+    }
     int *kept = realloc(engine->slots, ((size_t)count + 1) * sizeof *slots);
     if (!succeed(kept || fail(&problem, "there is not enough memory to record events"), &problem,
                  message)) {
         return false;
     }
-    if (count > 0) {
-        memcpy(kept, slots, (size_t)count * sizeof *slots);
-    }
+    memcpy(kept, slots, (size_t)count * sizeof *slots);
+    free(engine->events.numbers);
+    engine->events = (Record){NULL, 0, 0, 0}; /* Its rows have another length. */
     engine->slots = kept;
     engine->slot_count = count;
-    engine->events.count = 0;
-    simulation_observe(engine->simulation, count > 0 ? record_event : NULL, engine);
+    simulation_observe(engine->simulation, record_event, engine);
     return true;
 }
 

@@ -72,7 +72,8 @@ EXPORTED int prbm_mode_count(const Engine *engine);
 EXPORTED int prbm_modes(Engine *engine, double *q, double *frequencies, double *shapes,
                         char *message);
 
-/* Keep the values of slots (count,) directly before and after each event from now on; 0: no longer. */
+/* Keep the values of slots (count,) directly before and after each event from now on; NULL: no longer,
+ * which does not fail. */
 EXPORTED bool prbm_observe(Engine *engine, int count, const int *slots, char *message);
 /* The number of rows that have been kept.  Move them out: time and values, (rows, 1 + count).  Before
  * an event, the time is the largest number below that of the event. */

@@ -379,11 +379,11 @@ class KernelSimulation:
             ctypes.byref(done), self._message,
         )  # fmt: skip
         with self._lock:
-            if events is not None and not self._library.prbm_observe(
-                self._address, len(slots), slots.ctypes.data, self._message
-            ):
-                raise self._error()
             try:
+                if events is not None and not self._library.prbm_observe(
+                    self._address, len(slots), slots.ctypes.data, self._message
+                ):
+                    raise self._error()
                 self._repeat(lambda: self._library.prbm_sample(*arguments))
             except BaseException:
                 self._take_impacts(
@@ -391,9 +391,9 @@ class KernelSimulation:
                 )
                 raise
             finally:
+                self._library.prbm_observe(self._address, 0, None, None)
                 if events is not None:
                     events += _observed(self._library, self._address, len(slots))
-                    self._library.prbm_observe(self._address, 0, None, self._message)
         return x
 
     # -- saving and restoring --

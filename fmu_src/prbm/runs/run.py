@@ -211,9 +211,15 @@ def _in_order(events: Real, samples: Real) -> Real:
     """Return rows at events and samples in the order of their times, in their first column.
 
     Of events at one time, the row before the first one and that after the last one remain.
+
+    Examples
+    --------
+    >>> events = np.array([[0.9, 1.0], [1.0, 2.0], [0.9, 3.0], [1.0, 4.0], [1.5, 5.0], [1.6, 6.0]])
+    >>> _in_order(events, np.array([[0.0, 0.0], [1.0, 4.0]])).tolist()
+    [[0.0, 0.0], [0.9, 1.0], [1.0, 4.0], [1.5, 5.0], [1.6, 6.0]]
     """
-    events[:, 0] = np.maximum.accumulate(events[:, 0])
-    rows = np.concatenate((events, samples))
+    times = np.maximum.accumulate(events[:, 0])
+    rows = np.concatenate((np.column_stack((times, events[:, 1:])), samples))
     rows = rows[np.argsort(rows[:, 0], kind="stable")]
     last: Real = rows[np.append(np.diff(rows[:, 0]) > 0.0, True)]
     return last
