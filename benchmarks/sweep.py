@@ -51,10 +51,16 @@ class Cost:
 
 def measured(work: Callable[[], object], runs: int) -> Cost:
     """Return the cost of a run of some work, with that of the processes it has ended."""
-    wall, processor = time.perf_counter(), sum(os.times()[:4])
+    wall, processor = time.perf_counter(), used()
     work()
-    wall, processor = time.perf_counter() - wall, sum(os.times()[:4]) - processor
+    wall, processor = time.perf_counter() - wall, used() - processor
     return Cost(wall / runs, processor / runs)
+
+
+def used() -> float:
+    """Return the processor time of this process and of those that it has ended [s]."""
+    ended = os.times()
+    return time.process_time() + ended.children_user + ended.children_system
 
 
 def studied(model: Mechanism | Path, table: pd.DataFrame, stop_time: float, workers: int) -> None:

@@ -123,7 +123,7 @@ def test_a_failure_of_memory_for_the_record_changes_nothing(tmp_path, monkeypatc
     sources = kernel()
     for old, new in [
         (b"room > INT_MAX / 2", b"room > 0"),
-        (b"FIRST_IMPACTS = 16", b"FIRST_IMPACTS = 3"),
+        (b"FIRST_ROWS = 16", b"FIRST_ROWS = 3"),
     ]:
         assert sources["engine.c"].count(old) == 1
         sources["engine.c"] = sources["engine.c"].replace(old, new)
@@ -142,6 +142,10 @@ def test_a_failure_of_memory_for_the_record_changes_nothing(tmp_path, monkeypatc
     ):
         sim.advance(9.0)
     assert (sim.time, len(sim.record)) == (0.05, count)
+    sim.record = None
+    with pytest.raises(SimulationError, match="not enough memory to record the events up to t ="):
+        sim.sample([9.0], ["shuttle.x"], rows := [])
+    assert (sim.time, rows) == (0.05, [])
     for one in (sim, expected):
         one.advance(0.08)
     assert sim.state().tobytes() == expected.state().tobytes()
