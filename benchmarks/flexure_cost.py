@@ -41,7 +41,7 @@ from flexure_models import guide, guide_figures, limit_of_elements
 from native import POINTS
 from prbm.kernel.simulation import KernelSimulation
 from prbm.references.finite_elements import FiniteElements
-from scaling import beams, counted, instructions
+from scaling import beams, counted_in, instructions
 from support import mechanism
 
 Real = NDArray[np.float64]
@@ -206,7 +206,7 @@ def print_default_runs() -> None:
     }
     reference: tuple[float, float] | None = None
     for name, given in guides.items():
-        one, run = instructions(given), counted(given, POINTS, ("fmi2DoStep",))[0][1]
+        one, run = instructions(given), counted_in(given, POINTS, ("fmi2DoStep",))[0][1]
         reference = reference or (one, run)
         print(
             f"  {name:14s} right-hand side {one:6.0f}, ratio {one / reference[0]:5.3f}; "

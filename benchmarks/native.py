@@ -357,6 +357,23 @@ def inclusive(profile: Path, functions: Sequence[str]) -> tuple[int, int]:
     return calls, total
 
 
+def counted(job: Job, *groups: Sequence[str]) -> list[tuple[int, int]]:
+    """Run a job in callgrind; return the calls and inclusive instructions of groups of functions.
+
+    Raises
+    ------
+    RuntimeError
+        If the run fails, or a group has not been called.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "profile"
+        counter = ("valgrind", "--tool=callgrind", f"--callgrind-out-file={file}")
+        done: Result = execute(job, before=counter)
+        if done.status:
+            raise RuntimeError(done.errors)
+        return [inclusive(file, functions) for functions in groups]
+
+
 def profile(runs: int) -> None:
     """Print the instructions of a right-hand side and its share of a run."""
     del runs
@@ -366,16 +383,8 @@ def profile(runs: int) -> None:
     print("\nInstructions per right-hand side, over the default run until 0.1 s")
     library = kernel_library("profiled", ("-g",))
     for name, model in MODELS.items():
-        with tempfile.TemporaryDirectory() as folder:
-            file = Path(folder) / "profile"
-            job = Job(native(model, 2), points=POINTS[:101], records=READ, library=library)
-            counter = ("valgrind", "--tool=callgrind", f"--callgrind-out-file={file}")
-            done: Result = execute(job, before=counter)
-            if done.status:
-                print(done.errors)
-                return
-            calls, total = inclusive(file, RIGHT_HAND_SIDE)
-            _, whole = inclusive(file, ("fmi2DoStep",))
+        job = Job(native(model, 2), points=POINTS[:101], records=READ, library=library)
+        (calls, total), (_, whole) = counted(job, RIGHT_HAND_SIDE, ("fmi2DoStep",))
         needed = operations(model)
         print(
             f"{name:4s}{total / calls:8.0f} instructions, {sum(needed.values())} operations needed "

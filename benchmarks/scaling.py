@@ -32,8 +32,8 @@ from numpy.typing import NDArray
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "support"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fmu_src"))
 
-from c_importer import Job, execute, kernel_library, unpack, write
-from native import POINTS, RIGHT_HAND_SIDE, cost, inclusive
+from c_importer import Job, kernel_library, unpack, write
+from native import POINTS, RIGHT_HAND_SIDE, cost, counted
 from prbm.fmu import native_fmu
 from prbm.kernel.compiler import FLAGS
 from prbm.kernel.simulation import KernelSimulation
@@ -148,7 +148,7 @@ class Cost:
     schur: float = 0.0
 
 
-def counted(given: Mechanism, points: Real, *groups: Sequence[str]) -> list[tuple[int, int]]:
+def counted_in(given: Mechanism, points: Real, *groups: Sequence[str]) -> list[tuple[int, int]]:
     """Return the calls and inclusive instructions of groups of functions of a native FMU.
 
     Parameters
@@ -166,11 +166,7 @@ def counted(given: Mechanism, points: Real, *groups: Sequence[str]) -> list[tupl
         optimized = [flag for flag in FLAGS if flag != "-g0"]
         library = kernel_library("profiled", ("-g", *optimized))
         job = Job(folder / "model", points=points, records=("shuttle.x",), library=library)
-        counter = ("valgrind", "--tool=callgrind", f"--callgrind-out-file={folder / 'profile'}")
-        done = execute(job, before=counter)
-        if done.status:
-            raise RuntimeError(done.errors)
-        return [inclusive(folder / "profile", functions) for functions in groups]
+        return counted(job, *groups)
 
 
 def right_hand_side(given: Mechanism, constraints: int = 0) -> Cost:
@@ -179,7 +175,7 @@ def right_hand_side(given: Mechanism, constraints: int = 0) -> Cost:
     motion.advance(STOP_TIME_MAX)
     stop_time = STOP_TIME_MAX * min(1.0, STEPS_MAX / motion.step_count)
     groups = (RIGHT_HAND_SIDE, *((SCHUR_COMPLEMENT,) if constraints > SMALL else ()))
-    found = counted(given, np.array([0.0, stop_time]), *groups)
+    found = counted_in(given, np.array([0.0, stop_time]), *groups)
     return Cost(*(total / calls for calls, total in found))
 
 

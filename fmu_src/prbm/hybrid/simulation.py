@@ -493,12 +493,11 @@ class Simulation:
         moving, kept = self.motions().keys() >= set(names), list[list[float]]()
 
         def values() -> list[float]:
-            self._output_cache = None
             out: Mapping[str, float] = self.motions() if moving else self.outputs()
             return [out[name] for name in names]
 
         def beside(time: float, label: float) -> None:
-            now, self.time = self.time, time
+            now, self.time, self._output_cache = self.time, time, None
             kept.append([label, *values()])
             self.time, self._output_cache = now, None
 
