@@ -28,7 +28,10 @@ def content(path: Path, limit: int, error: Callable[[str], PrbmError]) -> bytes:
         with path.open("rb") as file:
             data = file.read(limit + 1)
     except (OSError, ValueError) as failure:
-        raise error(f"{shown(path)}: cannot be read ({opening_error(failure)})") from None
+        raise error(
+            f"{shown(path)}: cannot be read ({opening_error(failure)}); correct the path, or the "
+            "permissions of the file"
+        ) from None
     if len(data) > limit:
         raise error(f"{path}: larger than {limit} bytes, the limit of such files; split it")
     return data
