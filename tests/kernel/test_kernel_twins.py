@@ -1545,7 +1545,7 @@ class KernelEquations:
         """Set the accelerations and multipliers of the evaluation, and return them as one."""
         for address, x in ((self.evaluation.a, a), (self.evaluation.lam, lam)):
             ctypes.memmove(address, np.ascontiguousarray(x).ctypes.data, 8 * len(x))
-        return dynamics.Evaluation(a, lam, None, None, None, None)
+        return dynamics.Evaluation(a, lam, None, None, None, None, 0.0)
 
     def rate(self, t, y):
         """Return the rates of a state at a time."""

@@ -47,11 +47,16 @@ class DirectionMap:
         d, n = self.Phi.shape
         return d == n and bool(np.array_equal(self.Phi, np.eye(n)))
 
+    @cached_property
+    def _transposed(self) -> Real:
+        """Phi^T in the order of its own rows, whose products are faster."""
+        return self.Phi.T.copy()
+
     def of(self, q: Real) -> Real:
         """Return the directions, or their rates, (..., d), of coordinates or rates (..., n)."""
         if self.identity:
             return q
-        result: Real = q @ self.Phi.T
+        result: Real = q.dot(self._transposed)
         return result
 
     def to_coordinates(self, x: Row) -> Row:

@@ -23,7 +23,7 @@ from .compliant_stops import CompliantState, CompliantStops, Pressure
 from .contact_state import ContactMode, ContactState
 from .elements import Elements
 from .inputs import Inputs
-from .kinetics import kinetic_energy, mass_accelerations
+from .kinetics import mass_accelerations
 from .system import FIXED, Rows, System
 
 
@@ -43,6 +43,8 @@ class Evaluation(NamedTuple):
         Factors of the equations, for :meth:`Equations.project_near`.
     e : (d,) complex
         Directions.
+    mass_loss : float
+        Power that damping in proportion to mass dissipates [W].
     pressure : Pressure or None
         Forces of the pressed compliant stops, if there are any.
     """
@@ -53,6 +55,7 @@ class Evaluation(NamedTuple):
     scale: Real
     factors: constraints.Factors
     e: Complex
+    mass_loss: float
     pressure: Pressure | None = None
 
     @property
@@ -170,7 +173,8 @@ class Equations:
         self.moves = np.hstack(
             [system.Phi.Phi * self.force_scale, np.zeros((len(self.w), 1))]
         ).astype(complex)
-        self.inertia = system.inertia * self.force_scale * self.force_scale[:, None]
+        self.saddle = np.zeros((len(self.scale),) * 2)
+        self.saddle[:n, :n] = system.inertia * self.force_scale * self.force_scale[:, None]
 
     def with_contacts(self, contacts: ContactState) -> "Equations":
         """Return the equations for another state of the contacts."""
@@ -213,22 +217,13 @@ class Equations:
         system, n, d = self.system, self.n, len(self.w)
         e, w = system.directions(q), system.turning(v)
         moved = self.moves * e[:, None]
-        moved[:, n] = e * (w * w)
+        np.multiply(e, w * w, out=moved[:, n])
         terms = self.terms.dot(moved)
         moments = moved.conj().T.dot(terms[:d])
-        kkt, right = np.zeros((len(self.scale),) * 2), np.empty(len(self.scale))
-        R, bent = kkt[n:, :n], right[n:]
-        np.add(moments.real[:n, :n], self.inertia, out=kkt[:n, :n])
-        R[:], bent[:] = terms.real[d:-1, :n], terms.imag[d:-1, n]
-        if len(self.rows.carried):
-            carried, unit = self.rows.carried, self.scale[n + self.rows.carried]
-            slopes, convective = self.rows.carried_terms(e, v)
-            R[carried] = unit[:, None] * slopes * self.force_scale
-            bent[carried] = unit * convective
-        kkt[:n, n:] = R.T
-        if self.moving_walls:
-            walls = slice(self.first_hold, self.first_stick)
-            bent[walls] -= self.scale[n:][walls] * self.held_motions(t)[2]
+        kkt, right = self.saddle.copy(), np.empty(len(self.scale))
+        kkt[:n, :n] += moments.real[:n, :n]
+        if len(kkt) > n:
+            self._set_rows(t, e, v, terms, kkt, right)
         Q = self.element.motion_force(q, e, v, self.beta)
         if self.driven:
             Q += self.moment
@@ -241,8 +236,12 @@ class Equations:
             limit = self.friction_limit(c, e, pressure)
             Q -= self.contacts.modes[c].slip * limit * self.slip_row(c, e)
         Q *= self.force_scale
+        mass_loss = 0.0
         if self.mass_damping:
-            Q -= self.mass_damping * (kkt[:n, :n] @ (v / self.force_scale))
+            speed = v / self.force_scale
+            drag = self.mass_damping * kkt[:n, :n].dot(speed)
+            Q -= drag
+            mass_loss = float(drag.dot(speed))
         Q += moments.imag[:n, n]
         np.add(Q, terms.imag[-1, :n], out=right[:n])
         for c in self.slipping_rows:
@@ -251,7 +250,24 @@ class Equations:
             kkt[:n, n + self.normal_row(c)] -= share * self.slip_row(c, e) * self.force_scale
         x, factors = constraints.factor_and_solve(kkt, right, n, system.length, self.scale)
         M = kkt[:n, :n]
-        return Evaluation(x[:n], -x[n:], M, self.force_scale, factors, e, pressure)
+        return Evaluation(x[:n], -x[n:], M, self.force_scale, factors, e, mass_loss, pressure)
+
+    def _set_rows(
+        self, t: float, e: Complex, v: Real, terms: Complex, kkt: Real, right: Real
+    ) -> None:
+        """Set the scaled rows and their convective terms, from the products of :meth:`evaluate`."""
+        n, d = self.n, len(self.w)
+        R, bent = kkt[n:, :n], right[n:]
+        R[:], bent[:] = terms.real[d:-1, :n], terms.imag[d:-1, n]
+        if len(self.rows.carried):
+            carried, unit = self.rows.carried, self.scale[n + self.rows.carried]
+            slopes, convective = self.rows.carried_terms(e, v)
+            R[carried] = unit[:, None] * slopes * self.force_scale
+            bent[carried] = unit * convective
+        kkt[:n, n:] = R.T
+        if self.moving_walls:
+            walls = slice(self.first_hold, self.first_stick)
+            bent[walls] -= self.scale[n:][walls] * self.held_motions(t)[2]
 
     # -- rates of the state --
 
@@ -264,11 +280,7 @@ class Equations:
         n = self.n
         q, v, extras = y[:n], y[n : 2 * n], y[2 * n + 2 :]
         evaluation = self.evaluate(t, q, v, extras)
-        loss, power = self.element.loss(evaluation.e, v, self.beta), 0.0
-        if self.mass_damping:
-            loss += (
-                2.0 * self.mass_damping * kinetic_energy(evaluation.scaled, v / evaluation.scale)
-            )
+        loss, power = evaluation.mass_loss + self.element.loss(evaluation.e, v, self.beta), 0.0
         if self.slipping_points or self.slipping_rows:
             loss += friction_power(self, q, v, evaluation)
         if self.driven or self.moving_walls:
