@@ -11,6 +11,7 @@ import pytest
 
 from prbm.references.scalar_guide import ScalarGuide
 from prbm.runs.engine import simulation
+from prbm.runs.run import sampled, simulate
 from prbm.sweeps.study import study
 
 END = 1.5  # s, about seven periods.
@@ -111,6 +112,42 @@ def check(guide, runs: int, seed: int) -> None:
         lost = 0.5 * mass * (1 - restitution**2) * sum(v * v for v in exact.speeds)
         assert got["energy_lost"] == pytest.approx(lost, rel=1e-3)
     assert seen > 0.9 * runs
+
+
+@pytest.mark.parametrize("engine", ["kernel", "python"])
+def test_extremes_see_the_impacts_between_samples_of_driven_motions(mechanisms, engine):
+    """A step of the force F drives the guide from rest to the wall, where it is fastest.
+
+    M r^2 phi'^2 / 2 = F r sin(phi) - 2 k phi^2.  The samples are 10 ms apart.
+    """
+    guide, wall, force = mechanisms["PRBDM"], 2e-3, 3.0
+    found = study(
+        guide, {"stop.restitution": [0.2, 0.3]},
+        ["max(shuttle.vx)", "impact_speed", "max(force.x)", "min(force.x)"],
+        values={**FREE, "release.displacement": 0.0, "stop.position": wall},
+        inputs={"force.x": f"step({force} N, 3 ms)"}, stop_time=0.05, step=0.01, tolerance=1e-10,
+        workers=1, engine=engine,
+    )  # fmt: skip
+    assert found.messages == ("", "")
+    scalar = ScalarGuide.of({**guide.values(), **FREE})
+    phi = math.asin(wall / scalar.r)
+    energy = force * wall - 2.0 * scalar.k * phi**2
+    speed = math.cos(phi) * math.sqrt(2.0 * energy / scalar.mass)
+    for name in ("max(shuttle.vx)", "impact_speed"):
+        assert found.outputs[name] == pytest.approx(speed, rel=1e-6)
+    assert found.outputs["max(force.x)"].tolist() == [force] * 2
+    assert found.outputs["min(force.x)"].tolist() == [0.0] * 2
+
+
+def test_driven_motions_have_the_numbers_of_a_simulation(mechanisms):
+    """The outputs of a study are those of the simulation with the same inputs, bit by bit."""
+    mechanism, inputs = mechanisms["PRBDM2R"], {"base.acceleration.x": "half-sine(30 g, 2 ms)"}
+    result = simulate(mechanism, inputs=inputs, stop_time=0.1, step=1e-3)
+    names = ["shuttle.x", "stop.impulse", *inputs]
+    columns, impacts = sampled(mechanism, {}, names, inputs=inputs, stop_time=0.1, step=1e-3)
+    assert len(impacts) == len(result.impacts) > 0
+    for name in ("time", *names):
+        assert columns[name].tolist() == result[name].tolist()
 
 
 def test_static_quantities_need_no_simulation(mechanisms, monkeypatch):

@@ -20,6 +20,7 @@ from .experiment import experiment, experiment_of
 from .inputs import Source as InputSource
 from .inputs import check_wall, signals
 from .result import Columns, Result, row_type
+from .signals import after
 
 Source = Callable[[float], Mapping[str, float]]
 ROWS_MAX = 10_000_000  # Most communication points; a larger number is likely a wrong unit.
@@ -158,11 +159,12 @@ def sampled(
     *,
     stop_time: float,
     step: float,
+    inputs: Mapping[str, InputSource] | None = None,
     tolerance: float | None = None,
     engine: str | None = None,
     at_events: bool = False,
 ) -> tuple[dict[str, Real], tuple[Impact, ...]]:
-    """Return outputs of a simulation without inputs over time, the same numbers as `simulate`.
+    """Return outputs of a simulation, the same numbers as :func:`simulate`.
 
     It computes the outputs ``names`` only, and so takes hardly longer than the engine alone.
 
@@ -174,7 +176,7 @@ def sampled(
         Parameters and inputs that differ from their defaults, in SI.
     names : sequence of str
         Outputs and inputs.
-    stop_time, step, tolerance, engine
+    stop_time, step, inputs, tolerance, engine
         As for :func:`simulate`, in SI.
     at_events : bool
         Sample directly before and after each event, too.
@@ -192,19 +194,53 @@ def sampled(
         As :func:`simulate`.
     """
     times = communication_points(stop_time, step)
-    motion = simulation(mechanism, values, tolerance=tolerance, engine=engine)
-    _check(motion, Driver({}), None, times[-1], step, tolerance)
-    constant = {name: x for name, x in {**motion.values, **motion.given}.items() if name in names}
-    wanted = [name for name in names if name not in constant and name != "time"]
+    driver = Driver(signals(mechanism, inputs or {}, values))
+    start = {**values, **driver.values(0.0)}
+    motion = simulation(mechanism, start, tolerance=tolerance, engine=engine)
+    _check(motion, driver, None, times[-1], step, tolerance)
+    given = {**motion.values, **motion.given}
+    wanted = [name for name in names if name not in given and name != "time"]
     impacts: list[Impact] = []
     motion.record = impacts
     events: list[list[float]] = []
-    table = np.column_stack((times, motion.sample(times, wanted, events if at_events else None)))
+    sampler = _Sampler(motion, wanted, events if at_events else None)
+    rows = sampler.driven(driver, times) if driver.signals else sampler.rows(times)
+    table = np.column_stack((times, rows))
     if events:
         table = _in_order(np.array(events), table)
     columns = dict(zip(("time", *wanted), table.T, strict=True))
-    columns |= {name: np.full(len(table), x) for name, x in constant.items()}
+    columns |= {name: np.full(len(table), x) for name, x in given.items() if name in names}
+    for name in driver.signals.keys() & set(names):
+        signal = driver.signals[name]
+        columns[name] = np.array([after(signal, t) for t in columns["time"].tolist()])
     return columns, tuple(impacts)
+
+
+class _Sampler:
+    """A motion whose outputs, and rows beside events unless None, are kept as it advances."""
+
+    def __init__(
+        self, motion: Engine, names: Sequence[str], events: list[list[float]] | None
+    ) -> None:
+        self.motion, self.names, self.events = motion, names, events
+        self.set = motion.set
+        self.last: Real = np.empty(0)
+
+    def rows(self, times: Sequence[float]) -> Real:
+        """Advance to each of several times [s], and return the outputs there."""
+        return self.motion.sample(times, self.names, self.events)
+
+    def advance(self, time: float) -> None:
+        """Continue the motion to a time [s]."""
+        self.last = self.rows([time])[0]
+
+    def driven(self, driver: Driver, times: Sequence[float]) -> Real:
+        """Advance with inputs over time, and return the outputs at several times [s]."""
+        rows = np.empty((len(times), len(self.names)))
+        for row, t in zip(rows, times, strict=True):
+            driver.advance(self, t)
+            row[:] = self.last
+        return rows
 
 
 def _in_order(events: Real, samples: Real) -> Real:

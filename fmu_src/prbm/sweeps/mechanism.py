@@ -23,7 +23,7 @@ from ..mechanism.parameters import Tolerance
 from ..runs.engine import PYTHON, check_engine, kernel_available
 from ..runs.experiment import experiment
 from ..runs.inputs import Source, filled, signals
-from ..runs.run import communication_points, sampled, simulate
+from ..runs.run import communication_points, sampled
 from .children import Job, Row
 from .outputs import FAILED, OK, Outcome, Output, evaluate, parse_output
 
@@ -163,15 +163,10 @@ class MechanismJob(Job):
 
     def _motion(self, given: Mapping[str, float], inputs: Mapping[str, Source]) -> tuple[Any, Any]:
         """Return the columns that the outputs need, and the impacts."""
-        options: Any = {
-            "stop_time": self.stop, "step": self.step, "tolerance": self.tolerance,
-            "engine": self.engine,
-        }  # fmt: skip
-        if inputs:
-            result = simulate(self.mechanism, given, inputs=inputs, **options)
-            return result.columns, result.impacts
         needed = {name for o in self.outputs if not o.static for name in o.variables(self.names)}
         history = any(output.history for output in self.outputs)
-        if not history:
-            options["step"] = self.stop
-        return sampled(self.mechanism, given, sorted(needed), at_events=history, **options)
+        return sampled(
+            self.mechanism, given, sorted(needed), inputs=inputs, stop_time=self.stop,
+            step=self.step if history or inputs else self.stop, tolerance=self.tolerance,
+            engine=self.engine, at_events=history,
+        )  # fmt: skip
