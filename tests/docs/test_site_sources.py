@@ -13,6 +13,7 @@ import gallery
 import links
 import prbm
 import sources
+from prbm.drawing.icon import STYLES
 from prbm.files.mechanism_file import load, shipped
 from support import ROOT
 
@@ -121,6 +122,13 @@ def test_the_reference_has_the_public_names_and_those_that_pages_and_examples_im
 def test_examples_of_the_docstrings_hold(module):
     failures, tests = doctest.testmod(import_module(module))
     assert (failures, tests > 0) == (0, True)
+
+
+def test_all_kinds_of_parts_have_colours_on_the_site():
+    """A kind without a rule would be invisible."""
+    rules = (ROOT / "docs/website/static/site.css").read_text()
+    coloured = set(re.findall(r"\.mechanism \.(\w+)[^{]*\{[^}]*\b(?:stroke|fill): var", rules))
+    assert {kind.split()[0] for kind in STYLES} - {"centre"} <= coloured  # It is not drawn.
 
 
 @pytest.mark.slow
