@@ -625,6 +625,7 @@ MISTAKES = [
     ("picture PRBDM --out taken/a.png", "cannot write to taken: taken is a file; choose another"),
     ("animate PRBDM taken/a.gif", "cannot write to taken: taken is a file; choose another folder"),
     ("animate PRBDM new/a.gif --slow -1", "slow = -1 must be positive"),
+    ("animate PRBDM", "give the file to write, too: prbm animate PRBDM PRBDM.gif"),
     ("animate out.gif", "nothing to show: give RESULT.csv"),
     ("animate PRBDM out.txt", "end the name in .gif or .mp4"),
     ("measure", "required: QUANTITY"),

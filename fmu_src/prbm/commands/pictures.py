@@ -70,6 +70,8 @@ def plates(mechanism: Mechanism, values: Mapping[str, float]) -> Iterator[str]:
 def run_animation(options: argparse.Namespace) -> None:
     """Write a film of a result, or of a new simulation."""
     path = Path(options.files[-1])
+    if len(options.files) == 1 and _is_mechanism(options.files[0]):
+        raise UserMistake(f"give the file to write, too: prbm animate {path} {path.stem}.gif")
     check_encoder(path)
     check_file(path)
     start, stop = (
@@ -126,9 +128,13 @@ def _named(options: argparse.Namespace) -> tuple[Mechanism | None, list[str]]:
     if options.model is not None:
         return load(options.model), options.files
     first = options.files[0]
-    if len(options.files) == 2 and (first in shipped() or first.endswith(".toml")):
+    if len(options.files) == 2 and _is_mechanism(first):
         return load(first), options.files[1:]
     return None, options.files
+
+
+def _is_mechanism(name: str) -> bool:
+    return name in shipped() or name.endswith(".toml")
 
 
 def _owner(columns: Columns) -> Mechanism:
