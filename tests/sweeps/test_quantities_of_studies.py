@@ -123,7 +123,7 @@ def test_extremes_see_the_impacts_between_samples_of_driven_motions(mechanisms, 
     guide, wall, force = mechanisms["PRBDM"], 2e-3, 3.0
     found = study(
         guide, {"stop.restitution": [0.2, 0.3]},
-        ["max(shuttle.vx)", "impact_speed", "max(force.x)", "min(force.x)"],
+        ["max(shuttle.vx)", "impact_speed", "max(force.x)", "min(force.x)", "stop.position"],
         values={**FREE, "release.displacement": 0.0, "stop.position": wall},
         inputs={"force.x": f"step({force} N, 3 ms)"}, stop_time=0.05, step=0.01, tolerance=1e-10,
         workers=1, engine=engine,
@@ -137,6 +137,7 @@ def test_extremes_see_the_impacts_between_samples_of_driven_motions(mechanisms, 
         assert found.outputs[name] == pytest.approx(speed, rel=1e-6)
     assert found.outputs["max(force.x)"].tolist() == [force] * 2
     assert found.outputs["min(force.x)"].tolist() == [0.0] * 2
+    assert found.outputs["stop.position"].tolist() == [wall] * 2
 
 
 def test_driven_motions_have_the_numbers_of_a_simulation(mechanisms):
