@@ -126,7 +126,7 @@ def test_examples_of_the_docstrings_hold(module):
 
 def test_all_kinds_of_parts_have_colours_on_the_site():
     """A kind without a rule would be invisible."""
-    rules = (ROOT / "docs/website/static/site.css").read_text()
+    rules = (ROOT / "docs/website/static/site.css").read_text(encoding="utf-8")
     coloured = set(re.findall(r"\.mechanism \.(\w+)[^{]*\{[^}]*\b(?:stroke|fill): var", rules))
     assert {kind.split()[0] for kind in STYLES} - {"centre"} <= coloured  # It is not drawn.
 
